@@ -37,6 +37,7 @@ state() {
   shift
   [ -e "$work/$name.nml" ] && return
   [[ $* == *'packing_fraction = 0.7'* ]] && placement=lattice
+  [[ $* == *'packing_fraction = 0.7, polydispersity'* ]] && placement=dense
   input "$work/start.nml" "placement = '$placement', velocities = 'maxwell'" "$@"
   "$program" "$work/start.nml" -o "$work/$name.h5" --quiet --set stop.collisions_per_disk=20 >/dev/null
   input "$work/$name.nml" "placement = 'file', file = '$work/$name.h5', velocities = 'file'" "$@"
@@ -44,6 +45,13 @@ state() {
 
 # gas DISKS PACKING: the state of equal disks.
 gas() { state "gas_$1_$2" "name = 'gas', count = $1, packing_fraction = $2"; }
+
+# polydisperse DISTRIBUTION DISKS PACKING: the state of disks whose radii differ by up to a factor of 9.9.
+polydisperse() {
+  local spread=0.472
+  [ "$1" = lognormal ] && spread=0.398
+  state "$1_$2_$3" "name = 'gas', count = $2, packing_fraction = $3, polydispersity = $spread, radius_distribution = '$1', mass_scaling = 'area'"
+}
 
 # run NAME COLLISIONS [OPTION...]: one run from a state.
 run() {
@@ -202,33 +210,45 @@ ensemble() {
 
 # --- The gate ------------------------------------------------------------------------------------------
 
-# instructions PACKING COLLISIONS [OPTION...]: of the event loop and of what begins an epoch: what else starts and writes a
-# run depends on the clock.
+# instructions RADII PACKING COLLISIONS [OPTION...]: of the event loop and of what begins an epoch: what else starts and writes
+# a run depends on the clock. 1000 equal disks, or 4000 of many sizes.
 instructions() {
-  local packing=$1 collisions=$2
-  shift 2
-  gas 1000 "$packing"
+  local radii=$1 packing=$2 collisions=$3 name
+  shift 3
+  if [ "$radii" = equal ]; then
+    name=gas_1000_$packing
+    gas 1000 "$packing"
+  else
+    name=${radii}_4000_$packing
+    polydisperse "$radii" 4000 "$packing"
+  fi
   run_by=(valgrind --tool=callgrind --callgrind-out-file=/dev/null)
   run_by+=(--toggle-collect=__{event_driven_MOD_advance,event_driven_MOD_start,epochs_MOD_move_epoch}'*')
-  run "gas_1000_$packing" "$collisions" "$@" >/dev/null 2>"$work/count" || { cat "$work/count" >&2; return 1; }
+  run "$name" "$collisions" "$@" >/dev/null 2>"$work/count" || { cat "$work/count" >&2; return 1; }
   awk '/Collected/ { print $4 }' "$work/count"
 }
 
 check() {
-  local packing limit options count verdict=0
-  while read -r packing limit options; do
+  local radii packing limit options count verdict=0
+  while read -r radii packing limit options; do
     # shellcheck disable=SC2086 # several options, or none
-    count=$((($(instructions "$packing" 100000 $options) - $(instructions "$packing" 1 $options))/100000))
-    printf 'packing %s%s: %s instructions per collision, at most %s\n' "$packing" "${options:+, ${options#--set }}" "$count" "$limit"
+    count=$((($(instructions "$radii" "$packing" 100000 $options) - $(instructions "$radii" "$packing" 1 $options))/100000))
+    printf '%s radii, packing %s%s: %s instructions per collision, at most %s\n' "$radii" "$packing" "${options:+, ${options#--set }}" "$count" "$limit"
     [ "$count" -gt 0 ] && [ "$count" -le "$limit" ] || verdict=1
   done <<'LIMITS'
-0.5 2087
-0.7 2114
-0.1 3173
-0.5 2432 --set box.boundary=periodic,periodic
-0.1 3607 --set box.boundary=periodic,periodic
-0.5 2509 --set box.gravity=0,-1
-0.1 3717 --set box.gravity=0,-1
+equal 0.5 2087
+equal 0.7 2114
+equal 0.1 3173
+equal 0.5 2432 --set box.boundary=periodic,periodic
+equal 0.1 3607 --set box.boundary=periodic,periodic
+equal 0.5 2509 --set box.gravity=0,-1
+equal 0.1 3717 --set box.gravity=0,-1
+lognormal 0.7 2950
+lognormal 0.5 4580
+lognormal 0.3 6920
+lognormal 0.1 5200
+uniform 0.7 2780
+uniform 0.5 4110
 LIMITS
   return $verdict
 }

@@ -171,7 +171,7 @@ contains
 
       do stage = 1, stages
         call self%queue%list_coming(sim%tag, stage, n, disks)
-        call self%search%cells%read_ahead(sim%disk, sim%tag, stage, disks(:n))
+        call self%search%read_ahead(sim%disk, sim%tag, stage, disks(:n))
         if (self%is_part .and. stage == 2) call self%tracks%read_ahead(sim%disk, disks(:n))
       end do
       pause_at = min(pause_at, sim%tally%events + events_ahead)

@@ -171,7 +171,7 @@ contains
       self%sim%disk(s)%stamp = stamp
       self%sim%disk(s)%event_time = forever
       self%home(s) = news%home
-      call self%engine%search%insert(self%sim%tag(s), s, int(news%cell, int16))
+      call self%engine%search%insert(self%sim, s, int(news%cell, int16))
       call self%engine%tracks%begin_track(self%sim%tag(s)%cell, s)
       n_waiting = n_waiting + 1
       waiting(n_waiting) = s

@@ -11,7 +11,8 @@ module partners
 
   integer(int32), parameter :: n_sides = 4
   integer(int32), parameter :: first_crossing = -2000000000
-  integer(int32), parameter :: looks_again = first_crossing - n_sides      !! the end of what was searched, within a cell
+  !> The end of the region that was searched, within a cell; one less if it ends to the right or above.
+  integer(int32), parameter :: looks_again = first_crossing - n_sides
   integer(int32), parameter :: nothing = -huge(1_int32)
   integer(int32), parameter :: most_repeats = 11           !! of collisions at one moment that are counted
   integer(int32), parameter :: per_repeat = 2_int32**27    !! larger than any id of a disk

@@ -13,7 +13,7 @@ module cell_faces
   use side_motion, only: piston
   implicit none
   private
-  public :: all_cells, cell_faces_t, patch_t
+  public :: all_cells, cell_faces_t, line_t, patch_t
 
   !> The cells that a grid holds, of all those that the box is cut into: usually all. A patch may lie across a periodic
   !> side. Its outer faces are open where they are not sides of the box: what leaves there is lost to it.
@@ -60,6 +60,7 @@ module cell_faces
     procedure :: rectangle
     procedure :: choose_cell
     procedure :: next
+    procedure :: next_within
     procedure, private :: next_falling
   end type cell_faces_t
 
@@ -295,6 +296,27 @@ contains
       call next_straight(self%column, self%row, disk, cell, t, code)
     end if
   end subroutine next
+
+  !> When and how the disk reaches one of four lines around it, which may be nearer than its cell's.
+  pure subroutine next_within(self, column, row, disk, now, t, code)
+    class(cell_faces_t), intent(in) :: self
+    type(line_t), intent(in) :: column(0:1), row(0:1)
+    type(disk_t), intent(in) :: disk
+    real(real64), intent(in) :: now
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code
+    real(real64) :: t_y
+    integer(int32) :: code_y
+
+    if (self%falling) then
+      call next_along(self, column, 1, disk, now, t, code)
+      call next_along(self, row, 2, disk, now, t_y, code_y)
+      code = chosen(code, code_y, t_y < t)
+      t = merge(t_y, t, t_y < t)
+    else
+      call next_straight(column, row, disk, [1_int16, 1_int16], t, code)
+    end if
+  end subroutine next_within
 
   !> On a straight line. Which axis and which way are toss-ups: no branch on them.
   pure subroutine next_straight(column, row, disk, cell, t, code)

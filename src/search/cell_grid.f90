@@ -7,10 +7,11 @@ module cell_grid
   use box_sides, only: next_side
   use cell_contents, only: cell_contents_t, gather
   use cell_faces, only: all_cells, cell_faces_t, patch_t
-  use cell_scans, only: scan_around_seam, scan_cells, scan_chains_around, scan_one
+  use cell_scans, only: scan_around_seam, scan_cells, scan_chains_around, scan_list, scan_one
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
   use images, only: images_t
+  use neighbour_lists, only: neighbour_lists_t
   use neighbour_search, only: earliest_contact, latest_clock, no_gravity, prospect_t
   use partners, only: axis_of, is_wall, looks_again, nothing, obstacle_code, sense_of, side_crossed
   use reach_lists, only: largest_small_radius, place_t, reach_lists_t
@@ -36,6 +37,8 @@ module cell_grid
     type(reach_lists_t) :: reach                   !! obstacles, and disks much larger than those that the cells are made for
     type(images_t) :: images                       !! of the box, in this epoch
     integer(int32) :: n_listed = 0                 !! disks in cells, since they were filled
+    type(neighbour_lists_t), public :: lists       !! of the small disks, where cells hold many of them
+    real(real64) :: plain_radius = 0.0_real64      !! largest of disks whose crossings are plain: none, with lists [length]
   contains
     procedure :: build
     procedure :: predict
@@ -44,7 +47,11 @@ module cell_grid
     procedure :: insert
     procedure :: take_out
     procedure :: predict_with_care                 ! bound, so that it is not inlined into the hot path
+    procedure :: read_ahead
+    procedure, private :: cross_with_care
     procedure, private :: follow_big
+    procedure, private :: list
+    procedure, private :: predict_listed
   end type cell_grid_t
 
 contains
@@ -62,8 +69,7 @@ contains
     if (.not. self%is_part) self%patch = whole_box(sim, self%undivided)
     self%images = sim%images()
     call self%faces%set(sim%box, self%patch)
-    self%roomy = any(self%faces%width > spacious*self%patch%reach)
-    kept = sim%box%has_obstacles() .and. self%reach%serves(self%patch, self%faces)
+    kept = sim%box%has_obstacles() .and. self%reach%serves(self%patch, self%faces) .and. .not. self%lists%used
     if (kept) call clear_cells(self, sim, kept)
     associate (patch => self%patch)
       if (.not. kept) call self%cells%empty(patch%n(1) + 2, patch%n(2) + 2, sim%n_disks())
@@ -72,13 +78,19 @@ contains
         rims = self%reach%rims()
         call self%reach%renew_big(sim, patch, self%faces)
         rims = [rims, self%reach%rims()]
+      else
+        call self%reach%renew(sim, patch, self%faces)
+      end if
+      call list_all(self, sim)
+      self%roomy = any(self%faces%width > spacious*patch%reach) .and. .not. self%lists%used
+      self%plain_radius = merge(-1.0_real64, patch%small, self%lists%used)
+      if (kept .and. .not. self%lists%used) then
         do i = 1, size(rims, kind=int32)
           call mark(self, int(rims(i)%cell, int16))
         end do
         return
       end if
-      call self%reach%renew(sim, patch, self%faces)
-      if (.not. (any(sim%box%periodic) .or. allocated(self%reach%first) .or. self%is_part)) return
+      if (.not. (any(sim%box%periodic) .or. allocated(self%reach%first) .or. self%is_part .or. self%lists%used)) return
       do iy = 0, int(patch%n(2) + 1, int16)
         do ix = 0, int(patch%n(1) + 1, int16)
           call mark(self, [ix, iy])
@@ -118,12 +130,28 @@ contains
           sim%tag(i)%cell = 1                      ! one that is marked in any case
         else if (sim%tag(i)%id > 0) then
           cell = int(patch%cell_at(sim%position(i)), int16)
-          call self%insert(sim%tag(i), i, cell)
+          sim%tag(i)%cell = cell
+          call self%cells%insert(self%cells%number(cell), i)
           self%n_listed = self%n_listed + 1
         end if
       end do
     end associate
   end subroutine fill_cells
+
+  !> Lists the neighbours of all small disks, if that pays.
+  subroutine list_all(self, sim)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32) :: i
+
+    self%lists%used = .false.
+    if (self%undivided .or. sim%box%is_sheared()) return
+    call self%lists%prepare(sim%disk, sim%tag, sim%box%lower, sim%box%edges(), self%patch)
+    if (.not. self%lists%used) return
+    do i = 1, sim%n_disks()
+      if (sim%tag(i)%id > 0 .and. sim%disk(i)%radius <= self%patch%small) call self%list(sim, i)
+    end do
+  end subroutine list_all
 
   !> The cells that suit all disks of a simulation, and its obstacles: each counts as much as a disk, as a disk has to be
   !> tested against those that reach into its cell.
@@ -142,14 +170,15 @@ contains
   end function whole_box
 
   !> Puts disk i into a cell.
-  subroutine insert(self, tag, i, cell)
+  subroutine insert(self, sim, i, cell)
     class(cell_grid_t), intent(inout) :: self
-    type(tag_t), intent(inout) :: tag
+    type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer(int16), intent(in) :: cell(2)
 
-    tag%cell = cell
+    sim%tag(i)%cell = cell
     call self%cells%insert(self%cells%number(cell), i)
+    if (self%lists%used) call self%list(sim, i)
   end subroutine insert
 
   !> Takes disk i out of its cell.
@@ -158,8 +187,22 @@ contains
     type(tag_t), intent(in) :: tag
     integer(int32), intent(in) :: i
 
+    if (self%lists%used) call self%lists%leave(i, self%cells, self%patch, tag%cell)
     call self%cells%remove(self%cells%number(tag%cell), i)
   end subroutine take_out
+
+  !> Lists the neighbours of disk i around where it is now; none if it has left the patch.
+  subroutine list(self, sim, i)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+
+    associate (cell => sim%tag(i)%cell)
+      if (.not. self%patch%holds(cell)) return
+      call self%lists%lay(i, sim%disk(i)%radius, sim%position(i), self%faces, cell)
+      call self%lists%enter(i, self%cells, self%patch, cell)
+    end associate
+  end subroutine list
 
   !> Marks a cell if a disk there may meet an obstacle, a big disk, or others beyond a periodic side; or may be big.
   subroutine mark(self, cell)
@@ -169,7 +212,7 @@ contains
 
     special = .not. self%patch%holds(cell)
     if (.not. special) special = self%patch%at_seam(cell) .or. self%reach%has_any(cell) &
-      .or. (size(self%reach%big) > 0 .and. all(cell == 1))
+      .or. (size(self%reach%big) > 0 .and. all(cell == 1)) .or. self%lists%used
     call self%cells%mark(self%cells%number(cell), special)
   end subroutine mark
 
@@ -189,19 +232,34 @@ contains
     end do
   end subroutine follow_big
 
-  !> Moves disk i into the next cell, or notes where a big one is now, and predicts there.
+  !> Moves disk i into the next cell and predicts there, or where its search ends otherwise.
   subroutine cross(self, sim, i, code)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, code
+
+    if (sim%disk(i)%radius > self%plain_radius) then
+      call self%cross_with_care(sim, i, code)
+    else if (code > looks_again) then
+      call change_cell(self, sim, i, code)
+    end if
+    call self%predict(sim, i)
+  end subroutine cross
+
+  !> Notes where a big disk is now, or lists a small one again.
+  subroutine cross_with_care(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
 
     if (sim%disk(i)%radius > self%patch%small) then
       call self%follow_big(sim, self%reach%number_of(i))
-    else if (code /= looks_again) then
-      call change_cell(self, sim, i, code)
+    else
+      call self%lists%leave(i, self%cells, self%patch, sim%tag(i)%cell)
+      if (code > looks_again) call change_cell(self, sim, i, code)
+      call self%list(sim, i)
     end if
-    call self%predict(sim, i)
-  end subroutine cross
+  end subroutine cross_with_care
 
   !> Moves disk i into the cell beyond the face, over a periodic side into the first one behind it.
   subroutine change_cell(self, sim, i, code)
@@ -223,7 +281,7 @@ contains
     end if
     inside = .true.
     if (self%is_part) inside = self%patch%holds(cell)
-    if (self%roomy .and. inside) call self%faces%choose_cell(sim%disk(i), sim%now, cell)
+    if ((self%roomy .or. self%lists%used) .and. inside) call self%faces%choose_cell(sim%disk(i), sim%now, cell)
     call move(self, sim%tag(i), i, cell)
   end subroutine change_cell
 
@@ -248,8 +306,9 @@ contains
     integer(int32), intent(in) :: i
     integer(int16), intent(in) :: cell(2)
 
-    call take_out(self, tag, i)
-    call insert(self, tag, i, cell)
+    call self%cells%remove(self%cells%number(tag%cell), i)
+    tag%cell = cell
+    call self%cells%insert(self%cells%number(cell), i)
   end subroutine move
 
   !> The earliest of: side or cell face, obstacle, disk in the cells around.
@@ -279,6 +338,12 @@ contains
     end if
     if (self%cells%cell(self%cells%number(sim%tag(i)%cell))%needs_care() .or. &
       self%cells%cell(self%cells%number(sim%tag(j)%cell))%needs_care()) then
+      if (self%lists%used .and. .not. allocated(self%reach%first)) then
+        if (is_plainly_listed(self, sim%tag(i)%cell, i) .and. is_plainly_listed(self, sim%tag(j)%cell, j)) then
+          call self%predict_listed(sim, i, j)
+          return
+        end if
+      end if
       call self%predict(sim, i)
       call self%predict(sim, j)
     else if (self%faces%falling) then
@@ -287,6 +352,49 @@ contains
       call predict_two(self, sim%disk, sim%tag, sim%now, latest_clock + no_gravity, i, j)
     end if
   end subroutine predict_both
+
+  !> Whether a disk, which is small, has a list of disks that it sees through no image.
+  pure function is_plainly_listed(self, cell, i) result(yes)
+    class(cell_grid_t), intent(in) :: self
+    integer(int16), intent(in) :: cell(2)
+    integer(int32), intent(in) :: i
+    logical :: yes
+
+    yes = self%lists%is_short(i) .and. .not. self%patch%at_seam(cell)
+  end function is_plainly_listed
+
+  !> Predicts two disks that have just collided, by their lists.
+  subroutine predict_listed(self, sim, i, j)
+    class(cell_grid_t), intent(in) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+    type(prospect_t) :: near_i, near_j
+
+    call survey_list(self, sim%disk(i), sim%now, i, near_i)
+    call survey_list(self, sim%disk(j), sim%now, j, near_j)
+    if (self%faces%falling) then                   ! literals let the compiler specialise the kernel
+      call take_earliest(self, sim%disk, sim%tag, sim%now, latest_clock, near_i)
+      call take_earliest(self, sim%disk, sim%tag, sim%now, latest_clock, near_j)
+    else
+      call take_earliest(self, sim%disk, sim%tag, sim%now, latest_clock + no_gravity, near_i)
+      call take_earliest(self, sim%disk, sim%tag, sim%now, latest_clock + no_gravity, near_j)
+    end if
+  end subroutine predict_listed
+
+  !> When disk i leaves its neighbourhood, and whom it can meet before.
+  pure subroutine survey_list(self, disk, now, i, near)
+    type(cell_grid_t), intent(in) :: self
+    type(disk_t), intent(in) :: disk
+    real(real64), intent(in) :: now
+    integer(int32), intent(in) :: i
+    type(prospect_t), intent(out) :: near
+
+    associate (region => self%lists%neighbourhood(i))
+      call self%faces%next_within(region%column, region%row, disk, now, near%time, near%partner)
+    end associate
+    near%disk = i
+    call self%lists%copy_list(near)
+  end subroutine survey_list
 
   !> Predicts two disks in plain cells. All that precedes the tests of candidates is done for both first, as it
   !> does not wait for the tests.
@@ -347,6 +455,21 @@ contains
     tag(near%disk)%partner_stamp = disk(max(near%partner, 1))%stamp    ! without a branch; used if partner > 0
   end subroutine take_earliest
 
+  !> Prefetches what predictions for some disks will read, stage by stage.
+  subroutine read_ahead(self, disk, tag, stage, disks)
+    class(cell_grid_t), intent(in) :: self
+    type(disk_t), intent(in) :: disk(:)
+    type(tag_t), intent(in) :: tag(:)
+    integer(int32), intent(in) :: stage
+    integer(int32), intent(in) :: disks(:)
+
+    if (self%lists%used) then
+      call self%lists%read_ahead(disk, tag, stage, disks)
+    else
+      call self%cells%read_ahead(disk, tag, stage, disks)
+    end if
+  end subroutine read_ahead
+
   !> Predicts a disk where there is more than nine cells with a few small disks each. One that has left the patch is
   !> lost: nobody meets it any more.
   subroutine predict_with_care(self, sim, i)
@@ -363,6 +486,8 @@ contains
       sim%disk(i)%stamp = sim%disk(i)%stamp + 1
       near%time = 2*never
       near%partner = nothing
+    else if (self%lists%used) then
+      call find_event_of_listed()
     else
       call find_event_of_small()
     end if
@@ -373,24 +498,45 @@ contains
 
     !> The earliest event of a small disk.
     subroutine find_event_of_small()
-      real(real64) :: t
-
       associate (cell => sim%tag(i)%cell)
         call self%faces%next(sim%disk(i), cell, sim%now, self%faces%falling, near%time, near%partner)
-        near%cell = self%cells%number(cell)
         if (self%reach%has_any(cell)) call scan_reach(self%reach%first(cell(1), cell(2)))
-        if (self%patch%at_seam(cell)) then
-          t = self%images%look_again(sim%now, self%patch%width(1))
-          if (t < near%time) near%partner = looks_again
-          near%time = min(t, near%time)
-          call scan_around_seam(self%cells, self%patch, sim, self%images, near)
-        else
-          call gather(self%cells%cell, near%cell, self%cells%stride, i, near%list, near%n)
+      end associate
+      call scan_cells_around()
+    end subroutine find_event_of_small
+
+    !> The earliest event of a small disk where there are neighbour lists.
+    subroutine find_event_of_listed()
+      associate (cell => sim%tag(i)%cell, region => self%lists%neighbourhood(i))
+        call self%faces%next_within(region%column, region%row, sim%disk(i), sim%now, near%time, near%partner)
+        if (self%reach%has_any(cell)) call scan_reach(self%reach%first(cell(1), cell(2)))
+        if (is_plainly_listed(self, cell, i)) then
+          call self%lists%copy_list(near)
           call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))
-          if (self%cells%is_crowded_around(near%cell)) call scan_chains_around(self%cells, sim, near)
+        else if (self%lists%is_complete(i)) then
+          call scan_list(self%lists, sim, self%images, self%faces%falling, near)
+        else
+          call scan_cells_around()
         end if
       end associate
-    end subroutine find_event_of_small
+    end subroutine find_event_of_listed
+
+    !> The contacts of a small disk with those in the nine cells around it.
+    subroutine scan_cells_around()
+      real(real64) :: t
+
+      near%cell = self%cells%number(sim%tag(i)%cell)
+      if (self%patch%at_seam(sim%tag(i)%cell)) then
+        t = self%images%look_again(sim%now, self%patch%width(1))
+        if (t < near%time) near%partner = looks_again
+        near%time = min(t, near%time)
+        call scan_around_seam(self%cells, self%patch, sim, self%images, near)
+      else
+        call gather(self%cells%cell, near%cell, self%cells%stride, i, near%list, near%n)
+        call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))
+        if (self%cells%is_crowded_around(near%cell)) call scan_chains_around(self%cells, sim, near)
+      end if
+    end subroutine scan_cells_around
 
     !> The contacts of a small disk with what reaches into its cell.
     subroutine scan_reach(first)

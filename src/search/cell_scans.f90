@@ -5,11 +5,12 @@ module cell_scans
   use cell_contents, only: append, cell_contents_t
   use cell_faces, only: patch_t
   use images, only: image_t, images_t
-  use neighbour_search, only: earliest_contact, list_capacity, prospect_t
+  use neighbour_lists, only: neighbour_lists_t
+  use neighbour_search, only: earliest_contact, list_capacity, no_gravity, prospect_t
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: scan_around_seam, scan_cells, scan_chains_around, scan_one
+  public :: scan_around_seam, scan_cells, scan_chains_around, scan_list, scan_one
 
 contains
 
@@ -24,6 +25,42 @@ contains
     near%list(1) = j - 1
     call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image)
   end subroutine scan_one
+
+  !> Contacts with the disks in the list of a disk.
+  subroutine scan_list(lists, sim, images, falling, near)
+    type(neighbour_lists_t), intent(in) :: lists
+    type(simulation_t), intent(in) :: sim
+    type(images_t), intent(in) :: images
+    logical, intent(in) :: falling
+    type(prospect_t), intent(inout) :: near
+    integer(int32) :: j, k
+    real(real64) :: image(2)
+
+    near%n = 0
+    do k = 1, lists%n_entries(near%disk)
+      call lists%neighbour(near%disk, k, j, image)
+      if (any(abs(image) > 0)) cycle
+      if (near%n == list_capacity) call test_list()
+      near%n = near%n + 1
+      near%list(near%n) = j
+    end do
+    call test_list()
+    do k = 1, lists%n_entries(near%disk)
+      call lists%neighbour(near%disk, k, j, image)
+      if (any(abs(image) > 0)) call scan_one(sim, j + 1, images%image(image), near)
+    end do
+  contains
+
+    !> Literals let the compiler specialise the kernel.
+    subroutine test_list()
+      if (falling) then
+        call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0)
+      else
+        call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, no_gravity)
+      end if
+      near%n = 0
+    end subroutine test_list
+  end subroutine scan_list
 
   !> Contacts with the disks of some cells, seen through an image.
   pure subroutine scan_cells(cells, sim, c, near, image)

@@ -12,6 +12,7 @@ module memory
 
   ! Measured with 100 000 to a million disks. [bytes]
   integer(int64), parameter :: per_disk = 410, per_shared_disk = 540, besides = 25000000
+  integer(int64), parameter :: per_list = 270    !! of the neighbours of a disk, where sizes differ
 
 contains
 
@@ -21,7 +22,7 @@ contains
     type(problem_list_t), intent(inout) :: problems
     integer(int64) :: needed, free
 
-    needed = settings%n_disks()*per_disk + besides
+    needed = settings%n_disks()*(per_disk + merge(per_list, 0_int64, sizes_differ(settings))) + besides
     free = free_memory("")
     if (needed > free) call problems%add(0, "species.count", written(settings%n_disks())//" disks need about " &
       //size_text(needed)//" of memory, and "//size_text(free)//" are free; use fewer disks")
@@ -32,8 +33,17 @@ contains
     type(settings_t), intent(in) :: settings
     logical :: yes
 
-    yes = settings%n_disks()*per_shared_disk + besides <= free_memory("")
+    yes = settings%n_disks()*(per_shared_disk + merge(per_list, 0_int64, sizes_differ(settings))) + besides <= free_memory("")
   end function room_for_domains
+
+  !> Whether disks may have so many sizes that they are in neighbour lists.
+  pure function sizes_differ(settings) result(yes)
+    type(settings_t), intent(in) :: settings
+    logical :: yes
+
+    yes = any(settings%species%polydispersity > 0) .or. any(settings%species%radius_in_file) &
+      .or. maxval(settings%species%radius) > minval(settings%species%radius)
+  end function sizes_differ
 
   !> What the machine can give, or the limit of the control group if that is less: a batch job would be killed without a
   !> word. Huge if nobody says. [bytes]

@@ -257,6 +257,8 @@ class Draw:
         rng, groups, self.blocked = self.rng, [], blocked
         if not blocked and self.chance(0.2):
             return [rng.choice([self.from_file, self.from_file, self.by_position])()]
+        if self.chance(0.15):
+            return self.of_many_sizes()
         for k in range(rng.choice([1, 1, 1, 2, 3])):
             count = self.disks if k == 0 else rng.randint(1, max(self.disks // 3, 1))
             wide, high = self.region()
@@ -288,6 +290,23 @@ class Draw:
             )
         self.kinds = len(groups)
         return groups
+
+    def of_many_sizes(self) -> list[str]:
+        """Species from large to small, each with about the same area, with ratios up to 1 : 100."""
+        kinds, ratio = self.rng.randint(3, 6), 10.0 ** self.rng.uniform(0.3, 2)
+        wide, high = self.region()
+        radii = [ratio ** (-k / (kinds - 1)) for k in range(kinds)]
+        share = self.disks / sum(r**-2 for r in radii)
+        counts = [max(round(share * r**-2), 1) for r in radii]
+        unit = math.sqrt(self.packing * wide * high / math.pi)
+        unit /= math.sqrt(sum(n * r**2 for n, r in zip(counts, radii, strict=True)))
+        unit = min(unit, 0.24 * min(wide, high))
+        self.kinds = kinds
+        return [
+            f"&species name = 's{k}' count = {n} radius = {unit * r!r} mass = {r * r!r}"
+            f" placement = 'random'{self.where}{self.motion(n)} /"
+            for k, (n, r) in enumerate(zip(counts, radii, strict=True))
+        ]
 
     def placement(self, k: int) -> str:
         if self.blocked or k > 0:
@@ -337,7 +356,7 @@ class Draw:
         restitution = max(self.least, rng.choice([0, 0, 1, 1, 0.5, 0.9, 0.99, rng.random()]))
         words = f"&contact restitution = {restitution}"
         if self.kinds > 1 and self.chance(0.4):
-            table = [[rng.choice([0, 1, 0.9, rng.random()]) for _ in range(3)] for _ in range(3)]
+            table = [[rng.choice([0, 1, 0.9, rng.random()]) for _ in range(6)] for _ in range(6)]
             kinds = range(self.kinds)
             pairs = [max(self.least, table[min(a, b)][max(a, b)]) for a in kinds for b in kinds]
             words += f" pair_restitution = {numbers(*pairs)}"

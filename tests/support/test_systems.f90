@@ -34,11 +34,14 @@ module test_systems
     "channel inelastic contact", "periodic", "periodic few", "periodic dense mixture", &
     "periodic inelastic contact", "periodic pegs dilute", "periodic giant mixture", &
     "walls giants dilute", "walls giants gravity", "periodic giants dilute inelastic contact", &
-    "walls slants mixture", "channel gravity slants inelastic contact", "periodic slants pegs dilute"]
+    "walls slants mixture", "channel gravity slants inelastic contact", "periodic slants pegs dilute", &
+    "walls dense sizes", "channel dense sizes gravity", "periodic dense sizes inelastic", "walls sizes pegs", &
+    "periodic giant sizes"]
   !> Those and others whose sides move.
   character(len=*), parameter :: every_system(*) = [character(len=40) :: systems, "walls shaken", &
     "walls shaken gravity mixture", "channel shaken gravity inelastic contact", "walls shaken bed dilute", &
-    "walls shaken pegs inelastic contact", "walls shaken slants gravity", "walls shaken giants gravity"]
+    "walls shaken pegs inelastic contact", "walls shaken slants gravity", "walls shaken giants gravity", &
+    "walls shaken sizes gravity"]
 
 contains
 
@@ -102,7 +105,7 @@ contains
   !> A gas of about a hundred disks with the features that the words name, in a box of 3 x 2 away from the
   !> origin: `periodic` or `channel` (periodic in x), else walls; `gravity`; `pegs` and `slants` to bounce off and a
   !> `round` container; `mixture` of two species; a `giant` or two `giants`; a `bed` at rest that the giant
-  !> hits; `inelastic`; `smooth` walls; `contact` time; sides that are `shaken`; `few`, `dilute` or `dense`.
+  !> hits; many `sizes`; `inelastic`; `smooth` walls; `contact` time; sides that are `shaken`; `few`, `dilute` or `dense`.
   function system(words, seed, scale) result(sim)
     character(len=*), intent(in) :: words
     integer(int64), intent(in) :: seed
@@ -143,7 +146,8 @@ contains
       real(dp), intent(in) :: radius
       character(len=:), allocatable :: text
       text = " &species name = '"//name//"' count = "//written(n)//" mass = "//mass//" radius = "//written(radius) &
-        //given("dense", " placement = 'dense'")//" velocities = "//given("bed", "'rest' /", "'uniform' /")
+        //given("dense", " placement = 'dense'")//given("sizes", " polydispersity = 0.39 radius_distribution = 'lognormal'") &
+        //" velocities = "//given("bed", "'rest' /", "'uniform' /")
     end function gas
 
     pure logical function has(word)
@@ -173,13 +177,16 @@ contains
     allocate (box%obstacle(size(box%obstacle))%shape, source=shape)
   end subroutine add_obstacle
 
-  !> The dynamics that a method names: `cells`, `pairs` or `rescan`; with `heap`, else a calendar.
+  !> The dynamics that a method names: `cells`, with neighbour lists where they pay; `lists` everywhere, which are `short`
+  !> and often full; `pairs` or `rescan`; with `heap`, else a calendar.
   subroutine prepare(dynamics, method, sim)
     type(event_driven_t), intent(out) :: dynamics
     character(len=*), intent(in) :: method
     type(simulation_t), intent(inout) :: sim
     allocate (dynamics%search)
-    dynamics%search%undivided = index(method, "cells") == 0
+    dynamics%search%undivided = index(method, "pairs") + index(method, "rescan") > 0
+    if (index(method, "lists") > 0) dynamics%search%lists%least_candidates = -never
+    if (index(method, "short") > 0) dynamics%search%lists%capacity = 8
     dynamics%search%everyone = index(method, "rescan") > 0
     dynamics%windowed = index(method, "heap") == 0
     call dynamics%start(sim)
