@@ -294,6 +294,7 @@ lint-fortran:
 lint-python:
 	@$(venv) -m ruff check --quiet --output-format concise post tests docs
 	@$(venv) tests/support/check_style.py
+	@$(venv) tests/support/check_docstrings.py
 	@$(venv) tests/support/check_examples.py $(BUILD)/examples
 	@$(venv) -m mypy --no-error-summary --cache-dir $(BUILD)/mypy --scripts-are-modules post/ricochet $(BUILD)/examples
 lint-shell:

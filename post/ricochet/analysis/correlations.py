@@ -39,6 +39,15 @@ from ..running.simulation import Simulation
 from .statistics import FEWEST, Curve, Estimate, estimate, correlated_mean
 from .thermodynamics import ALONG_WALLS, later, refuse_others, unmoved
 
+__all__ = [
+    "Correlator",
+    "bursts",
+    "correlators",
+    "curves",
+    "lags_of",
+    "measured",
+]
+
 PER_DECADE = 12
 ORIGINS = 16  # in a lag
 BLOCKS = 16  # of the time, for errors
@@ -51,7 +60,29 @@ FIXED = ("msd", "fourth", "vacf", "diffusion", "overlap")
 
 
 def lags_of(times: np.ndarray) -> np.ndarray:
-    """(L,) lags that samples at these times (T,) have, and 0; of very many times some are tried."""
+    """Return the lags at which samples at given times have pairs.
+
+    Parameters
+    ----------
+    times : numpy.ndarray
+        (T,) times of the samples, each later than the one before
+
+    Returns
+    -------
+    numpy.ndarray
+        (L,) lags [time]: 0, and in each twelfth of a power of ten the lag of most pairs
+
+    Raises
+    ------
+    ValueError
+        if there are fewer than two times, or if they do not increase
+
+    Examples
+    --------
+    >>> lags = lags_of(np.arange(100.0))
+    >>> float(lags[0]), float(lags[1]), float(lags[-1]) <= 99
+    (0.0, 1.0, True)
+    """
     if len(times) < 2 or not (np.diff(times) > 0).all():
         raise ValueError("lags take two times and more, each later than the one before")
     origins = np.arange(len(times))
@@ -67,10 +98,34 @@ def lags_of(times: np.ndarray) -> np.ndarray:
 
 
 def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
-    """Times for samples: from 0 on, each `apart` from the other, in decades `first` to `last`.
+    """Return times for samples in bursts, which have pairs at all lags and many origins.
 
-    Ten in each power of ten, none later than `until`: samples for all lags between, with many
-    origins, where equal steps would be too many.
+    Each burst has ten samples in each power of ten from `first` to `last` after its start.
+
+    Parameters
+    ----------
+    first, last : float
+        the shortest and the longest time after the start of a burst [time]
+    apart : float
+        time from the start of one burst to that of the next
+    until : float
+        no sample is later than this [time]
+
+    Returns
+    -------
+    numpy.ndarray
+        (T,) times, from 0 on
+
+    Raises
+    ------
+    ValueError
+        unless 0 < first <= last <= until and apart > 0
+
+    Examples
+    --------
+    >>> times = bursts(0.1, 1.0, apart=2.0, until=5.0)
+    >>> float(times[0]), len(times), bool(times[-1] <= 5)
+    (0.0, 36, True)
     """
     if not (0 < first <= last <= until and apart > 0):
         raise ValueError("bursts take 0 < first <= last <= until, and apart > 0")
@@ -217,7 +272,24 @@ def mean_of(members: Sequence[Correlator], name: str, species: int, lags: np.nda
 
 
 def curves(members: Sequence[Correlator]) -> dict[str, dict[str, Curve]]:
-    """By species and "all", then by name: of the correlators of runs that differ by their seed."""
+    """Return the curves of correlators, by species and by name.
+
+    Parameters
+    ----------
+    members : sequence of Correlator
+        (R,) those of runs that differ by their seed, with the same lags
+
+    Returns
+    -------
+    dict of str to dict of str to Curve
+        by species and "all", then by name, as in the docstring of the module
+
+    Examples
+    --------
+    >>> found = curves(correlators(runs))
+    >>> sorted(found["all"])
+    ['alpha2', 'diffusion', 'msd', 'overlap', 'vacf']
+    """
     first = members[0]
     pairs = np.array([one.pairs.sum(axis=1) for one in members])
     lags = np.flatnonzero(pairs.all(axis=0))
@@ -235,10 +307,34 @@ def correlators(
     reach: float | None = None,
     skip: float | None = None,
 ) -> list[Correlator]:
-    """Of each run, in its steady state, at lags of the first.
+    """Correlate the steady state of each run at the lags that the first has.
 
-    `skip` collisions per disk are left out at the start [until nothing drifts], and the last frame,
-    which may be out of step.
+    Parameters
+    ----------
+    runs : sequence of Run
+        (R,) runs of the same disks
+    waves : iterable of float
+        wavenumbers of F_s(k, t) [1/length]
+    reach : float, optional
+        distance up to which a disk counts as unmoved [0.3 mean diameters]
+    skip : float, optional
+        collisions per disk that are left out at the start [until nothing drifts]
+
+    Returns
+    -------
+    list of Correlator
+        (R,) one for each run
+
+    Raises
+    ------
+    RunError
+        if a run has too few frames, or none as far apart as those of the others
+
+    Examples
+    --------
+    >>> one, *others = correlators(runs, skip=10)
+    >>> len(one.lags) > 10, len(others)
+    (True, 2)
     """
     refuse_others(runs)
     times = [run.time[later(run, skip)] for run in runs]
@@ -256,5 +352,25 @@ def correlators(
 
 
 def measured(runs: Sequence[Run], **options: Any) -> dict[str, dict[str, Curve]]:
-    """The curves of runs that differ by their seed; options as of `correlators`."""
+    """Return the time correlation functions of runs that differ by their seed.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        (R,) runs of the same disks
+    **options : object
+        `waves`, `reach` and `skip`, as of `correlators`
+
+    Returns
+    -------
+    dict of str to dict of str to Curve
+        by species and "all", then by name; the lags are x, the means y
+
+    Examples
+    --------
+    >>> found = correlations.measured(runs, waves=[5.0])
+    >>> msd = found["gas"]["msd"]
+    >>> float(msd.y[0]), bool(msd.y[-1] > msd.y[1])
+    (0.0, True)
+    """
     return curves(correlators(runs, **options))

@@ -13,6 +13,31 @@ from numpy.typing import ArrayLike
 
 from ..predictions.theory import Law
 
+__all__ = [
+    "Curve",
+    "Estimate",
+    "LawTest",
+    "PowerLaw",
+    "SeriesMean",
+    "binned",
+    "combine_runs",
+    "correlated_mean",
+    "diagnostics",
+    "equilibration",
+    "estimate",
+    "excess_kurtosis",
+    "fit_power_law",
+    "goodness_of_fit",
+    "has_drift",
+    "has_trend",
+    "kurtosis_noise",
+    "propagate_error",
+    "rounded_to_error",
+    "statistical_inefficiency",
+    "student",
+    "windows",
+]
+
 MOST_WINDOWS = 10**6
 FEWEST_RUNS = 4  # for an error of their error, and so to weigh by
 
@@ -43,7 +68,7 @@ class LawTest(NamedTuple):
 
 
 class PowerLaw(NamedTuple):
-    """y = factor x^exponent; its error is that of a weighted fit."""
+    """Power law y = factor x^exponent; its error is that of a weighted fit."""
 
     factor: float
     exponent: float
@@ -66,9 +91,30 @@ class PowerLaw(NamedTuple):
 def goodness_of_fit(
     sample: np.ndarray, cdf: Law, bins: int = 30, independent: int | None = None
 ) -> LawTest:
-    """Kolmogorov-Smirnov and chi-square test of a sample against a law.
+    """Compare a sample with a distribution by Kolmogorov-Smirnov and chi-square tests.
 
-    Correlated values scatter as if there were fewer: `independent` is that number [all of them].
+    Parameters
+    ----------
+    sample : numpy.ndarray
+        (n,) the values
+    cdf : callable
+        distribution function, which takes an array of values
+    bins : int
+        number of bins of equal probability for the chi-square test
+    independent : int, optional
+        number of independent values in the sample [all of them]; correlated values scatter
+        as if there were fewer
+
+    Returns
+    -------
+    LawTest
+        both statistics with their probabilities
+
+    Examples
+    --------
+    >>> sample = (np.arange(1000) + 0.5) / 1000
+    >>> goodness_of_fit(sample, lambda x: np.clip(x, 0, 1)).ks_p > 0.99
+    True
     """
     n = len(sample) if independent is None else independent
     distance = float(scipy.stats.ks_1samp(sample, cdf).statistic)
@@ -87,12 +133,47 @@ ONE_SIGMA = float(scipy.special.ndtr(1))  # scipy.stats takes a second to be rea
 
 
 def student(samples: ArrayLike) -> Any:
-    """Half the 68 % interval of a mean over its standard error, both from so many samples."""
+    """Return half the 68 % interval of a mean over its standard error, by Student's t.
+
+    Parameters
+    ----------
+    samples : array_like
+        (...) numbers of independent samples, of which both were estimated
+
+    Returns
+    -------
+    float or numpy.ndarray
+        (...) the factor, which tends to 1 for many samples
+
+    Examples
+    --------
+    >>> round(float(student(4)), 3)
+    1.197
+    """
     return scipy.special.stdtrit(np.maximum(1.0, np.subtract(samples, 1.0)), ONE_SIGMA)
 
 
 def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
-    """Mean and error over independent members; a single member has no error (NaN)."""
+    """Estimate a mean and its error from independent values, such as runs of several seeds.
+
+    Parameters
+    ----------
+    values : array_like
+        (..., R, ...) the values, of R runs along `axis`
+    axis : int
+        axis of the runs
+
+    Returns
+    -------
+    Estimate
+        (...) mean and half its 68 % interval, by Student's t; NaN for a single value
+
+    Examples
+    --------
+    >>> mean, error = estimate([1.0, 2.0, 3.0])
+    >>> float(mean), round(float(error), 2)
+    (2.0, 0.76)
+    """
     values = np.asarray(values, dtype=float)
     mean, count = values.mean(axis=axis), values.shape[axis]
     if count < 2:
@@ -101,10 +182,28 @@ def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
 
 
 def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estimate:
-    """When something happens to a curve: the middle and half the width between its two limits.
+    """Propagate the error of a curve to a number that is derived from it.
 
-    They are those of the curves an error below and above.  NaN if it never happens to one of them,
-    or if there are no errors.
+    Parameters
+    ----------
+    of : callable
+        takes a curve (P,) and returns the number, such as the time at which it crosses a level
+    curve : Estimate
+        (P,) the curve with its error
+
+    Returns
+    -------
+    Estimate
+        middle and half the distance of the numbers of the two curves that lie an error below
+        and above; NaN if one of the numbers is, or if the curve has no error
+
+    Examples
+    --------
+    >>> x = np.linspace(0, 4, 401)
+    >>> curve = Estimate(x, np.full(401, 0.5))
+    >>> mean, error = propagate_error(lambda y: x[np.searchsorted(y, 2.0)], curve)
+    >>> round(float(mean), 2), round(float(error), 2)
+    (2.0, 0.5)
     """
     first, last = (of(curve.mean + sign * curve.error) for sign in (-1, 1))
     return Estimate((first + last) / 2, abs(last - first) / 2)
@@ -136,13 +235,31 @@ def cells(series: np.ndarray, count: int) -> np.ndarray:
 
 
 def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
-    """1 + 2 tau, tau the integrated autocorrelation time in samples: as many count as one.
+    """Estimate 1 + 2 tau of a series, tau its integrated autocorrelation time in samples.
 
-    Below 1, but not below `least`, where samples make up for each other, as hits of a wall do.
+    So many samples are worth one independent sample.  The window of the sum and the correction
+    for the unknown mean are those of U. Wolff, Comput. Phys. Commun. 156, 143 (2004), S = 1.5.
+    Sums that end at the first negative term underestimate the error of short series.
 
-    The window of the sum and the correction for the unknown mean are those of U. Wolff, Comput.
-    Phys. Commun. 156, 143 (2004), with S = 1.5.  Sums that end at the first negative term, as
-    libraries have them, give too small errors for series as short as these.
+    Parameters
+    ----------
+    series : numpy.ndarray
+        (T,) samples at equal intervals
+    least : float
+        lower bound of the result; values below 1 occur where samples are anticorrelated
+
+    Returns
+    -------
+    float
+        the statistical inefficiency
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(1).normal(size=4000)
+    >>> bool(0.8 < statistical_inefficiency(noise) < 1.2)
+    True
+    >>> bool(4 < statistical_inefficiency(np.repeat(noise, 5)) < 6)
+    True
     """
     count, rest = len(series), series - np.mean(series)
     if np.ptp(series) <= 1e-12 * np.max(np.abs(series), initial=0):
@@ -157,11 +274,29 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
 
 
 def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
-    """Sum of a series (T,) in equilibrium over the sum of another, such as counts over times.
+    """Estimate the mean of a correlated series, or the ratio of the sums of two series.
 
-    The error is that of the mean of amount - ratio * per, from the autocorrelation of its cells,
-    with Student's t for few samples.  There is none if a few cells have most of the weight, as with
-    samples in decades.
+    The error is that of the mean of amount - ratio * per, from the autocorrelation of its means
+    over a few parts of the series, with Student's t.
+
+    Parameters
+    ----------
+    amount : array_like
+        (T,) samples of a series in equilibrium, such as numbers of collisions
+    per : array_like
+        (T,) or a number: the series to divide by, such as durations
+
+    Returns
+    -------
+    SeriesMean
+        the ratio of the sums, its error, the number of independent samples that the series is
+        worth, and its drift; the error is NaN if a few parts have most of the weight of `per`
+
+    Examples
+    --------
+    >>> found = correlated_mean(np.random.default_rng(1).normal(3.0, 0.1, 1000))
+    >>> bool(abs(found.mean - 3) < 4 * found.error < 0.03)
+    True
     """
     amount, per = np.broadcast_arrays(np.asarray(amount, dtype=float), per)
     if len(amount) == 0:
@@ -187,10 +322,27 @@ def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> Series
 
 
 def equilibration(series: np.ndarray) -> int:
-    """Where a series (T,) may be taken as stationary: twice the point that White's rule finds.
+    """Return the number of samples at the start of a series that are not yet stationary.
 
-    The rule (MSER; K. P. White, Simulation 69, 323 (1997)) drops what makes the standard error of
-    the rest smallest; at that point what is left of the start is as large as the noise.
+    It is twice the point that White's rule finds (MSER; K. P. White, Simulation 69, 323 (1997)),
+    which makes the standard error of the rest smallest.
+
+    Parameters
+    ----------
+    series : numpy.ndarray
+        (T,) samples at equal intervals
+
+    Returns
+    -------
+    int
+        index of the first sample to use, at most half of the series
+
+    Examples
+    --------
+    >>> start = np.exp(-np.arange(1000) / 20)
+    >>> noise = 0.01 * np.random.default_rng(1).normal(size=1000)
+    >>> 60 <= equilibration(start + noise) <= 300
+    True
     """
     values = cells(series, FINE)
     count = len(values)
@@ -199,9 +351,28 @@ def equilibration(series: np.ndarray) -> int:
 
 
 def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
-    """The mean over independent runs; their scatter counts where errors do not explain it, or lack.
+    """Combine the means of independent runs to one mean.
 
-    Samples add up, but where the scatter counts a run is one sample; drifts that agree grow.
+    The error follows from the errors of the runs, or from their scatter if that is larger than the
+    errors explain, or if a run has no error.
+
+    Parameters
+    ----------
+    means : sequence of SeriesMean
+        (R,) the means of the runs
+
+    Returns
+    -------
+    SeriesMean
+        the mean of the means; its `samples` are the sum of those of the runs, or the number of
+        runs where the scatter counts
+
+    Examples
+    --------
+    >>> one, other = SeriesMean(1.0, 0.1, 50, 0.0), SeriesMean(1.1, 0.1, 50, 0.0)
+    >>> both = combine_runs([one, other])
+    >>> round(float(both.mean), 3), round(both.error, 3), both.samples
+    (1.05, 0.071, 100.0)
     """
     runs = len(means)
     mean, error, samples, drift = np.array(means).T
@@ -225,14 +396,45 @@ def scatter_p(means: Sequence[SeriesMean]) -> float:
 
 
 def has_drift(mean: SeriesMean) -> bool:
-    """Whether its halves differ by more than chance explains."""
+    """Tell whether the halves of a series differ by more than chance explains.
+
+    Parameters
+    ----------
+    mean : SeriesMean
+        the mean of the series
+
+    Returns
+    -------
+    bool
+        whether the probability of such a difference is below `UNLIKELY`
+
+    Examples
+    --------
+    >>> has_drift(SeriesMean(1.0, 0.1, 50, 1.0)), has_drift(SeriesMean(1.0, 0.1, 50, 4.0))
+    (False, True)
+    """
     return bool(2 * scipy.special.ndtr(-abs(mean.drift)) < UNLIKELY)
 
 
 def has_trend(series: np.ndarray) -> bool:
-    """Whether most of how a series (T,) varies is a straight line: it grows or falls all the time.
+    """Tell whether a straight line explains most of the variance of a series.
 
-    That looks like a long memory to `correlated_mean`, whose error then hides the drift.
+    To `correlated_mean` such a trend looks like a long autocorrelation, which hides the drift.
+
+    Parameters
+    ----------
+    series : numpy.ndarray
+        (T,) samples at equal intervals
+
+    Returns
+    -------
+    bool
+        whether the square of the correlation with time is above 0.75
+
+    Examples
+    --------
+    >>> has_trend(np.arange(100.0)), has_trend(np.cos(np.arange(100.0)))
+    (True, False)
     """
     if len(series) < FEWEST or np.ptp(series) <= 1e-9 * np.max(np.abs(series)):
         return False
@@ -240,7 +442,25 @@ def has_trend(series: np.ndarray) -> bool:
 
 
 def diagnostics(name: str, means: Sequence[SeriesMean]) -> list[str]:
-    """Why the mean over these runs should not be trusted, in sentences; none if it may be."""
+    """Report why a mean over runs should not be trusted.
+
+    Parameters
+    ----------
+    name : str
+        name of the quantity, for the sentences
+    means : sequence of SeriesMean
+        (R,) the means of the runs
+
+    Returns
+    -------
+    list of str
+        one sentence for each reason; empty if there is none
+
+    Examples
+    --------
+    >>> diagnostics("Z", [SeriesMean(1.0, 0.1, 5.0, 0.0)])
+    ['Z: worth only 5.0 independent samples; run longer']
+    """
     found, whole = [], combine_runs(means)
     if np.isnan(whole.error):
         return [f"{name}: no error, a run has fewer than {FEWEST} samples in equilibrium"]
@@ -262,7 +482,32 @@ def diagnostics(name: str, means: Sequence[SeriesMean]) -> list[str]:
 
 
 def windows(time: np.ndarray, value: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
-    """Middles and means of windows of a series (T,) that have samples; no incomplete last one."""
+    """Average a series over windows of equal duration.
+
+    Parameters
+    ----------
+    time, value : numpy.ndarray
+        (T,) the series
+    width : float
+        duration of a window [time]
+
+    Returns
+    -------
+    middle, mean : numpy.ndarray
+        (W,) middles of the windows that have samples, and the means there; an incomplete last
+        window is left out
+
+    Raises
+    ------
+    ValueError
+        if there would be more than a million windows
+
+    Examples
+    --------
+    >>> middle, mean = windows(np.arange(6.0), np.arange(6.0), 2.0)
+    >>> middle, mean
+    (array([1., 3.]), array([0.5, 2.5]))
+    """
     count = max(1, int(np.floor((time[-1] - time[0]) / width + 1e-9)))
     if count > MOST_WINDOWS:
         raise ValueError(f"{count} windows of {width:g}")
@@ -274,20 +519,74 @@ def windows(time: np.ndarray, value: np.ndarray, width: float) -> tuple[np.ndarr
 
 
 def binned(values: np.ndarray, bins: np.ndarray, independent: int | None = None) -> Estimate:
-    """Histogram (B,) with integral 1; errors as of so many `independent` values, or of all."""
+    """Estimate a probability density by a histogram.
+
+    Parameters
+    ----------
+    values : numpy.ndarray
+        (n,) the sample
+    bins : numpy.ndarray
+        (B + 1,) edges of the bins
+    independent : int, optional
+        number of independent values in the sample [all of them]
+
+    Returns
+    -------
+    Estimate
+        (B,) density, which integrates to the share of the values inside the bins, and error
+
+    Examples
+    --------
+    >>> binned(np.array([0.1, 0.2, 0.7, 0.8]), np.array([0.0, 0.5, 1.0])).mean
+    array([1., 1.])
+    """
     share = np.histogram(values, bins)[0] / len(values)
     error = np.sqrt(share * (1 - share) / (independent or len(values)))
     return Estimate(share / np.diff(bins), error / np.diff(bins))
 
 
 def excess_kurtosis(speed: np.ndarray) -> float:
-    """a2 = <v^4> / (2 <v^2>^2) - 1: zero for a Maxwell law, -1/2 for equal speeds."""
+    """Return the second Sonine coefficient a2 = <v^4> / (2 <v^2>^2) - 1 of speeds.
+
+    The speeds are those of disks in two dimensions.
+
+    Parameters
+    ----------
+    speed : numpy.ndarray
+        (n,) speeds, in any unit
+
+    Returns
+    -------
+    float
+        0 for Maxwell's distribution, -1/2 for equal speeds
+
+    Examples
+    --------
+    >>> excess_kurtosis(np.ones(5))
+    -0.5
+    """
     square = np.square(speed)
     return float(np.mean(square**2) / (2 * np.mean(square) ** 2) - 1)
 
 
 def rounded_to_error(mean: float, error: float) -> tuple[str, ...]:
-    """Both with the two digits of the error that say something; the mean alone without an error."""
+    """Format a mean with the digits that its error justifies.
+
+    Parameters
+    ----------
+    mean, error : float
+        the two numbers
+
+    Returns
+    -------
+    tuple of str
+        mean and error, both to two digits of the error; the mean alone if the error is NaN
+
+    Examples
+    --------
+    >>> rounded_to_error(3.14159, 0.0123)
+    ('3.142', '0.012')
+    """
     if not np.isfinite(error):
         return (f"{mean:.4g}",)
     if error == 0:
@@ -297,10 +596,25 @@ def rounded_to_error(mean: float, error: float) -> tuple[str, ...]:
 
 
 def kurtosis_noise(count: int) -> float:
-    """Standard deviation of `excess_kurtosis` of so many Maxwellian speeds in two dimensions.
+    """Return the standard deviation of `excess_kurtosis` of Maxwellian speeds.
 
-    To first order a2 is the mean of x^2 / 2 - 2 x, less its mean, where x = v^2 is exponential with
-    the mean 1: variance 20 / 4 + 4 * 1 - 2 * 4 = 1.
+    To first order a2 is the mean of x^2 / 2 - 2 x, less its mean, where x = v^2 is exponential
+    with the mean 1: variance 20 / 4 + 4 * 1 - 2 * 4 = 1.
+
+    Parameters
+    ----------
+    count : int
+        number of speeds
+
+    Returns
+    -------
+    float
+        the standard deviation
+
+    Examples
+    --------
+    >>> float(kurtosis_noise(10000))
+    0.01
     """
     return 1 / np.sqrt(count)
 
@@ -308,10 +622,28 @@ def kurtosis_noise(count: int) -> float:
 def fit_power_law(
     x: np.ndarray, y: np.ndarray, y_error: np.ndarray | None = None
 ) -> PowerLaw | None:
-    """Weighted straight line through ln y against ln x; None with fewer than three points.
+    """Fit a power law by a weighted straight line through ln y against ln x.
 
-    If the points scatter by more than their errors, the errors of the fit are enlarged to match.
-    Without errors all points weigh alike, and their scatter is all that makes the error.
+    If the points scatter by more than their errors, the error of the fit is enlarged to match.
+
+    Parameters
+    ----------
+    x, y : numpy.ndarray
+        (P,) the points; those that are not positive are left out
+    y_error : numpy.ndarray, optional
+        (P,) errors of y [all points weigh alike, and their scatter makes the error]
+
+    Returns
+    -------
+    PowerLaw or None
+        factor and exponent with its error; None with fewer than three different x
+
+    Examples
+    --------
+    >>> x = np.array([1.0, 2.0, 4.0, 8.0])
+    >>> fit = fit_power_law(x, 3 * x**2)
+    >>> round(fit.factor, 6), round(fit.exponent, 6)
+    (3.0, 2.0)
     """
     alike = y_error is None
     x, y, y_error = (np.asarray(a, dtype=float) for a in (x, y, y if alike else y_error))

@@ -14,6 +14,16 @@ from ..reading.nature import TRAITS, allow
 from ..reading.reader import Run
 from .statistics import Curve, estimate, correlated_mean
 
+__all__ = [
+    "averaged",
+    "bond_correlation",
+    "bond_order",
+    "evenly",
+    "largest_cluster",
+    "pair_correlation",
+    "structure_factor",
+]
+
 MOST_PAIRS = 2 * 10**5  # whose distances are looked at in a frame, for `bond_correlation`
 MOST_TERMS = 3e8  # of the sums over disks and wave vectors in a frame
 
@@ -33,10 +43,37 @@ def refuse(run: Run, *traits: str) -> None:
 def pair_correlation(
     run: Run, frames: Index, edges: np.ndarray, pair: tuple[str, str] | None = None
 ) -> np.ndarray:
-    """g(r) in bins, `edges` in mean diameters, over the mean density of the box; NaN without pairs.
+    """Return the pair correlation function g(r) of some frames.
 
-    Between walls, which may move, only about disks far from them.  Of a `pair` of species: of disks
-    of the second about those of the first.
+    It is the density of disks at a distance r from a disk, over the mean density of the box.
+    Between walls, which may move, only disks far from them serve as centres.
+
+    Parameters
+    ----------
+    run : Run
+        a run in a box at rest
+    frames : Index
+        the frames: a number, a slice, or a list
+    edges : numpy.ndarray
+        (B + 1,) edges of the bins of r, in mean diameters
+    pair : tuple of str, optional
+        two species: disks of the second about disks of the first [all disks]
+
+    Returns
+    -------
+    numpy.ndarray
+        (B,) g(r); NaN where there are no pairs
+
+    Raises
+    ------
+    Refused
+        if the box is sheared
+
+    Examples
+    --------
+    >>> g = structure.pair_correlation(run, slice(10, None), np.linspace(0, 3, 31))
+    >>> g.shape, bool(g[5] == 0), bool(g[10] > 1)
+    ((30,), True, True)
     """
     refuse(run, "sheared")
     r = edges * 2 * run.radius.mean()
@@ -66,10 +103,36 @@ def masks(run: Run, pair: tuple[str, str] | None) -> list[np.ndarray]:
 def structure_factor(
     run: Run, frames: Index, edges: np.ndarray, pair: tuple[str, str] | None = None
 ) -> np.ndarray:
-    """S(k) = <|sum of exp(ikx)|^2> / N in bins, `edges` of k in 1 / mean diameters; NaN without k.
+    """Return the structure factor S(k) = <|sum of exp(i k x)|^2> / N of some frames.
 
-    Of a `pair` of species: the product of their two sums, over the root of their numbers.  Periodic
-    boxes.  Of many disks only every so many wave vector along x and y is taken.
+    Of many disks only a part of the wave vectors along x and y is evaluated.
+
+    Parameters
+    ----------
+    run : Run
+        a run in a periodic box
+    frames : Index
+        the frames: a number, a slice, or a list
+    edges : numpy.ndarray
+        (B + 1,) edges of the bins of k, in 1 / mean diameter
+    pair : tuple of str, optional
+        two species: the product of their two sums, over the root of their numbers [all disks]
+
+    Returns
+    -------
+    numpy.ndarray
+        (B,) S(k); NaN in bins without a wave vector of the box
+
+    Raises
+    ------
+    Refused
+        if the box has walls or is sheared
+
+    Examples
+    --------
+    >>> S = structure.structure_factor(run, slice(10, None), np.linspace(1, 11, 6))
+    >>> S.shape, bool(np.all(S > 0))
+    ((5,), True)
     """
     refuse(run, "sheared", "walls")
     unit = 2 * np.pi / run.edges  # the wave vectors are its multiples
@@ -97,7 +160,27 @@ def structure_factor(
 
 
 def evenly(run: Run, frames: Index = slice(None), most: int = 50) -> list[int]:
-    """At most so many of the frames [all], those next to even steps of time."""
+    """Choose frames that are nearest to equal steps of time.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    frames : Index
+        frames to choose from [all]
+    most : int
+        largest number of frames to return
+
+    Returns
+    -------
+    list of int
+        numbers of the frames, in order
+
+    Examples
+    --------
+    >>> len(structure.evenly(run, most=5))
+    5
+    """
     which = np.array(chosen(run.n_frames, frames))
     time = run.time[which]
     at = np.interp(np.linspace(time[0], time[-1], most), time, np.arange(len(time)))
@@ -111,9 +194,33 @@ def averaged(
     edges: np.ndarray,
     *more: object,
 ) -> Curve:
-    """The means of of(run, frames, edges, *more), and their errors, in the bins that have any.
+    """Average a function of frames over runs, or over the frames of a single run.
 
-    Errors are over the runs, or over the frames of a single one, which remember each other.
+    Parameters
+    ----------
+    of : callable
+        such as `pair_correlation`: takes run, frames, edges and `more`, and returns (B,) values
+    runs : sequence of Run
+        (R,) runs that differ by their seed
+    frames : sequence of Index
+        (R,) frames of each run
+    edges : numpy.ndarray
+        (B + 1,) edges of the bins
+    *more : object
+        further arguments of the function
+
+    Returns
+    -------
+    Curve
+        middles of the bins that have values, means and errors: over the runs, or for a single
+        run from the autocorrelation over its frames
+
+    Examples
+    --------
+    >>> frames = [structure.evenly(one, most=10) for one in runs]
+    >>> curve = averaged(pair_correlation, runs, frames, np.linspace(1, 3, 11))
+    >>> len(curve.x), bool(np.all(curve.error > 0))
+    (10, True)
     """
     middle, alone = (edges[1:] + edges[:-1]) / 2, len(runs) == 1
     parts: Iterable[tuple[Run, Index]] = zip(runs, frames, strict=True)
@@ -134,7 +241,29 @@ def largest_cluster(run: Run, frame: int, gap: float) -> int: ...
 @overload
 def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray: ...
 def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray:
-    """Disks in the largest cluster: those that hang together by gaps below `gap`."""
+    """Return the number of disks in the largest cluster.
+
+    Disks belong to one cluster if a chain of disks with gaps below `gap` connects them.
+
+    Parameters
+    ----------
+    run : Run
+        a run in a box at rest
+    frame : Index
+        a frame, or several
+    gap : float
+        largest gap between neighbours [length]
+
+    Returns
+    -------
+    int or numpy.ndarray
+        the number; (F,) of several frames
+
+    Examples
+    --------
+    >>> structure.largest_cluster(run, -1, gap=1.0)
+    64
+    """
     refuse(run, "sheared")
     if not isinstance(frame, int | np.integer):
         each = chosen(run.n_frames, frame)
@@ -153,7 +282,26 @@ def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray:
 
 
 def bond_order(run: Run, frame: Index) -> np.ndarray:
-    """(N,) complex psi6 of each disk, over its Delaunay neighbours; (F, N) of several frames."""
+    """Return the bond-orientational order psi6 of each disk, over its Delaunay neighbours.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    frame : Index
+        a frame, or several
+
+    Returns
+    -------
+    numpy.ndarray
+        (N,) complex; (F, N) of several frames; its modulus is 1 for six neighbours at equal angles
+
+    Examples
+    --------
+    >>> psi6 = structure.bond_order(run, -1)
+    >>> psi6.shape, bool(np.all(np.abs(psi6) <= 1 + 1e-12))
+    ((64,), True)
+    """
     if not isinstance(frame, int | np.integer):
         each = chosen(run.n_frames, frame)
         return np.array([bond_order(run, k) for k in each]).reshape(-1, run.n_disks)
@@ -178,9 +326,31 @@ def bond_order(run: Run, frame: Index) -> np.ndarray:
 def bond_correlation(
     run: Run, frames: Index, psi: Sequence[np.ndarray] | np.ndarray, edges: np.ndarray
 ) -> np.ndarray:
-    """g6(r) = Re <psi6*(0) psi6(r)> in bins, `edges` in mean diameters; NaN without pairs.
+    """Return the correlation function g6(r) = Re <psi6*(0) psi6(r)> of the bond order.
 
-    `psi` is the bond order of each of the frames.  Of many disks only some are centres.
+    Of many disks only some serve as centres.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    frames : Index
+        the frames
+    psi : sequence of numpy.ndarray
+        (F, N) `bond_order` of each of the frames
+    edges : numpy.ndarray
+        (B + 1,) edges of the bins of r, in mean diameters
+
+    Returns
+    -------
+    numpy.ndarray
+        (B,) g6(r); NaN where there are no pairs
+
+    Examples
+    --------
+    >>> psi6 = structure.bond_order(run, [-1])
+    >>> structure.bond_correlation(run, [-1], psi6, np.linspace(1, 3, 5)).shape
+    (4,)
     """
     few = np.linspace(0, run.n_disks - 1, min(run.n_disks, max(16, MOST_PAIRS // run.n_disks)))
     centres = few.astype(int)

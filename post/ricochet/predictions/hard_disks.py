@@ -15,6 +15,23 @@ from numpy.typing import ArrayLike
 from ..reading.arrays import Number
 from ..reading.reader import Restitution
 
+__all__ = [
+    "collision_rate",
+    "contact_value",
+    "crystal",
+    "enskog",
+    "haff_by_collisions",
+    "haff_by_time",
+    "haff_rate",
+    "henderson",
+    "long_time_tail",
+    "noise_temperature",
+    "published",
+    "simulated",
+    "simulated_finite",
+    "speed_of_sound",
+]
+
 CLOSE_PACKING = math.pi / math.sqrt(12)
 # Simulation: to 0.5 from the equation of state of Kolafa and Rottner, Mol. Phys. 104, 3435 (2006);
 # above, Erpenbeck and Luban, Phys. Rev. A 32, 2920 (1985).
@@ -56,25 +73,94 @@ def splines() -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
 
 
 def henderson(eta: Number) -> Number:
-    """Z of the fluid by Henderson, Mol. Phys. 30, 971 (1975)."""
+    """Return the compressibility factor Z = P / (n kT) of the fluid, by Henderson.
+
+    D. Henderson, Mol. Phys. 30, 971 (1975).
+
+    Parameters
+    ----------
+    eta : float or numpy.ndarray
+        packing fraction
+
+    Returns
+    -------
+    float or numpy.ndarray
+        Z
+
+    Examples
+    --------
+    >>> round(hard_disks.henderson(0.3), 4)
+    2.0638
+    """
     return (1 + eta**2 / 8) / (1 - eta) ** 2
 
 
 def simulated(eta: ArrayLike) -> np.ndarray:
-    """Z of the fluid between the points of `FLUID`; NaN beyond the last."""
+    """Return Z = P / (n kT) of the fluid, interpolated between published simulations.
+
+    Parameters
+    ----------
+    eta : array_like
+        (...) packing fraction
+
+    Returns
+    -------
+    numpy.ndarray
+        (...) Z; NaN beyond the last point of `FLUID`
+
+    Examples
+    --------
+    >>> bool(abs(hard_disks.simulated(0.3) / hard_disks.henderson(0.3) - 1) < 0.01)
+    True
+    """
     eta = np.asarray(eta, dtype=float)
     return np.where(eta <= FLUID[-1, 0], splines()[0](eta) / (1 - eta) ** 2, np.nan)
 
 
 def simulated_finite(eta: ArrayLike, count: int) -> np.ndarray:
-    """The same for `count` disks in a periodic box, eta up to 0.5."""
+    """Return Z = P / (n kT) of the fluid of a finite number of disks in a periodic box.
+
+    Parameters
+    ----------
+    eta : array_like
+        (...) packing fraction, up to 0.5
+    count : int
+        number of disks
+
+    Returns
+    -------
+    numpy.ndarray
+        (...) Z
+
+    Examples
+    --------
+    >>> bool(hard_disks.simulated_finite(0.3, 50) < hard_disks.simulated(0.3))
+    True
+    """
     return simulated(eta) + splines()[1](eta) / count
 
 
 def crystal(eta: Number, count: float = math.inf) -> Number:
-    """Z of the crystal by Alder, Hoover and Young, J. Chem. Phys. 49, 3688 (1968).
+    """Return Z = P / (n kT) of the crystal.
 
-    `count` disks in a periodic box: their centre of mass is free, as in an ideal gas of one.
+    Alder, Hoover and Young, J. Chem. Phys. 49, 3688 (1968).
+
+    Parameters
+    ----------
+    eta : float or numpy.ndarray
+        packing fraction
+    count : float
+        number of disks in a periodic box, whose centre of mass is free [infinite]
+
+    Returns
+    -------
+    float or numpy.ndarray
+        Z
+
+    Examples
+    --------
+    >>> 10 < hard_disks.crystal(0.75) < 12
+    True
     """
     alpha = CLOSE_PACKING / eta - 1
     z = 2 / alpha + 1.90 + 0.67 * alpha + 1.51 * alpha**2
@@ -102,7 +188,27 @@ def adiabat(
 
 
 def published(eta: float, count: int, periodic: bool) -> float:
-    """Z that simulations of others found: fluid to 0.65, crystal beyond 0.72; NaN between."""
+    """Return Z = P / (n kT) as simulations of others found it, in the fluid or in the crystal.
+
+    Parameters
+    ----------
+    eta : float
+        packing fraction
+    count : int
+        number of disks
+    periodic : bool
+        whether the box is periodic
+
+    Returns
+    -------
+    float
+        Z of the fluid up to 0.65 and of the crystal from 0.72 on; NaN between
+
+    Examples
+    --------
+    >>> hard_disks.published(0.7, 1000, True)
+    nan
+    """
     if eta <= 0.5:
         return float(simulated_finite(eta, count) if periodic else simulated(eta))
     return float(crystal(eta, count) if eta >= 0.72 else simulated(eta))
@@ -118,35 +224,128 @@ def of_sizes(z: np.ndarray, eta: np.ndarray, alike: float) -> np.ndarray:
 
 
 def contact_value(z: Number, eta: Number) -> Number:
-    """The chi of Z = 1 + 2 eta chi."""
+    """Return the pair correlation function at contact, chi = (Z - 1) / (2 eta).
+
+    Parameters
+    ----------
+    z : float or numpy.ndarray
+        P / (n kT)
+    eta : float or numpy.ndarray
+        packing fraction
+
+    Returns
+    -------
+    float or numpy.ndarray
+        chi
+
+    Examples
+    --------
+    >>> hard_disks.contact_value(2.0, 0.25)
+    2.0
+    """
     return (z - 1) / (2 * eta)
 
 
 def collision_rate(
     z: float, diameter: float, free: float, kt: float = 1.0, mass: float = 1.0
 ) -> float:
-    """The w that follows from Z; `free` = N between walls, N - 1 in a periodic box."""
+    """Return the number of collisions per disk and time that follows from the pressure.
+
+    Parameters
+    ----------
+    z : float
+        P / (n kT)
+    diameter : float
+        diameter of the disks [length]
+    free : float
+        disks that share the energy: N between walls, N - 1 in a periodic box
+    kt, mass : float
+        temperature and mass of a disk
+
+    Returns
+    -------
+    float
+        rate [1/time]
+
+    Examples
+    --------
+    >>> round(hard_disks.collision_rate(2.0, 1.0, 1e4), 3)
+    2.257
+    """
     # Mean relative speed for fixed energy over that of the Maxwell law.
     c_n = math.exp(math.lgamma(free) - math.lgamma(free + 0.5)) * math.sqrt(free)
     return 4 * (z - 1) * c_n / (math.sqrt(math.pi) * diameter) * math.sqrt(kt / mass)
 
 
 def haff_rate(xi: float) -> float:
-    """-d ln K / d tau, tau collisions per disk, while the gas stays homogeneous.
+    """Return the cooling rate -d ln K / d tau of the homogeneous state.
 
-    a2 by van Noije and Ernst, Granular Matter 1, 57 (1998).
+    a2 is that of van Noije and Ernst, Granular Matter 1, 57 (1998).
+
+    Parameters
+    ----------
+    xi : float
+        restitution
+
+    Returns
+    -------
+    float
+        rate per collision per disk
+
+    Examples
+    --------
+    >>> hard_disks.haff_rate(1.0)
+    0.0
     """
     a2 = 16 * (1 - xi) * (1 - 2 * xi**2) / (57 - 25 * xi + 30 * xi**2 * (1 - xi))
     return float((1 - xi**2) * (1 + a2 / 4) / 2)
 
 
 def haff_by_collisions(tau: np.ndarray, xi: float) -> np.ndarray:
-    """K / K0 after tau collisions per disk, while the gas stays homogeneous."""
+    """Return K / K0 of the homogeneous state after some collisions.
+
+    Parameters
+    ----------
+    tau : array_like
+        (T,) collisions per disk
+    xi : float
+        restitution
+
+    Returns
+    -------
+    numpy.ndarray
+        (T,) kinetic energy over that at the start
+
+    Examples
+    --------
+    >>> float(hard_disks.haff_by_collisions(0.0, 0.9))
+    1.0
+    """
     return np.exp(-haff_rate(xi) * np.asarray(tau))
 
 
 def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
-    """K / K0 after the time t, w0 = w at the start; Haff, J. Fluid Mech. 134, 401 (1983)."""
+    """Return K / K0 of the homogeneous state after some time.
+
+    P. K. Haff, J. Fluid Mech. 134, 401 (1983).
+
+    Parameters
+    ----------
+    w0_t : array_like
+        (T,) time, in units of the inverse of the first collision rate
+    xi : float
+        restitution
+
+    Returns
+    -------
+    numpy.ndarray
+        (T,) kinetic energy over that at the start
+
+    Examples
+    --------
+    >>> round(float(hard_disks.haff_by_time(4.0, 0.0)), 3)
+    0.25
+    """
     return (1 + (1 - xi**2) * np.asarray(w0_t) / 4) ** -2
 
 
@@ -166,9 +365,31 @@ def haff_soft(law: Restitution, thermal: float) -> tuple[np.ndarray, np.ndarray,
 def noise_temperature(
     strength: float, xi: float, eta: float, diameter: float, mass: float = 1.0
 ) -> float:
-    """The kT at which collisions take what noise gives, variance `strength` per time to each v_x.
+    """Return the temperature at which dissipation balances white-noise driving.
 
     Van Noije and Ernst, Granular Matter 1, 57 (1998), for Maxwell's velocities; chi by Henderson.
+
+    Parameters
+    ----------
+    strength : float
+        variance that each velocity component gains per time [velocity^2/time]
+    xi : float
+        restitution
+    eta : float
+        packing fraction
+    diameter, mass : float
+        diameter and mass of a disk
+
+    Returns
+    -------
+    float
+        kT
+
+    Examples
+    --------
+    >>> kt = hard_disks.noise_temperature(1.0, 0.9, 0.2, 0.1)
+    >>> bool(np.isclose(hard_disks.noise_temperature(8.0, 0.9, 0.2, 0.1), 4 * kt))
+    True
     """
     chi, density = contact_value(henderson(eta), eta), 4 * eta / (math.pi * diameter**2)
     loss = math.sqrt(math.pi) * (1 - xi**2) * chi * density * diameter
@@ -176,7 +397,25 @@ def noise_temperature(
 
 
 def speed_of_sound(eta: float, kt: float = 1.0, mass: float = 1.0) -> float:
-    """Of the fluid, adiabatic: c^2 = (d(eta Z)/d eta + Z^2) kT / m, Z by Henderson."""
+    """Return the adiabatic speed of sound of the fluid, c^2 = (d(eta Z)/d eta + Z^2) kT / m.
+
+    Parameters
+    ----------
+    eta : float
+        packing fraction; Z is that of Henderson
+    kt, mass : float
+        temperature and mass of a disk
+
+    Returns
+    -------
+    float
+        c [velocity]
+
+    Examples
+    --------
+    >>> round(hard_disks.speed_of_sound(1e-5), 3)
+    1.414
+    """
     step = 1e-6
     slope = ((eta + step) * henderson(eta + step) - (eta - step) * henderson(eta - step)) / step / 2
     return math.sqrt((slope + henderson(eta) ** 2) * kt / mass)
@@ -185,9 +424,30 @@ def speed_of_sound(eta: float, kt: float = 1.0, mass: float = 1.0) -> float:
 def enskog(
     z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0
 ) -> dict[str, float]:
-    """Viscosities, heat conductivity (k = 1) and D, by name; Gass, J. Chem. Phys. 54, 1898 (1971).
+    """Return the transport coefficients of Enskog's theory.
 
-    The bulk viscosity is all of it collisional; D is the first Sonine approximation.
+    D. M. Gass, J. Chem. Phys. 54, 1898 (1971).  The bulk viscosity is all of it collisional; D is
+    the first Sonine approximation.
+
+    Parameters
+    ----------
+    z : float
+        P / (n kT)
+    eta : float
+        packing fraction
+    diameter, kt, mass : float
+        diameter of a disk, temperature, mass of a disk
+
+    Returns
+    -------
+    dict of str to float
+        "viscosity", "bulk_viscosity", "conductivity" (Boltzmann's constant is 1) and "D"
+
+    Examples
+    --------
+    >>> found = hard_disks.enskog(hard_disks.henderson(0.3), 0.3, 1.0)
+    >>> sorted(found)
+    ['D', 'bulk_viscosity', 'conductivity', 'viscosity']
     """
     y, thermal = z - 1, np.sqrt(mass * kt / math.pi)
     density = 4 * eta / (math.pi * diameter**2)
@@ -242,5 +502,28 @@ def enskog_mixture(
 def long_time_tail(
     time: np.ndarray, density: float, diffusion: float, viscosity: float
 ) -> np.ndarray:
-    """<v(0) v(t)> / <v^2> at late times by mode coupling; Dorfman and Cohen, PRL 25, 1257."""
+    """Return the long-time tail of the velocity autocorrelation, by mode coupling.
+
+    J. R. Dorfman and E. G. D. Cohen, Phys. Rev. Lett. 25, 1257 (1970).
+
+    Parameters
+    ----------
+    time : array_like
+        (T,) lag [time]
+    density : float
+        disks per area
+    diffusion, viscosity : float
+        diffusion coefficient and kinematic viscosity [length^2/time]
+
+    Returns
+    -------
+    numpy.ndarray
+        (T,) <v(0) v(t)> / <v^2>
+
+    Examples
+    --------
+    >>> early, late = hard_disks.long_time_tail([1.0, 2.0], 1.0, 0.5, 0.5)
+    >>> float(early / late)
+    2.0
+    """
     return 1 / (8 * math.pi * density * (diffusion + viscosity) * np.asarray(time))

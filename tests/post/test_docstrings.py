@@ -1,0 +1,70 @@
+"""The examples in the docstrings of the public functions: each is executed."""
+
+import doctest
+import sys
+from importlib import import_module
+
+import numpy as np
+import pytest
+
+import ricochet
+
+sys.path.insert(0, str(ricochet.commands.HERE.parents[1] / "tests" / "support"))
+
+from check_docstrings import MODULES
+
+FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+GAS = {
+    "box": {"boundary": ("periodic", "periodic")},
+    "species": {"name": "gas", "count": 64, "packing_fraction": 0.3, "temperature": 1.0},
+    "stop": {"collisions_per_disk": 60},
+    "output": {
+        "event_log": True,
+        "helfand": True,
+        "frames_every_time": 0.02,
+        "observables_every_time": 0.004,
+    },
+}
+CRATER = """&species name = 'bed' count = 60 packing_fraction = 0.5 region = 0, 1, 0, 0.5 /
+&species name = 'projectile' relative_to = 'bed' mass = 25 radius = 2 position = 0.5, 0.8
+  velocity = 0, -5 /
+&contact restitution = 0.5 contact_time = 1e-5 /
+&stop energy_fraction = 0.1 /
+"""
+
+
+@pytest.fixture(scope="session")
+def names(request, tmp_path_factory):
+    """The objects that examples may use: `run`, `runs`, `cooling_runs` and `bed_run`."""
+    patch = pytest.MonkeyPatch()
+    patch.setenv("RICOCHET", str(request.getfixturevalue("program")))
+    folder = tmp_path_factory.mktemp("examples")
+
+    def made(name: str, system: object, **more: object) -> ricochet.Run:
+        return ricochet.run(system, more, folder / f"{name}.h5", progress=False)
+
+    runs = [made(f"gas_{seed}", GAS, **{"run.seed": seed}) for seed in (1, 2, 3)]
+    cool = {"contact.restitution": 0.9}
+    cooling_runs = [made(f"cool_{seed}", GAS, **{"run.seed": seed}, **cool) for seed in (1, 2, 3)]
+    yield {
+        "np": np,
+        "ricochet": ricochet,
+        "run": runs[0],
+        "runs": runs,
+        "cooling_runs": cooling_runs,
+        "bed_run": made("bed", CRATER),
+        "folder": folder,
+    }
+    patch.undo()
+
+
+@pytest.mark.parametrize("module", ["ricochet", *(f"ricochet.{name}" for name in MODULES)])
+def test_the_examples_of_a_module_work(module, names):
+    """In a namespace with NumPy, the module's own names and a few small runs."""
+    loaded = import_module(module)
+    finder, runner = doctest.DocTestFinder(), doctest.DocTestRunner(optionflags=FLAGS)
+    told: list[str] = []
+    for test in finder.find(loaded, globs={**vars(loaded), **names, module.split(".")[-1]: loaded}):
+        runner.run(test, out=told.append, clear_globs=False)
+    assert not runner.failures, "".join(told)
+    assert runner.tries or module == "ricochet"

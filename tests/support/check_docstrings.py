@@ -1,0 +1,48 @@
+"""Holds the docstrings of the public Python functions to the numpydoc standard.
+
+    python tests/support/check_docstrings.py
+
+One line for each problem.  Public are the names in `__all__` of `MODULES`.
+"""
+
+import sys
+from importlib import import_module
+
+MODULES = ("statistics", "structure", "correlations", "hard_disks")
+#: Rules that do not apply here, and why.
+IGNORED = {
+    "GL01": "the summary stands on the line of the quotes, as everywhere in the project",
+    "ES01": "a summary that says all needs no more text",
+    "SA01": "the pages of the project say which functions belong together",
+    "PR06": "types are those of the annotations",
+    "PR08": "descriptions of parameters are phrases that may begin with a symbol",
+    "PR09": "and that end without a stop, as comments on attributes do",
+    "RT02": "a tuple has names, as numpydoc itself recommends for several results",
+    "RT04": "likewise for results",
+    "RT05": "likewise",
+    "YD01": "generators have Yields only where a caller uses them",
+}
+#: A named tuple needs no example: functions return it.
+OF_CLASSES = {"EX01", "PR01", "PR02"}
+
+
+def problems() -> list[str]:
+    """All problems, as `module.name: CODE text`."""
+    from numpydoc.validate import validate  # the tests take the list of modules without it
+
+    found = []
+    for module in (f"ricochet.{name}" for name in MODULES):
+        loaded = import_module(module)
+        for name in loaded.__all__:
+            own = getattr(loaded, name)
+            ignored = IGNORED.keys() | (OF_CLASSES if isinstance(own, type) else set())
+            for code, text in validate(f"{loaded.__name__}.{name}")["errors"]:
+                if code not in ignored:
+                    found.append(f"{module}.{name}: {code} {text}")
+    return found
+
+
+if __name__ == "__main__":
+    told = problems()
+    print(*told, sep="\n", end="\n" * bool(told))
+    sys.exit(bool(told))
