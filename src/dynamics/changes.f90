@@ -107,7 +107,7 @@ contains
     real(real64), intent(in) :: before                       !! the total energy then [energy]
 
     sim%changes = sim%changes + 1
-    sim%most_energy = max(sim%most_energy, sim%kinetic_energy(), abs(total_energy(sim) - before))
+    sim%typical_speed2 = max(sim%typical_speed2, sim%mean_square_speed())
     call sim%choose_units()
     call sim%tally%sum(work)%add(total_energy(sim) - before)
   end subroutine book

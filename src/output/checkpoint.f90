@@ -404,7 +404,7 @@ contains
     call record%exchange(file, sim%events_then)
     call record%exchange(file, sim%start_energy)
     call record%exchange(file, sim%given_energy)
-    call record%exchange(file, sim%most_energy)
+    call record%exchange(file, sim%typical_speed2)
     call record%exchange(file, sim%kicks)
     call record%exchange(file, sim%changes)
     call exchange_tally()
@@ -441,14 +441,15 @@ contains
       end associate
     end subroutine exchange_tally
 
-    !> Whole numbers of units, which may grow to twice as many bits as an integer has.
+    !> The whole numbers of each sum, which have twice as many bits as an integer.
     subroutine exchange_sums(sums)
       type(exact_sum_t), intent(inout) :: sums(:)
-      integer(int128), target :: units(size(sums))
+      integer(int128), target :: parts(2*size(sums))
 
-      units = sums%units
-      call record%pass(file, c_loc(units), 2*size(units))
-      sums%units = units
+      parts = [sums%units, sums%rare]
+      call record%pass(file, c_loc(parts), 2*size(parts))
+      sums%units = parts(:size(sums))
+      sums%rare = parts(size(sums) + 1:)
     end subroutine exchange_sums
 
     !> The disks.

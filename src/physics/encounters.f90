@@ -23,6 +23,8 @@ module encounters
   integer(int32), parameter :: most_visible = most_repeats - 3
   real(real64), parameter :: rounded = 1.0e-12_real64, slowest = 1.0e-120_real64
 
+  real(real64), parameter :: far_heavier = 2.0_real64**20    !! ratio of masses
+
 contains
 
   !> Collides disk i at the time t with what `code` names, unless they are together already, with all that is rare: disks
@@ -60,21 +62,19 @@ contains
       if (sim%law%by_speed%speed > 0) restitution = sim%law%by_speed%restitution_at(restitution, approach(sim, i, code, t))
       call collide_pair(sim, i, code, t, counts, restitution)
       if (n_repeats > 0) sim%tag([i, code])%met = repeated(sim%tag([code, i])%id, n_repeats)
-      if (sim%law%grip%is_rough()) &
-        call rub(sim, first, second, sim%mass_of(first)*magnitude(sim%disk(first)%v - v), counts)
+      if (sim%law%grip%is_rough()) call rub(sim, first, second, impulse_between(sim, first, second, v, w), counts)
     else
       call collide_wall(sim, i, code, t, counts)
     end if
     if (.not. counts) return
-    change = sim%mass_of(first)*(sim%disk(first)%v - v)
-    if (code > 0 .and. sim%with%stress) call book_pair(sim, first, second, change, &
-      0.5_real64*(gain(sim, first, v) - gain(sim, second, w)))
+    change = momentum_change(sim, first, second, v, w)
+    if (code > 0 .and. sim%with%stress) call book_pair(sim, first, second, change, handed(sim, first, second, v, w))
     call sim%note_change(first, v, t)
     if (code > 0) call sim%note_change(second, w, t)
     if (.not. present(log)) return
     ids = [sim%tag(first)%id, code]
     if (code > 0) ids(2) = sim%tag(second)%id
-    call log%append([sim%epoch + t, real(ids, real64), sim%mass_of(first)*magnitude(sim%disk(first)%v - v), change])
+    call log%append([sim%epoch + t, real(ids, real64), impulse_between(sim, first, second, v, w), change])
   end subroutine collide
 
   !> Collides the disks i and j at the time t. Which of them is i changes no bit.
@@ -199,6 +199,61 @@ contains
     end associate
     call keep_apart(sim, i, j)
   end subroutine rub
+
+  !> The momentum that disk i has gained, from a surface or from disk j. The velocity of a disk that is far heavier than its
+  !> partner hardly changes, and rounds: then it is that which the partner has lost.
+  pure function momentum_change(sim, i, j, v, w) result(change)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: j              !! not positive: there is no partner
+    real(real64), intent(in) :: v(2), w(2)       !! their velocities before [length/time]
+    real(real64) :: change(2)                    !! [mass length/time]
+
+    if (is_far_heavier(sim, i, j)) then
+      change = -sim%mass_of(j)*(sim%disk(j)%v - w)
+    else
+      change = sim%mass_of(i)*(sim%disk(i)%v - v)
+    end if
+  end function momentum_change
+
+  !> The size of that.
+  pure function impulse_between(sim, i, j, v, w) result(impulse)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: j              !! not positive: there is no partner
+    real(real64), intent(in) :: v(2), w(2)       !! their velocities before [length/time]
+    real(real64) :: impulse                      !! [mass length/time]
+
+    if (is_far_heavier(sim, i, j)) then
+      impulse = sim%mass_of(j)*magnitude(sim%disk(j)%v - w)
+    else
+      impulse = sim%mass_of(i)*magnitude(sim%disk(i)%v - v)
+    end if
+  end function impulse_between
+
+  !> Whether disk i is so much heavier than disk j that its own change of velocity has lost digits.
+  pure function is_far_heavier(sim, i, j) result(yes)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, j
+    logical :: yes
+
+    yes = j > 0
+    if (yes) yes = sim%mass_of(i) > far_heavier*sim%mass_of(j)
+  end function is_far_heavier
+
+  !> The energy of translation that disk i has gained from disk j, as the mean of the gain of one and the loss of the other.
+  pure function handed(sim, i, j, v, w) result(energy)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: v(2), w(2)       !! their velocities before [length/time]
+    real(real64) :: energy
+
+    if (is_far_heavier(sim, i, j) .or. is_far_heavier(sim, j, i)) then
+      energy = 0.25_real64*dot_product(momentum_change(sim, i, j, v, w), sim%disk(i)%v + v + sim%disk(j)%v + w)
+    else
+      energy = 0.5_real64*(gain(sim, i, v) - gain(sim, j, w))
+    end if
+  end function handed
 
   !> The energy of translation that disk i has gained.
   pure function gain(sim, i, before)

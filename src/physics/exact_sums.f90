@@ -1,21 +1,31 @@
 !> Sums that come out the same to the last bit in whatever order their terms are added: fixed-point numbers.
 module exact_sums
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use kinds, only: int64, int128, real64
   implicit none
   private
   public :: exact_sum_t
 
   integer, parameter :: digits_of_bound = 62             !! binary ones, of a term at the bound
+  integer, parameter :: digits_of_rare = 90              !! and of terms that are counted apart
   real(real64), parameter :: most_units = 2.0_real64**digits_of_bound
+  real(real64), parameter :: rare_unit = 2.0_real64**digits_of_rare
+  integer, parameter :: digits_of_most = 125
+  integer(int128), parameter :: most = 2_int128**digits_of_most    !! of either number: beyond it the sum is lost
 
-  !> Terms may exceed the bound that `choose_unit` was given: then adding them takes a little longer.
+  !> Terms may exceed the bound that `choose_unit` was given: then adding them takes a little longer. 2**35 terms of any size
+  !> below 2**90 units cannot overflow; the multiples of 2**90 units in larger ones are counted apart.
   type :: exact_sum_t
     integer(int128) :: units = 0
+    integer(int128) :: rare = 0                          !! multiples of 2**90 units
     real(real64) :: per_one = 0.0_real64                 !! units per 1, a power of two; 0: not chosen yet
   contains
     procedure :: choose_unit
     procedure :: add
+    procedure :: include
+    procedure :: clear
     procedure :: value
+    procedure, private :: add_rare, make_finer, make_coarser
   end type exact_sum_t
 
 contains
@@ -30,11 +40,41 @@ contains
     before = self%per_one
     self%per_one = 1
     if (bound > 0) self%per_one = scale(1.0_real64, min(digits_of_bound - exponent(bound), maxexponent(bound) - 1))
-    if (.not. before > 0 .or. self%units == 0) return
+    if (.not. before > 0) return
     finer = exponent(self%per_one) - exponent(before)
-    if (finer > 0) self%units = self%units*2_int128**finer
-    if (finer < 0) self%units = self%units/2_int128**min(-finer, 126)
+    if (finer > 0) call self%make_finer(min(finer, digits_of_most))
+    if (finer < 0) call self%make_coarser(min(-finer, digits_of_most))
   end subroutine choose_unit
+
+  !> Divides the unit by a power of two.
+  elemental subroutine make_finer(self, digits)
+    class(exact_sum_t), intent(inout) :: self
+    integer, intent(in) :: digits                        !! binary
+    integer(int128) :: moved
+
+    if (self%units == 0 .and. self%rare == 0) return
+    moved = self%units/2_int128**max(digits_of_rare - digits, 0)
+    self%units = self%units - moved*2_int128**max(digits_of_rare - digits, 0)
+    if (abs(self%rare) >= 2_int128**(digits_of_most - digits) &
+      .or. abs(moved) >= 2_int128**(digits_of_most - max(digits - digits_of_rare, 0))) then
+      self%rare = most
+    else
+      self%rare = self%rare*2_int128**digits + moved*2_int128**max(digits - digits_of_rare, 0)
+      self%units = self%units*2_int128**digits
+    end if
+  end subroutine make_finer
+
+  !> Multiplies the unit by a power of two.
+  elemental subroutine make_coarser(self, digits)
+    class(exact_sum_t), intent(inout) :: self
+    integer, intent(in) :: digits                        !! binary
+    integer(int128) :: left
+
+    left = self%rare/2_int128**digits
+    self%units = self%units/2_int128**digits &
+      + (self%rare - left*2_int128**digits)/2_int128**max(digits - digits_of_rare, 0)*2_int128**max(digits_of_rare - digits, 0)
+    self%rare = left
+  end subroutine make_coarser
 
   !> Adds a term, less what is below a unit.
   elemental subroutine add(self, term)
@@ -45,18 +85,57 @@ contains
     units = term*self%per_one
     if (abs(units) < most_units) then
       self%units = self%units + int(units, int64)
-    else
+    else if (abs(units) < rare_unit) then
       self%units = self%units + int(units, int128)
+    else
+      call self%add_rare(units)
     end if
   end subroutine add
 
-  !> The sum so far.
+  !> Adds a term in two parts, which are exact: a double has fewer digits than either.
+  elemental subroutine add_rare(self, units)
+    class(exact_sum_t), intent(inout) :: self
+    real(real64), intent(in) :: units
+    real(real64) :: rare
+
+    rare = aint(units/rare_unit)
+    if (abs(rare) < real(most, real64) .and. abs(self%rare) < most) then
+      self%rare = self%rare + int(rare, int128)
+      self%units = self%units + int(units - rare*rare_unit, int128)
+    else
+      self%rare = most
+    end if
+  end subroutine add_rare
+
+  !> Adds the terms of another sum in the same units.
+  elemental subroutine include(self, other)
+    class(exact_sum_t), intent(inout) :: self
+    type(exact_sum_t), intent(in) :: other
+
+    self%units = self%units + other%units
+    self%rare = self%rare + other%rare
+    if (max(abs(self%rare), abs(other%rare)) >= most) self%rare = most
+  end subroutine include
+
+  !> Takes all terms away.
+  elemental subroutine clear(self)
+    class(exact_sum_t), intent(inout) :: self
+
+    self%units = 0
+    self%rare = 0
+  end subroutine clear
+
+  !> The sum so far; not a number if it has become too large.
   elemental function value(self)
     class(exact_sum_t), intent(in) :: self
     real(real64) :: value
 
     value = 0
-    if (self%per_one > 0) value = real(self%units, real64)/self%per_one
+    if (.not. self%per_one > 0) return
+    value = real(self%units, real64)/self%per_one
+    if (self%rare == 0) return
+    value = value + real(self%rare, real64)*(rare_unit/self%per_one)
+    if (abs(self%rare) >= most) value = ieee_value(value, ieee_quiet_nan)
   end function value
 
 end module exact_sums

@@ -14,9 +14,11 @@ module simulation_state
   private
   public :: given_t, simulation_t, system_t
 
+  !> How far terms of sums are commonly above the typical ones of the heaviest disks, and at most above those of the lightest.
+  real(real64), parameter :: common = 2.0_real64**7, rare = 2.0_real64**22
   !> Walls and kicks may give more than they commonly do, and nobody knows how much less until they act: units fine enough
-  !> for the energies before that leave room for the sums of 2**35 terms.
-  real(real64), parameter :: uncommon = 64, finer = 2.0_real64**(-30)
+  !> for the energies before that.
+  real(real64), parameter :: finer = 2.0_real64**(-30)
 
   !> What acts on disks.
   type :: system_t
@@ -53,7 +55,7 @@ module simulation_state
     type(tally_t) :: tally                        !! counts and sums since the start of the run
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
     real(real64) :: given_energy = 0.0_real64     !! kinetic energy when the velocities were last given, at the start or by a change
-    real(real64) :: most_energy = 0.0_real64      !! the largest that it was then and after changes, for the units of sums
+    real(real64) :: typical_speed2 = 0.0_real64   !! mean square, the largest at the start and after changes [(length/time)**2]
   contains
     procedure :: time
     procedure :: has_reached
@@ -79,6 +81,7 @@ module simulation_state
     procedure :: is_driven
     procedure :: start_sums
     procedure :: choose_units
+    procedure :: mean_square_speed
     procedure :: fastest_drive
   end type simulation_t
 
@@ -334,7 +337,7 @@ contains
     if (self%tally%sum(1)%per_one > 0 .or. self%n_disks() == 0) return
     self%start_energy = self%kinetic_energy()
     self%given_energy = self%start_energy
-    self%most_energy = self%start_energy
+    self%typical_speed2 = self%mean_square_speed()
     call self%choose_units()
   end subroutine start_sums
 
@@ -347,24 +350,43 @@ contains
     speed = sqrt(maxval([0.0_real64, self%drive%speed2([(s, s=1, size(self%species))], self%species%mass)]))
   end function fastest_drive
 
-  !> The units of the sums, from what a collision can contribute at most given the energy of the start, or what walls and
-  !> kicks commonly give to a disk. Nothing is lost if it is more: disks that fall through periodic sides gain energy for
-  !> ever.
+  !> Mean square of the speeds now, and of those of the rims of disks that turn.
+  pure function mean_square_speed(self) result(speed2)
+    class(simulation_t), intent(in) :: self
+    real(real64) :: speed2                        !! [(length/time)**2]
+    integer(int32) :: i
+
+    speed2 = 0
+    do i = 1, self%n_disks()
+      speed2 = speed2 + (sum(self%velocity(i)**2) + (self%spin(i)*self%disk(i)%radius)**2)/self%n_disks()
+    end do
+  end function mean_square_speed
+
+  !> The units of the sums, from the commonest terms: those of disks with the mean square speed, or that which walls and kicks
+  !> commonly give. Where masses differ widely, collisions of the lightest disks are still summed to 40 binary digits, and
+  !> rare terms of the heaviest exceed the bound of the type, which then takes a little longer.
   pure subroutine choose_units(self)
     class(simulation_t), intent(inout) :: self
-    real(real64), dimension(size(self%species)) :: mass, kicked    ! [mass, (length/time)**2]
-    real(real64) :: energy, impulse, length
+    real(real64) :: mass(size(self%disk)), kicked(size(self%species))    ! [mass, (length/time)**2]
+    real(real64) :: speed2, light, heavy, small, large, length
     integer :: s
 
-    mass = self%species%mass
-    kicked = self%drive%speed2([(s, s=1, size(mass))], mass)
-    energy = self%most_energy + sum(self%species%count*mass)*sum(abs(self%box%gravity)*self%box%edges()) &
-      + uncommon*(self%box%highest_temperature() + maxval(mass)*self%box%highest_speed()**2 + maxval(mass*kicked))
-    impulse = sqrt(8*maxval(mass))*sqrt(energy)
+    mass = self%masses()
+    light = minval(mass)
+    heavy = maxval(mass)
+    small = 2*minval(self%disk%radius)
+    large = 2*maxval(self%disk%radius)
     length = maxval(self%box%edges())
+    kicked = self%drive%speed2([(s, s=1, size(kicked))], self%species%mass)
+    speed2 = self%typical_speed2 + sum(abs(self%box%gravity)*self%box%edges()) + self%box%highest_temperature()/light &
+      + self%box%highest_speed()**2 + maxval(kicked)
     call self%tally%make_room(size(self%box%surface))
-    call self%tally%choose_units(merge(finer, 1.0_real64, self%is_driven()) &
-      *[energy, impulse, impulse*2*maxval(self%disk%radius), energy*length, sqrt(energy*maxval(mass))*length])
+    call self%tally%choose_units(merge(finer, 1.0_real64, self%is_driven())*[ &
+      min(common*heavy, rare*light)*speed2, &
+      min(common*heavy, rare*light)*sqrt(speed2), &
+      min(common*heavy*large, rare*light*small)*sqrt(speed2), &
+      min(common*heavy*length, rare*light*small)*speed2, &
+      min(common*heavy*length, rare*light*small)*sqrt(speed2)])
   end subroutine choose_units
 
 end module simulation_state

@@ -99,9 +99,9 @@ contains
     self%collisions = self%collisions + other%collisions
     self%stuck = self%stuck + other%stuck
     self%collapse = min(self%collapse, other%collapse)
-    self%sum%units = self%sum%units + other%sum%units
+    call self%sum%include(other%sum)
     self%hits = self%hits + other%hits
-    self%at_surface%units = self%at_surface%units + other%at_surface%units
+    call self%at_surface%include(other%at_surface)
   end subroutine include
 
   !> Begins anew in the same units.
@@ -112,9 +112,9 @@ contains
     self%collisions = 0
     self%stuck = 0
     self%collapse = never
-    self%sum%units = 0
+    call self%sum%clear()
     self%hits = 0
-    self%at_surface%units = 0
+    call self%at_surface%clear()
   end subroutine clear
 
 end module tally

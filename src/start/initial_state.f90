@@ -17,6 +17,7 @@ module initial_state
   public :: check_speeds, create_simulation, describe_system
 
   real(real64), parameter :: most = 1.0e130_real64          !! of what is squared later: 1e308 is the limit of numbers
+  real(real64), parameter :: widest = 1.0e30_real64*(1 + 1.0e-12_real64)   !! ratio of masses
 
 contains
 
@@ -60,6 +61,8 @@ contains
     end do
     speed = speed + sim%box%highest_speed() + sqrt(sim%box%highest_temperature()/mass(1))
     speed = speed + sqrt(2*maxval(abs(sim%box%gravity)))*sqrt(longest)
+    if (mass(2) > widest*mass(1)) call problems%add(0, "species.mass", "masses from "//written(mass(1))//" to " &
+      //written(mass(2))//"; allowed: a ratio of up to 1e30, with which sums over collisions are exact")
     if (.not. speed > 0) return
     if (longest*speed > most .or. shortest*speed < 1/most .or. longest/speed > most .or. shortest/speed < 1/most) then
       call problems%add(0, "species.radius", "lengths from "//written(shortest)//" to "//written(longest)//" with speeds up to " &
