@@ -409,7 +409,14 @@ def test_a_damaged_input_in_a_file_is_called_damaged(tmp_path):
     "groups",
     [
         {"drive": {"kind": "noise", "interval": 0.01, "strength": 1}},
-        {"drive": {"kind": "active", "interval": 1e-4, "temperature": 1, "speed": 2}},
+        {
+            "drive": {
+                "kind": "active",
+                "interval": 1e-4,
+                "temperature": 1,
+                "self_propulsion_speed": 2,
+            }
+        },
         {"output": {"frames_every_time": 0.1, "observables_every_time": 1e-3}},
         {"output": {"frames_per_decade": 5, "decades_from": 1e-3, "observables_at": [0.1, 0.2]}},
         {"run": {"dynamics": "steps", "dt": 1e-4}},
