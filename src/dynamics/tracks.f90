@@ -73,13 +73,8 @@ contains
   subroutine add_track(self, i)
     class(tracks_t), intent(inout) :: self
     integer(int32), intent(in) :: i
-    type(track_t), allocatable :: more(:)
 
-    if (self%n_tracks == size(self%track)) then
-      allocate (more(2*self%n_tracks))
-      more(:self%n_tracks) = self%track
-      call move_alloc(more, self%track)
-    end if
+    if (self%n_tracks == size(self%track)) self%track = [self%track, self%track]
     self%n_tracks = self%n_tracks + 1
     self%track_of(i) = self%n_tracks
   end subroutine add_track

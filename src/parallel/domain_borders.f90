@@ -102,14 +102,8 @@ contains
 
     !> Notes what is to be taken over from the neighbour's slot t.
     subroutine note_news()
-      type(news_t), allocatable :: more(:)
-
       if (.not. allocated(self%news)) allocate (self%news(256))
-      if (self%n_news == size(self%news)) then
-        allocate (more(2*self%n_news))
-        more(:self%n_news) = self%news
-        call move_alloc(more, self%news)
-      end if
+      if (self%n_news == size(self%news)) self%news = [self%news, self%news]
       self%n_news = self%n_news + 1
       associate (news => self%news(self%n_news))
         news%whole_disk_t = other%sim%whole_disk(t)

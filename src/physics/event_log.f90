@@ -32,14 +32,9 @@ contains
   pure subroutine append(self, record)
     class(event_log_t), intent(inout) :: self
     real(real64), intent(in) :: record(record_length)
-    real(real64), allocatable :: longer(:, :)
 
     if (.not. allocated(self%record)) allocate (self%record(record_length, first_room))
-    if (self%n == size(self%record, 2)) then
-      allocate (longer(record_length, 2*self%n))
-      longer(:, :self%n) = self%record
-      call move_alloc(longer, self%record)
-    end if
+    if (self%n == size(self%record, 2)) self%record = reshape(self%record, [record_length, 2*self%n], pad=[0.0_real64])
     self%n = self%n + 1
     self%record(:, self%n) = record
   end subroutine append

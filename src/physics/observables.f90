@@ -134,18 +134,12 @@ contains
     character(len=*), intent(in) :: name
     real(real64), intent(in) :: value(:)
     logical, intent(in), optional :: is_count
-    type(observable_t), allocatable :: larger(:)
 
     if (.not. allocated(self%row)) allocate (self%row(32))
-    if (self%n == size(self%row)) then
-      allocate (larger(2*self%n))
-      larger(:self%n) = self%row
-      call move_alloc(larger, self%row)
-    end if
+    if (self%n == size(self%row)) self%row = [self%row, self%row]
     self%n = self%n + 1
     associate (row => self%row(self%n))
-      row%name = name
-      row%width = size(value)
+      row = observable_t(name, size(value))
       row%value(:size(value)) = value
       if (present(is_count)) row%is_count = is_count
     end associate
