@@ -7,7 +7,7 @@ module changes
   use kinds, only: int32, int64, real64
   use partners, only: n_sides
   use observables, only: total_energy
-  use side_motion, only: piston
+  use side_motion, only: piston, side_state_t
   use simulation_state, only: simulation_t, system_t
   use tally, only: work
   implicit none
@@ -22,22 +22,19 @@ contains
     type(system_t), intent(in) :: system
     character(len=:), allocatable, intent(out) :: problem    !! why it cannot; empty if it could
     type(simulation_t) :: other
-    real(real64) :: before, here(2, 2), there(2, 2), tau     ! [energy], lower and upper sides [length], [time]
+    real(real64) :: before, here(2, 2), there(2, 2), v       ! [energy], lower and upper sides [length], of a side [length/time]
     integer :: k
 
     problem = ""
     other%given_t = sim%given_t
     other%system_t = system
     other%with%own_sizes = sim%with%own_sizes
-    other%box%epoch = sim%epoch
+    other%box%epoch = sim%box%epoch
     do k = 1, n_sides                                        ! a piston starts where the side is, and as fast
-      associate (old => sim%box%surface(k)%motion, new => other%box%surface(k)%motion)
-        if (new%kind /= piston) cycle
-        tau = old%moment(sim%epoch, sim%now)
-        new%at = old%place(tau)
-        new%v = merge(old%velocity(tau), 0.0_real64, old%travels())
-        new%clock = sim%now
-      end associate
+      if (other%box%surface(k)%motion%kind /= piston) cycle
+      v = 0
+      if (sim%box%surface(k)%motion%travels()) v = sim%box%side_velocity(k, sim%now)
+      other%box%side(k) = side_state_t(sim%box%side_position(k, sim%now), v, sim%now)
     end do
     call bounds(sim%box, sim%now, here(:, 1), here(:, 2))
     call bounds(other%box, sim%now, there(:, 1), there(:, 2))

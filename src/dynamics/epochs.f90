@@ -119,13 +119,10 @@ contains
     end do
     if (sim%law%contact_time > 0) sim%extra%last_contact = sim%extra%last_contact - shift
     sim%now = sim%now - shift
-    sim%epoch = sim%epoch + shift
     sim%last_advance = sim%last_advance - shift
-    sim%box%epoch = sim%epoch
-    associate (motion => sim%box%surface(:n_sides)%motion)    ! only sides move
-      motion%clock = motion%clock - shift
-      if (.not. any(motion%travels())) return
-    end associate
+    sim%box%epoch = sim%box%epoch + shift
+    sim%box%side%clock = sim%box%side%clock - shift
+    if (.not. any(sim%box%surface(:n_sides)%motion%travels())) return    ! only sides move
     do i = 1, sim%n_disks()
       call keep_off_sides(sim%box, sim%disk(i), sim%now)
     end do

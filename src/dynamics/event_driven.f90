@@ -96,7 +96,7 @@ contains
     end do
     if (mod(n, 2_int32) == 1) call self%search%predict(sim, n)
     last = never
-    if (sim%drive%reaches_all()) last = sim%drive%time_of(sim%kicks + 1) - sim%epoch
+    if (sim%drive%reaches_all()) last = sim%drive%time_of(sim%kicks + 1) - sim%box%epoch
     last = max(last, minval(sim%disk%event_time))
     do i = 1, n
       if (sim%disk(i)%event_time <= last) then
@@ -255,7 +255,6 @@ contains
     integer(int32), intent(in) :: side             !! its code
     integer(int32) :: i
 
-    self%search%faces%box%surface(1 - side)%motion = sim%box%surface(1 - side)%motion
     do i = 1, sim%n_disks()
       if (sim%disk(i)%partner == side .or. side_time(sim%box, sim%disk(i), side) < sim%disk(i)%event_time) &
         call predict(self, sim, i)

@@ -56,7 +56,7 @@ contains
     kick_time = next_kick(evolution, sim)
     due = min(limits%time, kick_time)
     goal = limits
-    goal%time = due - sim%epoch
+    goal%time = due - sim%box%epoch
     if (sim%epoch_end > 0) then                    ! time steps have no epochs
       goal%time = min(goal%time, sim%epoch_end)
       goal%events = min(goal%events, most_events(sim))
@@ -67,7 +67,7 @@ contains
       epoch_is_over = sim%tally%events >= most_events(sim)
       if (arrived .and. evolution%idle) then
         call wait()
-      else if (arrived .and. due - sim%epoch > sim%epoch_end) then
+      else if (arrived .and. due - sim%box%epoch > sim%epoch_end) then
         epoch_is_over = .true.
         arrived = .false.                          ! at the end of the epoch, not where it was to go
       end if
@@ -83,9 +83,9 @@ contains
     !> Lets time pass until something is due where nothing will ever happen by itself; without an end, to the last collision.
     subroutine wait()
       if (due < last_time) then
-        sim%now = max(sim%now, due - sim%epoch)
+        sim%now = max(sim%now, due - sim%box%epoch)
       else                                           ! a stale event, or the end of the epoch, may have moved it
-        sim%now = max(maxval(sim%disk%clock), limits%sampled - sim%epoch)
+        sim%now = max(maxval(sim%disk%clock), limits%sampled - sim%box%epoch)
       end if
     end subroutine wait
 

@@ -8,7 +8,7 @@ module side_motion
   use kinds, only: never, pi, real64
   implicit none
   private
-  public :: motions, side_motion_t
+  public :: motions, side_motion_t, side_state_t
 
   !> The motions by their names in the input; a motion is its number in this list.
   character(len=*), parameter :: motions = "still sine parabolic sawtooth constant_velocity piston"
@@ -17,6 +17,13 @@ module side_motion
   !> A part of a period: what bends the gap for so short a time does not change it by a bit.
   real(real64), parameter :: negligible = 1.0e-10_real64
   integer, parameter :: pieces_in_reach = 6                 !! that take more than a period, even with some negligible ones
+
+  !> The state of a side whose motion depends on what has happened: a piston changes it at each collision.
+  type :: side_state_t
+    real(real64) :: position = 0.0_real64            !! how far inwards of its own place at `clock` [length]
+    real(real64) :: velocity = 0.0_real64            !! inwards, at `clock` [length/time]
+    real(real64) :: clock = 0.0_real64               !! when these were set, since the epoch [time]
+  end type side_state_t
 
   type :: side_motion_t
     integer :: kind = still                          !! in `motions`
@@ -30,9 +37,6 @@ module side_motion
     ! Of a piston, on which disks and a force act:
     real(real64) :: mass = 1.0_real64                !! [mass]
     real(real64) :: pull = 0.0_real64                !! acceleration inwards by the force [length/time**2]
-    real(real64) :: clock = 0.0_real64               !! of its last hit, since the epoch [time]
-    real(real64) :: at = 0.0_real64                  !! how far inwards it was then [length]
-    real(real64) :: v = 0.0_real64                   !! its velocity inwards then, after the hit [length/time]
   contains
     procedure :: travels
     procedure :: drifts
@@ -86,13 +90,14 @@ contains
 
   !> Time since a period, a stroke or the flight of a piston began, at the time epoch + t of the run. The remainders are exact, so
   !> that a late time is as sharp as an early one.
-  elemental function moment(self, epoch, t) result(tau)
+  elemental function moment(self, epoch, t, state) result(tau)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! [time]
+    type(side_state_t), intent(in), optional :: state     !! of a piston
     real(real64) :: tau                              !! [time]
 
     if (self%kind == piston) then
-      tau = t - self%clock
+      tau = t - state%clock
     else if (self%kind == constant_velocity) then
       tau = (epoch - self%start_time) + t
     else
@@ -101,9 +106,10 @@ contains
   end function moment
 
   !> How far the side is inwards of its own place.
-  elemental function place(self, tau) result(x)
+  elemental function place(self, tau, state) result(x)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! a moment [time]
+    type(side_state_t), intent(in), optional :: state     !! of a piston
     real(real64) :: x                                !! [length]
     real(real64) :: s
 
@@ -116,14 +122,15 @@ contains
     else if (self%kind == constant_velocity) then
       x = self%offset + self%strike*min(max(tau, 0.0_real64), self%end_time - self%start_time)
     else if (self%kind == piston) then
-      x = flight(self%at, self%v, self%pull, tau)
+      x = flight(state%position, state%velocity, self%pull, tau)
     end if
   end function place
 
   !> Its velocity inwards.
-  elemental function velocity(self, tau) result(v)
+  elemental function velocity(self, tau, state) result(v)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! a moment [time]
+    type(side_state_t), intent(in), optional :: state     !! of a piston
     real(real64) :: v                                !! [length/time]
     real(real64) :: s
 
@@ -136,7 +143,7 @@ contains
     else if (self%kind == constant_velocity .and. (tau < 0 .or. tau >= self%end_time - self%start_time)) then
       v = 0
     else if (self%kind == piston) then
-      v = flight_velocity(self%v, self%pull, tau)
+      v = flight_velocity(state%velocity, self%pull, tau)
     end if
   end function velocity
 
@@ -237,12 +244,13 @@ contains
 
   !> Time until the side strikes the rim of a disk on a parabola; `never` if it does not. A disk that is in its reach for a
   !> whole period is struck, unless it is at the very end of the reach and hardly moves: then ever more periods are skipped.
-  pure function contact_time(self, tau, gap, v, g) result(s)
+  pure function contact_time(self, tau, gap, v, g, state) result(s)
     class(side_motion_t), intent(in) :: self         !! one that travels
     real(real64), intent(in) :: tau                  !! the moment from which the time counts [time]
     real(real64), intent(in) :: gap                  !! from the side to the rim, not negative [length]
     real(real64), intent(in) :: v                    !! of the disk [length/time]
     real(real64), intent(in) :: g                    !! its acceleration [length/time**2]
+    type(side_state_t), intent(in), optional :: state     !! of a piston
     real(real64) :: s, from, to, above, entry
     integer :: pieces
 
@@ -250,7 +258,7 @@ contains
       s = time_in_stroke(self, tau, gap, v, g)
       return
     else if (self%kind == piston) then
-      s = time_to_line(gap, self%velocity(tau) - v, self%pull - g)
+      s = time_to_line(gap, self%velocity(tau, state) - v, self%pull - g)
       return
     end if
     above = gap + self%place(tau) - self%amplitude   ! beyond the reach of the side

@@ -234,7 +234,7 @@ contains
         motion%mass = group%real_of("mass", 1.0_real64)
         motion%pull = group%real_of("force", 0.0_real64)/motion%mass
         motion%amplitude = width
-        motion%at = motion%offset
+        box%side(side)%position = motion%offset
       else if (motion%top_speed() > largest) then
         call group%complain("period", "the side moves at up to "// &
           written(motion%top_speed())//"; allowed: up to "//written(largest), problems)

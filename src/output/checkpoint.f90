@@ -390,8 +390,7 @@ contains
     integer(int64) :: settled
     integer :: k
 
-    call record%exchange(file, sim%epoch)
-    sim%box%epoch = sim%epoch
+    call record%exchange(file, sim%box%epoch)
     call record%exchange(file, sim%now)
     settled = merge(1, 0, sim%settled)
     call record%exchange(file, settled)
@@ -409,9 +408,9 @@ contains
     call record%exchange(file, sim%changes)
     call exchange_tally()
     if (any(sim%box%surface%motion%kind == piston)) then
-      call record%exchange(file, sim%box%surface%motion%clock)
-      call record%exchange(file, sim%box%surface%motion%at)
-      call record%exchange(file, sim%box%surface%motion%v)
+      call record%exchange(file, sim%box%side%clock)
+      call record%exchange(file, sim%box%side%position)
+      call record%exchange(file, sim%box%side%velocity)
     end if
     call exchange_disks()
     do k = 1, size(progress%cadence)

@@ -34,11 +34,11 @@ module domains
     integer(int32) :: halo = 0                     !! columns, rows of copies beyond the domain
     integer(int32), allocatable :: neighbour(:)    !! domains that have disks in this one's patch
     type(patch_t) :: patch
-    type(simulation_t) :: sim                      !! own disks and copies in slots, clocks since the epoch of the whole
+    type(simulation_t) :: sim                      !! own disks and copies in slots, clocks since the same epoch
     type(event_driven_t) :: engine
     integer(int32), allocatable :: home(:)         !! (slots) number of the disk in the whole simulation; or next vacant slot
     integer(int32) :: vacant = 0                   !! the first vacant slot; 0: none
-    type(event_log_t), allocatable :: log          !! of the collisions booked here, with times since the epoch
+    type(event_log_t), allocatable :: log          !! of the collisions booked here
     integer(int64) :: turns = 0                    !! of the engine, in this window
     logical :: done = .false.                      !! the engine came to the end of the window
     logical :: good = .false.                      !! no own disk can have met a wrong copy
@@ -73,7 +73,7 @@ contains
     self%n_news = 0
     self%good = .true.
     self%sim%now = sim%now
-    self%sim%box%epoch = sim%epoch                 ! for its sides; what happens here is told by times since the epoch
+    self%sim%box%epoch = sim%box%epoch
     if (allocated(self%log)) self%log%n = 0
     self%sim%tally = sim%tally
     call self%sim%tally%clear()
@@ -236,9 +236,8 @@ contains
 
   !> Moves what all domains have logged to the log of the whole, in the order of time. Of simultaneous collisions in
   !> different domains nobody knows which comes first: then it is not good.
-  subroutine merge_logs(domain, epoch, log, good)
+  subroutine merge_logs(domain, log, good)
     type(domain_t), intent(inout) :: domain(:)
-    real(real64), intent(in) :: epoch              !! of the whole [time]
     type(event_log_t), intent(inout) :: log
     logical, intent(out) :: good
     integer :: next(size(domain)), k, m
@@ -254,9 +253,7 @@ contains
       m = minloc(head, dim=1)
       if (.not. head(m) < huge(head)) exit
       good = good .and. count(head <= head(m)) == 1
-      associate (record => domain(m)%log%record(:, next(m)))
-        call log%append([epoch + record(1), record(2:)])
-      end associate
+      call log%append(domain(m)%log%record(:, next(m)))
       next(m) = next(m) + 1
     end do
     do k = 1, size(domain)

@@ -142,7 +142,7 @@ contains
       self%windows_done = self%windows_done + windows
       if (present(log)) then
         listed = log%n
-        if (good) call merge_logs(self%parts%domain, sim%epoch, log, good)
+        if (good) call merge_logs(self%parts%domain, log, good)
       end if
       ! The plain engine finds the very event at which a count is at its limit, or a collapse.
       too_far = good

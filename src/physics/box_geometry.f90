@@ -8,7 +8,7 @@ module box_geometry
   use kinds, only: int32, never, real64
   use partners, only: axis_of, is_side, n_sides, obstacle_number, sense_of, side_name
   use shapes, only: shape_t, spare
-  use side_motion, only: piston, side_motion_t, still
+  use side_motion, only: piston, side_motion_t, side_state_t, still
   implicit none
   private
   public :: box_t, surface_t
@@ -35,7 +35,9 @@ module box_geometry
     !> Left, right, bottom, top, which count where they are walls; then the groups of obstacles.
     type(surface_t), allocatable :: surface(:)
     type(obstacle_t), allocatable :: obstacle(:)   !! those of one group side by side: see `partners` for their codes
-    real(real64) :: epoch = 0.0_real64          !! that of the simulation: the motion of sides needs the time of the run [time]
+    ! State, beside that of the disks. The input gives the state of sides at the start.
+    real(real64) :: epoch = 0.0_real64          !! the moment from which all clocks count, since the start of the run [time]
+    type(side_state_t) :: side(n_sides)
   contains
     procedure :: edges
     procedure :: periods
@@ -44,7 +46,6 @@ module box_geometry
     procedure :: is_sheared
     procedure :: slip
     procedure :: stream
-    procedure :: without_obstacles
     procedure :: add_obstacles
     procedure :: has_obstacles
     procedure :: n_obstacles
@@ -56,6 +57,8 @@ module box_geometry
     procedure :: highest_speed
     procedure :: gives_energy
     procedure :: reach
+    procedure :: side_position
+    procedure :: side_velocity
   end type box_t
 
   interface box_t
@@ -74,24 +77,6 @@ contains
       box%surface(k)%name = trim(side_name(k))
     end do
   end function new_box
-
-  !> The same box without its obstacles, of which there may be many.
-  pure function without_obstacles(self) result(box)
-    class(box_t), intent(in) :: self
-    type(box_t) :: box
-    integer :: k
-
-    box%lower = self%lower
-    box%upper = self%upper
-    box%periodic = self%periodic
-    box%gravity = self%gravity
-    box%shear_rate = self%shear_rate
-    box%epoch = self%epoch
-    allocate (box%surface(n_sides), box%obstacle(0))
-    do k = 1, n_sides
-      box%surface(k) = self%surface(k)
-    end do
-  end function without_obstacles
 
   !> Adds groups of obstacles, whose shapes are to follow.
   subroutine add_obstacles(self, name, n)
@@ -268,6 +253,30 @@ contains
     length = transpose(reshape(self%surface(:n_sides)%motion%amplitude, [2, 2]))
   end function reach
 
+  !> How far side k is inwards of its own place at a time.
+  pure function side_position(self, k, t) result(x)
+    class(box_t), intent(in) :: self
+    integer, intent(in) :: k
+    real(real64), intent(in) :: t               !! since the epoch [time]
+    real(real64) :: x                           !! [length]
+
+    associate (motion => self%surface(k)%motion, state => self%side(k))
+      x = motion%place(motion%moment(self%epoch, t, state), state)
+    end associate
+  end function side_position
+
+  !> Its velocity inwards then.
+  pure function side_velocity(self, k, t) result(v)
+    class(box_t), intent(in) :: self
+    integer, intent(in) :: k
+    real(real64), intent(in) :: t               !! since the epoch [time]
+    real(real64) :: v                           !! [length/time]
+
+    associate (motion => self%surface(k)%motion, state => self%side(k))
+      v = motion%velocity(motion%moment(self%epoch, t, state), state)
+    end associate
+  end function side_velocity
+
   !> The earlier of a known event and the contacts with the obstacles listed. A disk stays in the box until it
   !> passes a periodic side, so the images of an obstacle one period away are enough; an obstacle that encloses the disks
   !> has none.
@@ -377,9 +386,7 @@ contains
 
     u = 0
     if (.not. is_side(code)) return
-    associate (motion => box%surface(1 - code)%motion)
-      if (motion%kind /= still) u = motion%velocity(motion%moment(box%epoch, t))*normal
-    end associate
+    if (box%surface(1 - code)%motion%kind /= still) u = box%side_velocity(1 - code, t)*normal
   end function strike_velocity
 
   !> Unit vector from a surface to a disk at x that hits it with the velocity v.

@@ -25,9 +25,7 @@ contains
 
     inwards = 0
     do k = 1, n_sides
-      associate (motion => box%surface(k)%motion)
-        if (motion%travels()) inwards(k) = motion%place(motion%moment(box%epoch, t))
-      end associate
+      if (box%surface(k)%motion%travels()) inwards(k) = box%side_position(k, t)
     end do
     lower = box%lower + inwards([1, 3])
     upper = box%upper - inwards([2, 4])
@@ -51,20 +49,20 @@ contains
     else
       gap = (box%upper(axis) - inset) - disk%x(axis)
     end if
-    associate (motion => box%surface(1 - side)%motion)
+    associate (motion => box%surface(1 - side)%motion, state => box%side(1 - side))
       if (motion%travels()) then
         since = disk%clock
         v = -sense*disk%v(axis)
         if (motion%kind == piston) then             ! what flies was not hit before both clocks
-          since = max(since, motion%clock)
+          since = max(since, state%clock)
           after = since - disk%clock
           gap = gap + flight(0.0_real64, v, -sense*box%gravity(axis), after)
           v = flight_velocity(v, -sense*box%gravity(axis), after)
         end if
-        tau = motion%moment(box%epoch, since)
-        gap = gap - motion%place(tau)
+        tau = motion%moment(box%epoch, since, state)
+        gap = gap - motion%place(tau, state)
         if (gap < no_gap(disk, axis, motion)) gap = 0
-        t = since + motion%contact_time(tau, gap, v, -sense*box%gravity(axis))
+        t = since + motion%contact_time(tau, gap, v, -sense*box%gravity(axis), state)
       else
         t = disk%clock + time_to_line(max(gap, 0.0_real64), sense*disk%v(axis), sense*box%gravity(axis))
       end if

@@ -74,7 +74,7 @@ contains
     if (.not. present(log)) return
     ids = [sim%tag(first)%id, code]
     if (code > 0) ids(2) = sim%tag(second)%id
-    call log%append([sim%epoch + t, real(ids, real64), impulse_between(sim, first, second, v, w), change])
+    call log%append([sim%box%epoch + t, real(ids, real64), impulse_between(sim, first, second, v, w), change])
   end subroutine collide
 
   !> Collides the disks i and j at the time t. Which of them is i changes no bit.

@@ -89,9 +89,7 @@ contains
       if (.not. sim%box%surface(k)%motion%travels()) cycle
       call bounds(sim%box, sim%now, at(:, 1), at(:, 2))
       call list%add(path//"/position", [at((k + 1)/2, 2 - modulo(k, 2))])
-      associate (motion => sim%box%surface(k)%motion)
-        call list%add(path//"/velocity", [motion%velocity(motion%moment(sim%box%epoch, sim%now))])
-      end associate
+      call list%add(path//"/velocity", [sim%box%side_velocity(k, sim%now)])
     end do
   end function observed
 

@@ -40,7 +40,6 @@ module simulation_state
     type(tag_t), allocatable :: tag(:)            !! (n)
     real(real64), allocatable :: own_mass(:)      !! (n) where those of a species differ [mass]
     type(extra_t), allocatable :: extra(:)        !! (n) where `has_extra`
-    real(real64) :: epoch = 0.0_real64            !! the moment from which `now` and the clocks count [time]
     real(real64) :: now = 0.0_real64              !! since the epoch [time]
     logical :: settled = .false.                  !! all that happens up to `now` is behind
     real(real64) :: epoch_begin = 0.0_real64      !! since the epoch [time]
@@ -92,7 +91,7 @@ contains
     class(simulation_t), intent(in) :: self
     real(real64) :: t
 
-    t = self%epoch + self%now
+    t = self%box%epoch + self%now
   end function time
 
   !> Whether a moment has come, with all that happens then: in between, where the run may pause, it has not.
@@ -216,7 +215,7 @@ contains
     class(simulation_t), intent(in) :: self
     type(images_t) :: images
 
-    images = self%box%images(self%epoch)
+    images = self%box%images(self%box%epoch)
   end function images_now
 
   !> Where disk i is now. Its own state, at its clock, stays as it is.

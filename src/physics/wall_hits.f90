@@ -81,16 +81,16 @@ contains
 
     mass = sim%mass_of(i)
     axis = axis_of(code)
-    associate (motion => sim%box%surface(1 - code)%motion, disk => sim%disk(i))
-      v = motion%velocity(motion%moment(0.0_real64, t))
+    associate (motion => sim%box%surface(1 - code)%motion, side => sim%box%side(1 - code), disk => sim%disk(i))
+      v = sim%box%side_velocity(1 - code, t)
       given = dot_product(disk%v - before, normal)*mass/(mass + motion%mass)
       disk%v = disk%v - given*normal
       ! It touches, in the digits of `side_time`: else rounding lifts it off what rests.
-      motion%at = merge(disk%x(axis) - (sim%box%lower(axis) + disk%radius), &
+      side%position = merge(disk%x(axis) - (sim%box%lower(axis) + disk%radius), &
         (sim%box%upper(axis) - disk%radius) - disk%x(axis), sense_of(code) < 0)
-      motion%v = min(v - given, dot_product(disk%v, normal))       ! never ahead of it by rounding
-      motion%clock = t
-      u = u + (0.5_real64*(motion%v - v))*normal
+      side%velocity = min(v - given, dot_product(disk%v, normal))       ! never ahead of it by rounding
+      side%clock = t
+      u = u + (0.5_real64*(side%velocity - v))*normal
     end associate
   end subroutine push
 

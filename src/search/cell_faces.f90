@@ -8,6 +8,7 @@ module cell_faces
   use box_sides, only: side_time
   use disks, only: disk_t
   use free_flight, only: flight, flight_velocity, slowest, time_to_line
+  use neighbour_search, only: prospect_t
   use partners, only: crossing, is_wall, n_sides, nothing, sense_of, side_crossed
   use shapes, only: spare
   use side_motion, only: piston
@@ -50,9 +51,9 @@ module cell_faces
   type :: cell_faces_t
     real(real64) :: width(2) = 0.0_real64          !! from cell to cell [length]
     real(real64) :: overlap(2) = 0.0_real64        !! of neighbouring cells [length]
-    logical :: moving = .false.                    !! sides move
     logical :: falling = .false.                   !! disks fly on parabolas, or sides move: more than one face is in question
-    type(box_t) :: box
+    logical :: periodic(2) = .false.               !! by axis
+    real(real64) :: beyond(2, 2) = 0.0_real64      !! how far disks may be beyond the sides: lower ones, upper ones [length]
     type(line_t), allocatable :: column(:, :)      !! (0:1,columns) their left and right faces
     type(line_t), allocatable :: row(:, :)         !! (0:1,rows)
   contains
@@ -185,9 +186,10 @@ contains
 
     self%width = patch%width
     self%overlap = max(self%width - patch%reach, 0.0_real64)
-    self%moving = any(box%surface(:n_sides)%motion%travels())
-    self%falling = box%falling() .or. self%moving
-    self%box = box%without_obstacles()
+    self%falling = box%falling() .or. any(box%surface(:n_sides)%motion%travels())
+    self%periodic = box%periodic
+    self%beyond = box%reach()
+    where (transpose(reshape(box%surface(:n_sides)%motion%kind == piston, [2, 2]))) self%beyond = never
     call cut(1, self%column)
     call cut(2, self%row)
     call find_struck(1, self%column)
@@ -202,16 +204,16 @@ contains
 
       low = 2 - 2*axis                               ! codes of the two sides
       high = low - 1
-      inset = merge(0, 1, self%box%periodic(axis))
+      inset = merge(0, 1, box%periodic(axis))
       allocate (line(0:1, patch%n(axis)))
       do k = 1, patch%n(axis)
         place = patch%place_of(k, axis)
-        line(0, k) = line_t(self%box%lower(axis) + self%width(axis)*(place - 1) - 0.5_real64*self%overlap(axis), &
+        line(0, k) = line_t(box%lower(axis) + self%width(axis)*(place - 1) - 0.5_real64*self%overlap(axis), &
           0.0_real64, crossing(low))
-        line(1, k) = line_t(self%box%lower(axis) + self%width(axis)*place + 0.5_real64*self%overlap(axis), &
+        line(1, k) = line_t(box%lower(axis) + self%width(axis)*place + 0.5_real64*self%overlap(axis), &
           0.0_real64, crossing(high))
-        if (place == 1) line(0, k) = line_t(self%box%lower(axis), inset, low)
-        if (place == patch%whole(axis)) line(1, k) = line_t(self%box%upper(axis), -inset, high)
+        if (place == 1) line(0, k) = line_t(box%lower(axis), inset, low)
+        if (place == patch%whole(axis)) line(1, k) = line_t(box%upper(axis), -inset, high)
       end do
     end subroutine cut
 
@@ -221,10 +223,10 @@ contains
       type(line_t), intent(inout) :: line(0:, :)
       real(real64) :: reach(2, 2)
 
-      reach = self%box%reach()
-      associate (side => self%box%surface(2*axis - 1:2*axis)%motion, within => (reach(axis, :) + patch%small)*(1 + spare))
-        line(0, :)%struck = side(1)%travels() .and. line(0, :)%place <= self%box%lower(axis) + within(1)
-        line(1, :)%struck = side(2)%travels() .and. line(1, :)%place >= self%box%upper(axis) - within(2)
+      reach = box%reach()
+      associate (side => box%surface(2*axis - 1:2*axis)%motion, within => (reach(axis, :) + patch%small)*(1 + spare))
+        line(0, :)%struck = side(1)%travels() .and. line(0, :)%place <= box%lower(axis) + within(1)
+        line(1, :)%struck = side(2)%travels() .and. line(1, :)%place >= box%upper(axis) - within(2)
       end associate
     end subroutine find_struck
   end subroutine set
@@ -236,25 +238,23 @@ contains
     integer(int32), intent(in) :: cell(2)          !! of all those of the box
     integer(int32), intent(in) :: n(2)             !! columns, rows of the box
     real(real64), intent(out) :: low(2), high(2)   !! from its lower left corner [length]
-    real(real64) :: reach(2, 2)
 
-    reach = self%box%reach()
-    where (transpose(reshape(self%box%surface(:n_sides)%motion%kind == piston, [2, 2]))) reach = never
-    low = self%width*(cell - 1) - 0.5_real64*self%overlap - merge(reach(:, 1), 0.0_real64, cell == 1)
-    high = self%width*cell + 0.5_real64*self%overlap + merge(reach(:, 2), 0.0_real64, cell == n)
+    low = self%width*(cell - 1) - 0.5_real64*self%overlap - merge(self%beyond(:, 1), 0.0_real64, cell == 1)
+    high = self%width*cell + 0.5_real64*self%overlap + merge(self%beyond(:, 2), 0.0_real64, cell == n)
   end subroutine rectangle
 
   !> Of the cells that contain the disk, the one that it leaves last.
-  pure subroutine choose_cell(self, disk, now, cell)
+  pure subroutine choose_cell(self, gravity, disk, now, cell)
     class(cell_faces_t), intent(in) :: self
+    real(real64), intent(in) :: gravity(2)         !! [length/time**2]
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
     integer(int16), intent(inout) :: cell(2)       !! in: any of them
     real(real64) :: s
 
     s = now - disk%clock
-    cell(1) = cell(1) + ahead(self%column, self%overlap(1), disk%x(1), disk%v(1), self%box%gravity(1), s, cell(1))
-    cell(2) = cell(2) + ahead(self%row, self%overlap(2), disk%x(2), disk%v(2), self%box%gravity(2), s, cell(2))
+    cell(1) = cell(1) + ahead(self%column, self%overlap(1), disk%x(1), disk%v(1), gravity(1), s, cell(1))
+    cell(2) = cell(2) + ahead(self%row, self%overlap(2), disk%x(2), disk%v(2), gravity(2), s, cell(2))
   end subroutine choose_cell
 
   !> Along one axis: 1 or -1 if the disk is in the next cell as well, and moves towards it; else 0.
@@ -281,40 +281,40 @@ contains
   end function chosen
 
   !> When and how the disk leaves its cell, or meets a side within it.
-  pure subroutine next(self, disk, cell, now, falling, t, code)
+  pure subroutine next(self, box, disk, cell, now, falling, near)
     class(cell_faces_t), intent(in) :: self
+    type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int16), intent(in) :: cell(2)
     real(real64), intent(in) :: now
     logical, intent(in) :: falling
-    real(real64), intent(out) :: t
-    integer(int32), intent(out) :: code
+    type(prospect_t), intent(inout) :: near        !! gets time and partner
 
     if (falling) then
-      call self%next_falling(disk, cell, now, t, code)
+      call self%next_falling(box, disk, cell, now, near%time, near%partner)
     else
-      call next_straight(self%column, self%row, disk, cell, t, code)
+      call next_straight(self%column, self%row, disk, cell, near%time, near%partner)
     end if
   end subroutine next
 
   !> When and how the disk reaches one of four lines around it, which may be nearer than its cell's.
-  pure subroutine next_within(self, column, row, disk, now, t, code)
+  pure subroutine next_within(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
+    type(box_t), intent(in) :: box
     type(line_t), intent(in) :: column(0:1), row(0:1)
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
-    real(real64), intent(out) :: t
-    integer(int32), intent(out) :: code
+    type(prospect_t), intent(inout) :: near        !! gets time and partner
     real(real64) :: t_y
     integer(int32) :: code_y
 
     if (self%falling) then
-      call next_along(self, column, 1, disk, now, t, code)
-      call next_along(self, row, 2, disk, now, t_y, code_y)
-      code = chosen(code, code_y, t_y < t)
-      t = merge(t_y, t, t_y < t)
+      call next_along(box, column, 1, disk, now, near%time, near%partner)
+      call next_along(box, row, 2, disk, now, t_y, code_y)
+      near%partner = chosen(near%partner, code_y, t_y < near%time)
+      near%time = merge(t_y, near%time, t_y < near%time)
     else
-      call next_straight(column, row, disk, [1_int16, 1_int16], t, code)
+      call next_straight(column, row, disk, [1_int16, 1_int16], near%time, near%partner)
     end if
   end subroutine next_within
 
@@ -352,8 +352,9 @@ contains
   end function line_time
 
   !> On a parabola.
-  pure subroutine next_falling(self, disk, cell, now, t, code)
+  pure subroutine next_falling(self, box, disk, cell, now, t, code)
     class(cell_faces_t), intent(in) :: self
+    type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int16), intent(in) :: cell(2)
     real(real64), intent(in) :: now
@@ -362,15 +363,15 @@ contains
     real(real64) :: t_x, t_y
     integer(int32) :: code_x, code_y
 
-    call next_along(self, self%column(:, cell(1)), 1, disk, now, t_x, code_x)
-    call next_along(self, self%row(:, cell(2)), 2, disk, now, t_y, code_y)
+    call next_along(box, self%column(:, cell(1)), 1, disk, now, t_x, code_x)
+    call next_along(box, self%row(:, cell(2)), 2, disk, now, t_y, code_y)
     code = chosen(code_x, code_y, t_y < t_x)
     t = merge(t_y, t_x, t_y < t_x)
   end subroutine next_falling
 
   !> The same along one axis.
-  pure subroutine next_along(self, line, axis, disk, now, t, code)
-    class(cell_faces_t), intent(in) :: self
+  pure subroutine next_along(box, line, axis, disk, now, t, code)
+    type(box_t), intent(in) :: box
     type(line_t), intent(in) :: line(0:1)          !! of the disk's cell
     integer(int32), intent(in) :: axis
     type(disk_t), intent(in) :: disk
@@ -380,19 +381,17 @@ contains
     real(real64) :: g, x, v, sense, gap, disc, t_other
     integer(int32) :: up
 
-    g = self%box%gravity(axis)
+    g = box%gravity(axis)
     up = merge(1, 0, disk%v(axis) > 0)
-    if (self%moving) then                          ! asked first, as it is seldom so
-      if (any(line%struck)) then
-        call next_moving(line, axis, self%box, disk, now, t, code)
-        return
-      end if
+    if (any(line%struck)) then
+      call next_moving(line, axis, box, disk, now, t, code)
+      return
     end if
     if (.not. abs(g) > 0) then
       t = line_time(line(up), disk, axis)
     else if (any(is_wall(line%code))) then
-      t = falling_time(line(up), axis, self%box, disk, now)
-      t_other = falling_time(line(1 - up), axis, self%box, disk, now)
+      t = falling_time(line(up), axis, box, disk, now)
+      t_other = falling_time(line(1 - up), axis, box, disk, now)
       up = chosen(up, 1 - up, t_other < t)
       t = min(t, t_other)
     else                                           ! forward, or, if gravity turns the disk before, back

@@ -3,7 +3,7 @@
 !> overlap (see `cell_faces`).
 module cell_grid
   use kinds, only: int16, int32, never, real64
-  use box_geometry, only: meet_image, next_obstacle
+  use box_geometry, only: box_t, meet_image, next_obstacle
   use box_sides, only: next_side
   use cell_contents, only: cell_contents_t, gather
   use cell_faces, only: all_cells, cell_faces_t, patch_t
@@ -281,13 +281,14 @@ contains
     end if
     inside = .true.
     if (self%is_part) inside = self%patch%holds(cell)
-    if ((self%roomy .or. self%lists%used) .and. inside) call self%faces%choose_cell(sim%disk(i), sim%now, cell)
+    if ((self%roomy .or. self%lists%used) .and. inside) call self%faces%choose_cell(sim%box%gravity, sim%disk(i), sim%now, cell)
     call move(self, sim%tag(i), i, cell)
   end subroutine change_cell
 
   !> Chooses the cell of disk i again after a collision.
-  subroutine choose_cell(self, disk, tag, i)
+  subroutine choose_cell(self, gravity, disk, tag, i)
     class(cell_grid_t), intent(inout) :: self
+    real(real64), intent(in) :: gravity(2)         !! [length/time**2]
     type(disk_t), intent(in) :: disk
     type(tag_t), intent(inout) :: tag
     integer(int32), intent(in) :: i
@@ -295,7 +296,7 @@ contains
 
     if (disk%radius > self%patch%small) return
     cell = tag%cell
-    call self%faces%choose_cell(disk, disk%clock, cell)
+    call self%faces%choose_cell(gravity, disk, disk%clock, cell)
     if (cell(1) /= tag%cell(1) .or. cell(2) /= tag%cell(2)) call move(self, tag, i, cell)
   end subroutine choose_cell
 
@@ -320,9 +321,9 @@ contains
     if (self%cells%cell(self%cells%number(sim%tag(i)%cell))%needs_care()) then
       call self%predict_with_care(sim, i)
     else if (self%faces%falling) then              ! literals let the compiler specialise the kernel
-      call predict_one(self, sim%disk, sim%tag, sim%now, 0, i)
+      call predict_one(self, sim%box, sim%disk, sim%tag, sim%now, 0, i)
     else
-      call predict_one(self, sim%disk, sim%tag, sim%now, no_gravity, i)
+      call predict_one(self, sim%box, sim%disk, sim%tag, sim%now, no_gravity, i)
     end if
   end subroutine predict
 
@@ -333,8 +334,8 @@ contains
     integer(int32), intent(in) :: i, j
 
     if (self%roomy) then
-      call choose_cell(self, sim%disk(i), sim%tag(i), i)
-      call choose_cell(self, sim%disk(j), sim%tag(j), j)
+      call choose_cell(self, sim%box%gravity, sim%disk(i), sim%tag(i), i)
+      call choose_cell(self, sim%box%gravity, sim%disk(j), sim%tag(j), j)
     end if
     if (self%cells%cell(self%cells%number(sim%tag(i)%cell))%needs_care() .or. &
       self%cells%cell(self%cells%number(sim%tag(j)%cell))%needs_care()) then
@@ -347,9 +348,9 @@ contains
       call self%predict(sim, i)
       call self%predict(sim, j)
     else if (self%faces%falling) then
-      call predict_two(self, sim%disk, sim%tag, sim%now, latest_clock, i, j)
+      call predict_two(self, sim%box, sim%disk, sim%tag, sim%now, latest_clock, [i, j])
     else
-      call predict_two(self, sim%disk, sim%tag, sim%now, latest_clock + no_gravity, i, j)
+      call predict_two(self, sim%box, sim%disk, sim%tag, sim%now, latest_clock + no_gravity, [i, j])
     end if
   end subroutine predict_both
 
@@ -370,27 +371,28 @@ contains
     integer(int32), intent(in) :: i, j
     type(prospect_t) :: near_i, near_j
 
-    call survey_list(self, sim%disk(i), sim%now, i, near_i)
-    call survey_list(self, sim%disk(j), sim%now, j, near_j)
+    call survey_list(self, sim%box, sim%disk(i), sim%now, i, near_i)
+    call survey_list(self, sim%box, sim%disk(j), sim%now, j, near_j)
     if (self%faces%falling) then                   ! literals let the compiler specialise the kernel
-      call take_earliest(self, sim%disk, sim%tag, sim%now, latest_clock, near_i)
-      call take_earliest(self, sim%disk, sim%tag, sim%now, latest_clock, near_j)
+      call take_earliest(sim%box%gravity, sim%disk, sim%tag, sim%now, latest_clock, near_i)
+      call take_earliest(sim%box%gravity, sim%disk, sim%tag, sim%now, latest_clock, near_j)
     else
-      call take_earliest(self, sim%disk, sim%tag, sim%now, latest_clock + no_gravity, near_i)
-      call take_earliest(self, sim%disk, sim%tag, sim%now, latest_clock + no_gravity, near_j)
+      call take_earliest(sim%box%gravity, sim%disk, sim%tag, sim%now, latest_clock + no_gravity, near_i)
+      call take_earliest(sim%box%gravity, sim%disk, sim%tag, sim%now, latest_clock + no_gravity, near_j)
     end if
   end subroutine predict_listed
 
   !> When disk i leaves its neighbourhood, and whom it can meet before.
-  pure subroutine survey_list(self, disk, now, i, near)
+  pure subroutine survey_list(self, box, disk, now, i, near)
     type(cell_grid_t), intent(in) :: self
+    type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
     integer(int32), intent(in) :: i
     type(prospect_t), intent(out) :: near
 
     associate (region => self%lists%neighbourhood(i))
-      call self%faces%next_within(region%column, region%row, disk, now, near%time, near%partner)
+      call self%faces%next_within(box, region%column, region%row, disk, now, near)
     end associate
     near%disk = i
     call self%lists%copy_list(near)
@@ -398,58 +400,64 @@ contains
 
   !> Predicts two disks in plain cells. All that precedes the tests of candidates is done for both first, as it
   !> does not wait for the tests.
-  subroutine predict_two(self, disk, tag, now, known, i, j)
+  subroutine predict_two(self, box, disk, tag, now, known, pair)
     class(cell_grid_t), intent(in) :: self
+    type(box_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
-    integer(int32), value :: known, i, j
-    type(prospect_t) :: near_i, near_j
+    integer(int32), value :: known
+    integer(int32), intent(in) :: pair(2)
+    type(prospect_t) :: first, second
 
-    call survey(self, disk(i), tag(i), now, known, i, near_i)
-    call survey(self, disk(j), tag(j), now, known, j, near_j)
-    call take_earliest(self, disk, tag, now, known, near_i)
-    call take_earliest(self, disk, tag, now, known, near_j)
+    first%disk = pair(1)
+    second%disk = pair(2)
+    call survey(self, box, disk(first%disk), tag(first%disk), now, known, first)
+    call survey(self, box, disk(second%disk), tag(second%disk), now, known, second)
+    call take_earliest(box%gravity, disk, tag, now, known, first)
+    call take_earliest(box%gravity, disk, tag, now, known, second)
   end subroutine predict_two
 
   !> Predicts one disk in a plain cell.
-  subroutine predict_one(self, disk, tag, now, known, i)
+  subroutine predict_one(self, box, disk, tag, now, known, i)
     class(cell_grid_t), intent(in) :: self
+    type(box_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
     integer(int32), value :: known, i
     type(prospect_t) :: near
 
-    call survey(self, disk(i), tag(i), now, known, i, near)
-    call take_earliest(self, disk, tag, now, known, near)
+    near%disk = i
+    call survey(self, box, disk(i), tag(i), now, known, near)
+    call take_earliest(box%gravity, disk, tag, now, known, near)
   end subroutine predict_one
 
-  !> When disk i leaves its cell, and whom it can meet before.
-  subroutine survey(self, disk, tag, now, known, i, near)
+  !> When a disk leaves its cell, and which disks it can meet before.
+  subroutine survey(self, box, disk, tag, now, known, near)
     class(cell_grid_t), intent(in) :: self
+    type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     type(tag_t), intent(in) :: tag
     real(real64), intent(in) :: now
-    integer(int32), value :: known, i
-    type(prospect_t), intent(out) :: near
+    integer(int32), value :: known
+    type(prospect_t), intent(inout) :: near        !! of the disk that it names
 
-    call self%faces%next(disk, tag%cell, now, iand(known, no_gravity) == 0, near%time, near%partner)
-    near%disk = i
+    call self%faces%next(box, disk, tag%cell, now, iand(known, no_gravity) == 0, near)
     near%cell = self%cells%number(tag%cell)
-    call gather(self%cells%cell, near%cell, self%cells%stride, i, near%list, near%n)
+    call gather(self%cells%cell, near%cell, self%cells%stride, near%disk, near%list, near%n)
   end subroutine survey
 
   !> Writes into a disk the earliest of the events in prospect.
-  subroutine take_earliest(self, disk, tag, now, known, near)
-    class(cell_grid_t), intent(in) :: self
+  subroutine take_earliest(gravity, disk, tag, now, known, near)
+    real(real64), intent(in) :: gravity(2)         !! [length/time**2]
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
     integer(int32), value :: known
     type(prospect_t), intent(inout) :: near
 
-    call earliest_contact(disk, tag, near, now, self%faces%box%gravity, known)
+    call earliest_contact(disk, tag, near, now, gravity, known)
     disk(near%disk)%event_time = near%time
     disk(near%disk)%partner = near%partner
     tag(near%disk)%partner_stamp = disk(max(near%partner, 1))%stamp    ! without a branch; used if partner > 0
@@ -499,7 +507,7 @@ contains
     !> The earliest event of a small disk.
     subroutine find_event_of_small()
       associate (cell => sim%tag(i)%cell)
-        call self%faces%next(sim%disk(i), cell, sim%now, self%faces%falling, near%time, near%partner)
+        call self%faces%next(sim%box, sim%disk(i), cell, sim%now, self%faces%falling, near)
         if (self%reach%has_any(cell)) call scan_reach(self%reach%first(cell(1), cell(2)))
       end associate
       call scan_cells_around()
@@ -508,7 +516,7 @@ contains
     !> The earliest event of a small disk where there are neighbour lists.
     subroutine find_event_of_listed()
       associate (cell => sim%tag(i)%cell, region => self%lists%neighbourhood(i))
-        call self%faces%next_within(region%column, region%row, sim%disk(i), sim%now, near%time, near%partner)
+        call self%faces%next_within(sim%box, region%column, region%row, sim%disk(i), sim%now, near)
         if (self%reach%has_any(cell)) call scan_reach(self%reach%first(cell(1), cell(2)))
         if (is_plainly_listed(self, cell, i)) then
           call self%lists%copy_list(near)

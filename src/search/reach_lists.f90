@@ -204,7 +204,7 @@ contains
     high = floor((middle + room)/faces%width + 0.5_real64)
     if (shape%encloses) low = 1
     if (shape%encloses) high = patch%whole
-    where (.not. faces%box%periodic)
+    where (.not. faces%periodic)
       low = min(max(low, 1), patch%whole)
       high = min(max(high, 1), patch%whole)
     end where
