@@ -53,6 +53,8 @@ def names(request, tmp_path_factory):
         "runs": runs,
         "cooling_runs": cooling_runs,
         "bed_run": made("bed", CRATER),
+        "walled_run": made("walls", GAS, **{"box.boundary": ("wall", "wall")}),
+        **{name: import_module(f"ricochet.{name}") for name in MODULES},
         "folder": folder,
     }
     patch.undo()
@@ -64,7 +66,7 @@ def test_the_examples_of_a_module_work(module, names):
     loaded = import_module(module)
     finder, runner = doctest.DocTestFinder(), doctest.DocTestRunner(optionflags=FLAGS)
     told: list[str] = []
-    for test in finder.find(loaded, globs={**vars(loaded), **names, module.split(".")[-1]: loaded}):
+    for test in finder.find(loaded, globs={**names, **vars(loaded)}):
         runner.run(test, out=told.append, clear_globs=False)
     assert not runner.failures, "".join(told)
     assert runner.tries or module == "ricochet"

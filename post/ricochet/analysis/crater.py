@@ -14,6 +14,18 @@ from ..reading.files import RunError
 from ..reading.nature import allow
 from ..reading.reader import Run
 
+__all__ = [
+    "Crater",
+    "bed",
+    "box_takes_part",
+    "crater",
+    "displaced",
+    "ended_by_time",
+    "energy_fraction",
+    "hole",
+    "projectile",
+]
+
 
 class Crater(NamedTuple):
     """The size of a crater by several definitions, and how the run ended."""
@@ -47,22 +59,95 @@ FEW_HITS = 0.01  # of walls, per disk: up to here the box does not count
 
 
 def energy_fraction(run: Run) -> float:
-    """The share of the energy at which the run was to end."""
+    """Return the share of the first energy at which a run was to end.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+
+    Returns
+    -------
+    float
+        `stop.energy_fraction`
+
+    Examples
+    --------
+    >>> energy_fraction(bed_run)
+    0.1
+    """
     return float(run.parameter("stop", "energy_fraction", 0.1))
 
 
 def ended_by_time(run: Run, size: Crater) -> bool:
-    """More energy is left than `stop.energy_fraction`."""
+    """Tell whether a run ended with more energy than `stop.energy_fraction`.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    size : Crater
+        its crater
+
+    Returns
+    -------
+    bool
+        whether more energy is left
+
+    Examples
+    --------
+    >>> ended_by_time(bed_run, crater(bed_run))
+    False
+    """
     return size.energy_left > energy_fraction(run) * (1 + 1e-9)
 
 
 def box_takes_part(run: Run, side_collisions: float) -> bool:
-    """The crater reaches the floor or the sides; `side_collisions` may be a mean over runs."""
+    """Tell whether so many disks hit the sides that the crater depends on the box.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    side_collisions : float
+        number of collisions with the sides; it may be a mean over runs
+
+    Returns
+    -------
+    bool
+        whether there is more than one for each hundred disks
+
+    Examples
+    --------
+    >>> box_takes_part(bed_run, 0)
+    False
+    """
     return side_collisions > FEW_HITS * run.n_disks
 
 
 def projectile(run: Run) -> int:
-    """Index of the projectile."""
+    """Find the projectile.
+
+    Parameters
+    ----------
+    run : Run
+        a run with a species 'projectile', or with a single disk that moves at the start
+
+    Returns
+    -------
+    int
+        index of the projectile
+
+    Raises
+    ------
+    RunError
+        if there is no such disk
+
+    Examples
+    --------
+    >>> projectile(bed_run)
+    60
+    """
     if run.n_disks < 2:
         raise RunError(f"{run.path}: holds one disk; a crater needs a projectile and a bed")
     if "projectile" in run.names:
@@ -74,19 +159,75 @@ def projectile(run: Run) -> int:
 
 
 def bed(run: Run) -> np.ndarray:
-    """(N,) mask of the disks at rest at the start."""
+    """Return which disks belong to the bed.
+
+    Parameters
+    ----------
+    run : Run
+        a run with a projectile
+
+    Returns
+    -------
+    numpy.ndarray
+        (N,) mask of all disks but the projectile
+
+    Examples
+    --------
+    >>> int(bed(bed_run).sum())
+    60
+    """
     mask = np.ones(run.n_disks, dtype=bool)
     mask[projectile(run)] = False
     return mask
 
 
 def displaced(run: Run, frame: int = -1) -> np.ndarray:
-    """(N,) mask of the bed disks further than their radius from their first position."""
+    """Return which disks of the bed are farther than their radius from their first position.
+
+    Parameters
+    ----------
+    run : Run
+        a run with a projectile
+    frame : int
+        the frame [the last]
+
+    Returns
+    -------
+    numpy.ndarray
+        (N,) mask
+
+    Examples
+    --------
+    >>> displaced(bed_run).shape, int(displaced(bed_run, 0).sum())
+    ((61,), 0)
+    """
     return bed(run) & (run.displacement(frame) > run.radius)
 
 
 def crater(run: Run) -> Crater:
-    """The sizes of the crater in the last frame."""
+    """Measure the crater in the last frame.
+
+    Parameters
+    ----------
+    run : Run
+        a run in which a projectile meets a bed at rest
+
+    Returns
+    -------
+    Crater
+        its sizes by several definitions, and how the run ended
+
+    Raises
+    ------
+    Refused
+        if something else than a projectile moves the bed
+
+    Examples
+    --------
+    >>> size = crater(bed_run)
+    >>> size.hit > 5, size.energy_left <= 0.1
+    (True, True)
+    """
     law = "a crater is what a projectile does to a bed that lies still without it"
     allow(run, law, *QUIET)
     if run.event_count is None:
@@ -110,9 +251,22 @@ def crater(run: Run) -> Crater:
 
 
 def hole(run: Run) -> np.ndarray:
-    """(P, 2) outline of the hole, the largest place where half of the bed's packing is gone.
+    """Return the outline of the largest region in which half of the bed's packing is gone.
 
-    Empty where there is none.
+    Parameters
+    ----------
+    run : Run
+        a run with a projectile
+
+    Returns
+    -------
+    numpy.ndarray
+        (P, 2) closed line [length]; empty if there is no such region
+
+    Examples
+    --------
+    >>> hole(bed_run).shape[1]
+    2
     """
     x, y, before = packing_field(run, 0)
     *_, after = packing_field(run, -1)

@@ -1,18 +1,31 @@
 """Speeds of the disks of a gas in units of their thermal speed, and the law that they follow."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..predictions.theory import Law, finite_n_cdf
+from ..reading.arrays import Index, chosen
 from ..reading.nature import Refused
 from ..reading.reader import Run
 from .statistics import Estimate, estimate, excess_kurtosis, correlated_mean
 from .thermodynamics import conserved, drift, free_disks
 
+__all__ = [
+    "exact_law",
+    "independent_frames",
+    "kt_of_frames",
+    "means",
+    "reduced_speeds",
+    "relaxation",
+]
+
 MEMORY = 5.0  # collisions per disk after which a speed is independent
 
 
-def thermal_energy(run: Run, frames: slice | list[int]) -> np.ndarray:
+def thermal_energy(run: Run, frames: Index) -> np.ndarray:
     """(F, N) m v^2 / 2, v relative to the flow of a sheared box and to what never changes."""
+    frames = chosen(run.n_frames, frames)
     velocity = run.velocity[frames]
     if run.shear_rate:
         velocity[..., 0] -= run.shear_rate * run.position[frames][..., 1]
@@ -22,16 +35,57 @@ def thermal_energy(run: Run, frames: slice | list[int]) -> np.ndarray:
     return 0.5 * run.mass * np.sum(velocity**2, axis=-1)
 
 
-def kt_of_frames(run: Run, frames: slice | list[int]) -> np.ndarray:
-    """(F,) kT, of the momenta that are free."""
+def kt_of_frames(run: Run, frames: Index) -> np.ndarray:
+    """Return the kT of some frames, from the momenta that are free.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    frames : Index
+        the frames
+
+    Returns
+    -------
+    numpy.ndarray
+        (F,) kT; velocities are relative to the flow of a sheared box
+
+    Examples
+    --------
+    >>> bool(np.allclose(speeds.kt_of_frames(run, [0, -1]), thermodynamics.kt_at_start(run)))
+    True
+    """
     free = run.n_disks - 1 if run.shear_rate else free_disks(run)
     return thermal_energy(run, frames).sum(axis=1) / free
 
 
-def reduced_speeds(run: Run, frames: list[int], each: bool = False) -> np.ndarray:
-    """(F * N,) speeds of these frames, each species by its own thermal speed.
+def reduced_speeds(run: Run, frames: Index, each: bool = False) -> np.ndarray:
+    """Return speeds in units of the thermal speed sqrt(2 kT / m) of each species.
 
-    That is the one of all these frames, or of `each` for itself.  Refuses disks at rest.
+    Parameters
+    ----------
+    run : Run
+        a run
+    frames : Index
+        the frames
+    each : bool
+        whether each frame has a kT of its own, instead of one for all of these frames
+
+    Returns
+    -------
+    numpy.ndarray
+        (F * N,) reduced speeds
+
+    Raises
+    ------
+    Refused
+        if the disks of a species are at rest
+
+    Examples
+    --------
+    >>> u = speeds.reduced_speeds(run, [-2, -1])
+    >>> u.shape, round(float(np.mean(u**2)), 6)
+    ((128,), 1.0)
     """
     energy = thermal_energy(run, frames)
     for kind in run.by_species:
@@ -56,18 +110,55 @@ def all_move(run: Run, frame: int) -> bool:
     return all(energy[kind.disks].any() for kind in run.by_species)
 
 
-def independent_frames(run: Run, frames: list[int]) -> int:
-    """How many independent frames these count as."""
-    tau = run.collisions_per_disk_at(run.time)[frames]
-    return min(len(frames), 1 + int((tau[-1] - tau[0]) / MEMORY * (1 + 1e-9)))
+def independent_frames(run: Run, frames: Index) -> int:
+    """Return the number of frames that are independent, five collisions per disk apart.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    frames : Index
+        the frames, in order
+
+    Returns
+    -------
+    int
+        the number, at least 1
+
+    Examples
+    --------
+    >>> speeds.independent_frames(run, [0])
+    1
+    """
+    numbers = chosen(run.n_frames, frames)
+    tau = run.collisions_per_disk_at(run.time)[numbers]
+    return min(len(numbers), 1 + int((tau[-1] - tau[0]) / MEMORY * (1 + 1e-9)))
 
 
 def relaxation(
     run: Run, until: float = 16, frames: int | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Collisions per disk and a2 of each frame up to `until` collisions per disk, or the first.
+    """Return the second Sonine coefficient a2 of early frames against collisions.
 
-    Frames with disks at rest have none: they are left out, or refused among the first.
+    Parameters
+    ----------
+    run : Run
+        a run
+    until : float
+        collisions per disk up to which frames count
+    frames : int, optional
+        number of frames from the first one on, instead of `until`
+
+    Returns
+    -------
+    tau, a2 : numpy.ndarray
+        (F,) collisions per disk and coefficient; frames with disks at rest are left out
+
+    Examples
+    --------
+    >>> tau, a2 = speeds.relaxation(run, until=5)
+    >>> len(tau) == len(a2) > 1, float(tau[0])
+    (True, 0.0)
     """
     tau = run.collisions_per_disk_at(run.time)
     if frames is None:
@@ -78,7 +169,23 @@ def relaxation(
 
 
 def exact_law(run: Run) -> Law | None:
-    """The law of N disks that share a fixed kinetic energy, for runs that have one."""
+    """Return the exact distribution of speeds of a run whose kinetic energy is fixed.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+
+    Returns
+    -------
+    callable or None
+        distribution function of the reduced speed; None of a run that has none
+
+    Examples
+    --------
+    >>> float(speeds.exact_law(run)(0.0))
+    0.0
+    """
     axes = int(conserved(run).sum())
     free = not run.nature.keeps_kinetic_energy or run.n_disks < 2 + axes / 2
     if free or "round_container" in run.nature or axes == 1 or (axes == 2 and np.ptp(run.mass) > 0):
@@ -86,14 +193,37 @@ def exact_law(run: Run) -> Law | None:
     return finite_n_cdf(run.n_disks, axes == 2)
 
 
-def means(runs: list[Run], frames: list[list[int]], name: str) -> tuple[Estimate, Estimate]:
-    """Mean speed and mean kinetic energy of a species in some frames of each run.
+def means(runs: Sequence[Run], frames: Sequence[Index], name: str) -> tuple[Estimate, Estimate]:
+    """Estimate the mean speed and the mean kinetic energy of a species.
 
-    The error is over the runs, or over the frames of the only run, which remember each other.
+    Parameters
+    ----------
+    runs : list of Run
+        (R,) runs that differ by their seed
+    frames : list of Index
+        (R,) frames of each run
+    name : str
+        the species
+
+    Returns
+    -------
+    tuple of Estimate
+        speed and energy; the errors are over the runs, or over the frames of a single run
+
+    Examples
+    --------
+    >>> speed, energy = speeds.means(runs, [[-1]] * 3, "gas")
+    >>> bool(speed.mean > 0), bool(energy.error > 0)
+    (True, True)
     """
     mask = runs[0].of_species(name)
     members = [
-        np.array([(run.speed(k)[mask].mean(), run.kinetic_energy(k)[mask].mean()) for k in own])
+        np.array(
+            [
+                (run.speed(k)[mask].mean(), run.kinetic_energy(k)[mask].mean())
+                for k in chosen(run.n_frames, own)
+            ]
+        )
         for run, own in zip(runs, frames, strict=True)
     ]
     if len(members) > 1:

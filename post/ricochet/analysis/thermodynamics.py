@@ -18,6 +18,26 @@ from ..reading.reader import SIDES, Run, Species
 from ..running.simulation import Simulation
 from .statistics import FEWEST, FINE, SeriesMean, equilibration, correlated_mean
 
+__all__ = [
+    "collision_rate",
+    "frames_from",
+    "free_disks",
+    "kt_at_start",
+    "mean_energy",
+    "mean_free_time",
+    "packing",
+    "pair_rates",
+    "pressures",
+    "rates",
+    "start_of_equilibrium",
+    "start_of_steady_state",
+    "temperature",
+    "z_rate",
+    "z_virial",
+    "z_wall",
+    "z_ways",
+]
+
 TIMED = ("every_time", "at", "per_decade")  # samples at times, not after collisions
 SPEEDS_FORGET = 15.0  # collisions per disk after which no distribution of speeds remembers another
 ALONG_WALLS = {
@@ -76,12 +96,29 @@ def after_start(run: Run, skip: float | None = None) -> float:
 
 
 def start_of_steady_state(run: Run, skip: float | None = None) -> float:
-    """The time after `skip` collisions per disk, or else that from which nothing drifts.
+    """Return the time from which a run is steady.
 
-    Looked at are the collision rate and the energies of each species, where they can change, at the
-    observables or, if these are few, at the frames.  Speeds get `SPEEDS_FORGET`, as those
-    series say nothing of their distribution; a gas that cools gets no more.  A run too short for
-    all that counts from its middle.
+    Examined are the collision rate and the energies of each species, where they can change, at the
+    observables or, if these are few, at the frames.  Speed distributions get at least
+    `SPEEDS_FORGET` collisions per disk.  A run too short for that counts from its middle.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    skip : float, optional
+        collisions per disk that are left out at the start [until nothing drifts]
+
+    Returns
+    -------
+    float
+        time
+
+    Examples
+    --------
+    >>> start = thermodynamics.start_of_steady_state(run)
+    >>> bool(0 < start < run.time[-1])
+    True
     """
     if skip is not None or run.nature.cooling:
         return after_start(run, skip)
@@ -104,7 +141,31 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
 
 
 def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
-    """The same of a run that has an equilibrium; others are refused."""
+    """Return the time from which a run is in equilibrium.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    skip : float, optional
+        collisions per disk that are left out at the start [until nothing drifts]
+
+    Returns
+    -------
+    float
+        time
+
+    Raises
+    ------
+    Refused
+        if the run has no equilibrium
+
+    Examples
+    --------
+    >>> start = thermodynamics.start_of_equilibrium(run, skip=10)
+    >>> bool(run.collisions_per_disk_at(start) >= 9.9)
+    True
+    """
     allow(run, "it has no equilibrium", *SETTLED)
     return start_of_steady_state(run, skip)
 
@@ -112,7 +173,30 @@ def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
 def frames_from(
     run: Run, start: float, apart: float = 0.0, frames: list[int] | None = None
 ) -> list[int]:
-    """Of the frames [all] those from a time on, each `apart` collisions per disk from the last."""
+    """Choose frames from a time on that are some collisions apart.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    start : float
+        time of the first frame
+    apart : float
+        collisions per disk between frames
+    frames : list of int, optional
+        frames to choose from [all]
+
+    Returns
+    -------
+    list of int
+        numbers of the frames
+
+    Examples
+    --------
+    >>> some = thermodynamics.frames_from(run, 0.0, apart=10)
+    >>> 5 <= len(some) <= 7
+    True
+    """
     chosen, last = [], -np.inf
     tau = run.collisions_per_disk_at(run.time)
     for frame in range(run.n_frames) if frames is None else sorted(frames):
@@ -158,8 +242,24 @@ def conserved(run: Run) -> np.ndarray:
 
 
 def free_disks(run: Run) -> float:
-    """N, less a half for each axis along which the total momentum is conserved."""
-    return run.n_disks - conserved(run).sum() / 2
+    """Return N, less a half for each axis along which the total momentum is conserved.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+
+    Returns
+    -------
+    float
+        the number that divides the kinetic energy to give kT
+
+    Examples
+    --------
+    >>> thermodynamics.free_disks(run)
+    63.0
+    """
+    return float(run.n_disks - conserved(run).sum() / 2)
 
 
 def drift(run: Run) -> np.ndarray:
@@ -177,7 +277,23 @@ def kt_of(run: Run, energy: np.ndarray) -> np.ndarray:
 
 
 def kt_at_start(run: Run) -> float:
-    """The kT of the first frame."""
+    """Return the kT of the first frame.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+
+    Returns
+    -------
+    float
+        kT
+
+    Examples
+    --------
+    >>> thermodynamics.kt_at_start(run) > 0
+    True
+    """
     return float(kt_of(run, run.kinetic_energy(0).sum()))
 
 
@@ -196,10 +312,32 @@ def kt_in_time(run: Run) -> tuple[str, np.ndarray, np.ndarray]:
 
 
 def temperature(run: Run, skip: float | None = None) -> SeriesMean:
-    """The kT of equilibrium: exact where the kinetic energy is kept, else its mean over time.
+    """Estimate the kT of equilibrium.
 
-    Samples by collisions meet a hot gas more often, as its collisions are as frequent as sqrt(kT):
-    each counts 1 over that.  Not so where disks fall, and slow down between collisions.
+    Samples after a number of collisions occur more often while a gas is hot, because its collisions
+    are as frequent as sqrt(kT): each counts 1 over that.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    skip : float, optional
+        collisions per disk that are left out at the start [until nothing drifts]
+
+    Returns
+    -------
+    SeriesMean
+        kT; exact where the kinetic energy is conserved
+
+    Raises
+    ------
+    Refused
+        if the run has no equilibrium
+
+    Examples
+    --------
+    >>> thermodynamics.temperature(run).error
+    0.0
     """
     if run.nature.keeps_kinetic_energy:
         return SeriesMean(kt_at_start(run), 0.0, np.inf, 0.0)
@@ -217,7 +355,28 @@ def between(time: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
-    """What <K> of a disk of this mass is in equilibrium, without gravity."""
+    """Estimate the mean kinetic energy of a disk of some mass in equilibrium, without gravity.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    mass : float
+        mass of the disk
+    skip : float, optional
+        collisions per disk that are left out at the start [until nothing drifts]
+
+    Returns
+    -------
+    SeriesMean
+        <K>, which is below kT where the total momentum is conserved
+
+    Examples
+    --------
+    >>> mean = thermodynamics.mean_energy(run, 1.0).mean
+    >>> bool(np.isclose(mean, run.kinetic_energy(-1).mean()))
+    True
+    """
     bound = (run.n_disks - free_disks(run)) * mass / run.mass.sum()
     moving = 0.5 * mass * float(np.sum(drift(run) ** 2))
     return temperature(run, skip).scaled(1 - bound, moving)
@@ -227,7 +386,23 @@ def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
 
 
 def packing(run: Run) -> float:
-    """Area of the disks over area of the box."""
+    """Return the area of the disks over the area of the box.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+
+    Returns
+    -------
+    float
+        packing fraction
+
+    Examples
+    --------
+    >>> round(thermodynamics.packing(run), 6)
+    0.3
+    """
     return float(np.pi * np.sum(run.radius**2) / np.prod(run.edges))
 
 
@@ -248,7 +423,30 @@ def lightest_and_heaviest(run: Run) -> tuple[int, int]:
 
 
 def mean_free_time(run: Run, start: float = 0.0) -> float:
-    """1 / w, from some time on."""
+    """Return the mean time between the collisions of a disk with others.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    start : float
+        time from which collisions count
+
+    Returns
+    -------
+    float
+        1 / w [time]
+
+    Raises
+    ------
+    RunError
+        if no two disks collided after that time
+
+    Examples
+    --------
+    >>> bool(thermodynamics.mean_free_time(run) < run.time[-1] / 50)
+    True
+    """
     first, last = run.collisions_per_disk_at(np.array([start, run.time[-1]]))
     if not last > first:
         raise RunError(f"{run.path}: has no collisions of two disks yet")
@@ -300,18 +498,90 @@ def virial_over_kt(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.
 
 
 def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:
-    """Pair collisions per disk and time."""
+    """Estimate the number of pair collisions per disk and time.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    skip : float, optional
+        collisions per disk that are left out at the start [until nothing drifts]
+
+    Returns
+    -------
+    SeriesMean
+        w [1/time]
+
+    Raises
+    ------
+    Refused
+        if the run has no equilibrium
+
+    Examples
+    --------
+    >>> rate = thermodynamics.collision_rate(run)
+    >>> 0 < rate.error < rate.mean
+    True
+    """
     s = steps(run, skip)
     return correlated_mean(s.collisions, s.time).scaled(2 / run.n_disks)
 
 
 def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
-    """P / (n kT) by the virial of the pairs."""
+    """Estimate Z = P / (n kT) by the virial of the pair collisions.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    skip : float, optional
+        collisions per disk that are left out at the start [until nothing drifts]
+
+    Returns
+    -------
+    SeriesMean
+        Z
+
+    Raises
+    ------
+    Refused
+        if the run has no equilibrium
+
+    Examples
+    --------
+    >>> z = thermodynamics.z_virial(run)
+    >>> bool(abs(z.mean - hard_disks.henderson(0.3)) < 0.3)
+    True
+    """
     return correlated_mean(*virial_over_kt(run, skip)).scaled(1.0, 1.0)
 
 
 def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
-    """P / (n kT) by the collision rate; equal masses."""
+    """Estimate Z = P / (n kT) by the collision rate, for equal masses.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    skip : float, optional
+        collisions per disk that are left out at the start [until nothing drifts]
+
+    Returns
+    -------
+    SeriesMean
+        Z
+
+    Raises
+    ------
+    Refused
+        if the run has no equilibrium
+
+    Examples
+    --------
+    >>> z = thermodynamics.z_rate(run)
+    >>> bool(abs(z.mean - hard_disks.henderson(0.3)) < 0.3)
+    True
+    """
     s = steps(run, skip)
     turning = run.n_disks / 2 if run.nature & {"rough", "rotating"} else 0.0
     share = free_disks(run) + turning if run.nature.keeps_energy else MANY  # a fixed energy
@@ -320,7 +590,31 @@ def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
 
 
 def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
-    """P / (n kT) by the force on the sides, over the area open to the centres of equal disks."""
+    """Estimate Z = P / (n kT) by the force on the four sides, for equal disks between walls.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    skip : float, optional
+        collisions per disk that are left out at the start [until nothing drifts]
+
+    Returns
+    -------
+    SeriesMean
+        Z; the area is that open to the centres of the disks
+
+    Raises
+    ------
+    Refused
+        if the run has no equilibrium
+
+    Examples
+    --------
+    >>> z = thermodynamics.z_wall(walled_run)
+    >>> bool(1 < z.mean < 4)
+    True
+    """
     s = steps(run, skip)
     a = run.edges - 2 * run.radius[0]
     work = s.impulse[:, :2].mean(axis=1) * a[0] + s.impulse[:, 2:].mean(axis=1) * a[1]
@@ -328,7 +622,30 @@ def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
 
 
 def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
-    """P / (n kT) by virial, rate, walls, where they apply."""
+    """Estimate Z = P / (n kT) in each way that applies to a run.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    skip : float, optional
+        collisions per disk that are left out at the start [until nothing drifts]
+
+    Returns
+    -------
+    dict of str to SeriesMean
+        "virial"; "rate" but of mixtures; "walls" between four walls
+
+    Raises
+    ------
+    Refused
+        if the run has no equation of state
+
+    Examples
+    --------
+    >>> sorted(thermodynamics.z_ways(run))
+    ['rate', 'virial']
+    """
     allow(run, "it has no equation of state", *FLUID)
     walled = not run.periodic.any() and np.ptp(run.radius) == 0
     ways = {"virial": z_virial} | ({} if "mixture" in run.nature else {"rate": z_rate})
@@ -337,7 +654,30 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
 
 def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
-    """By the virial, and by the sides that are walls; a side feels force per length."""
+    """Estimate the pressure by the virial, and by the force on each side that is a wall.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    skip : float, optional
+        collisions per disk that are left out at the start [until nothing drifts]
+
+    Returns
+    -------
+    dict of str to SeriesMean
+        "pressure_virial", "pressure_left", ... [energy/length^2]
+
+    Raises
+    ------
+    Refused
+        if the run has no equilibrium
+
+    Examples
+    --------
+    >>> sorted(thermodynamics.pressures(run))
+    ['pressure_virial']
+    """
     s = steps(run, skip)
     inside = correlated_mean(run.n_disks * s.kt * s.time + s.virial / 2, s.time)
     found = {"pressure_virial": inside.scaled(1 / np.prod(run.edges))}
@@ -354,7 +694,30 @@ def has_log(run: Run) -> bool:
 
 
 def pair_rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
-    """w_ij from the event log: of a disk of species i with disks of species j, per time."""
+    """Estimate the collision rates between species from the event log.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    skip : float, optional
+        collisions per disk that are left out at the start [until nothing drifts]
+
+    Returns
+    -------
+    dict of str to SeriesMean
+        "w_A_B": collisions of a disk of A with disks of B, per time
+
+    Raises
+    ------
+    RunError
+        if the run has no event log
+
+    Examples
+    --------
+    >>> sorted(thermodynamics.pair_rates(run))
+    ['w_gas_gas']
+    """
     log, species = run.event_log(), run.species - 1
     cuts = np.linspace(start_of_equilibrium(run, skip), run.time[-1], FINE + 1)
     pairs = log.j > 0
@@ -370,7 +733,30 @@ def pair_rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
 
 def rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
-    """The kT, pressures and rates of collisions, by name."""
+    """Estimate temperature, pressures and collision rates.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    skip : float, optional
+        collisions per disk that are left out at the start [until nothing drifts]
+
+    Returns
+    -------
+    dict of str to SeriesMean
+        by name
+
+    Raises
+    ------
+    Refused
+        if the run has no equilibrium
+
+    Examples
+    --------
+    >>> sorted(thermodynamics.rates(run))
+    ['collisions_per_disk_and_time', 'kT', 'pressure_virial', 'w_gas_gas']
+    """
     found = {"kT": temperature(run, skip), **pressures(run, skip)}
     found["collisions_per_disk_and_time"] = collision_rate(run, skip)
     if not run.periodic.all():

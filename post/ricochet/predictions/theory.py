@@ -9,6 +9,17 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
+__all__ = [
+    "demon_share",
+    "finite_n_cdf",
+    "maxwell_cdf",
+    "maxwell_pdf",
+    "path_density",
+    "rough_ratio",
+    "rough_temperatures",
+    "scattering_angle",
+]
+
 #: A distribution function, or its density.
 Law = Callable[[np.ndarray], np.ndarray]
 
@@ -24,29 +35,95 @@ EQUIPARTITION = np.transpose(
 
 
 def maxwell_pdf(u: np.ndarray) -> np.ndarray:
-    """Density of the reduced speed in equilibrium, 2 u exp(-u^2)."""
+    """Return the density of the reduced speed u = v / sqrt(2 kT / m) in equilibrium.
+
+    Parameters
+    ----------
+    u : numpy.ndarray
+        (n,) reduced speeds
+
+    Returns
+    -------
+    numpy.ndarray
+        (n,) 2 u exp(-u^2)
+
+    Examples
+    --------
+    >>> float(theory.maxwell_pdf(np.array([0.0]))[0])
+    0.0
+    """
     return 2 * u * np.exp(-(u**2))
 
 
 def maxwell_cdf(u: np.ndarray) -> np.ndarray:
-    """Its distribution function, 1 - exp(-u^2)."""
+    """Return the distribution function of the reduced speed in equilibrium.
+
+    Parameters
+    ----------
+    u : numpy.ndarray
+        (n,) reduced speeds
+
+    Returns
+    -------
+    numpy.ndarray
+        (n,) 1 - exp(-u^2)
+
+    Examples
+    --------
+    >>> round(float(theory.maxwell_cdf(1.0)), 4)
+    0.6321
+    """
     return -np.expm1(-np.square(u))
 
 
 def finite_n_cdf(count: int, periodic: bool = False) -> Law:
-    """The exact law of u for `count` disks that share a fixed energy, kT = E/N.
+    """Return the exact distribution of the reduced speed of disks that share a fixed energy.
 
-    Between walls K/E follows the Beta(1, N-1) law whatever the masses; in a periodic box of
-    equal disks at rest as a whole, K N / (E (N-1)) follows Beta(1, N-2).
+    Between walls K/E follows the Beta(1, N-1) distribution whatever the masses; in a periodic box
+    of equal disks at rest as a whole, K N / (E (N-1)) follows Beta(1, N-2).
+
+    Parameters
+    ----------
+    count : int
+        number of disks
+    periodic : bool
+        whether the box is periodic, so that the total momentum is conserved
+
+    Returns
+    -------
+    callable
+        distribution function of u = v / sqrt(2 kT / m) with kT = E / N
+
+    Examples
+    --------
+    >>> cdf = theory.finite_n_cdf(2)
+    >>> float(cdf(0.0)), float(cdf(np.sqrt(2.0)))
+    (0.0, 1.0)
     """
     free, scale = (count - 2, count - 1) if periodic else (count - 1, count)
     return lambda u: 1 - np.clip(1 - np.square(u) / scale, 0, 1) ** free
 
 
 def path_density(x: np.ndarray) -> np.ndarray:
-    """Density of free paths in units of the mean one, <v> / w, if collisions have no memory.
+    """Return the density of free paths if collisions have no memory.
 
     nu(v) / w follows from the mean relative speed of a disk of speed v in a Maxwellian gas.
+
+    Parameters
+    ----------
+    x : numpy.ndarray
+        (n,) free paths, in units of the mean one, <v> / w
+
+    Returns
+    -------
+    numpy.ndarray
+        (n,) density
+
+    Examples
+    --------
+    >>> x = np.linspace(0, 20, 2001)
+    >>> bool(abs(np.trapezoid(theory.path_density(x), x) - 1) < 1e-3)
+    True
     """
     u = np.linspace(0, 5, 2001)[1:]  # v / sqrt(2 kT / m)
     half = u**2 / 2
@@ -61,9 +138,26 @@ def path_density(x: np.ndarray) -> np.ndarray:
 def scattering_angle(
     b: ArrayLike, mass_ratio: float = np.inf, restitution: float = 1.0
 ) -> np.ndarray:
-    """Deflection [rad] of a disk hitting one at rest, b = impact parameter / (r1 + r2).
+    """Return the deflection of a disk that collides with a smooth disk at rest.
 
-    `mass_ratio` is the mass at rest over the moving mass; infinite and elastic: 2 acos b.
+    Parameters
+    ----------
+    b : array_like
+        (...) impact parameter over r1 + r2
+    mass_ratio : float
+        mass of the disk at rest over that of the moving disk
+    restitution : float
+        normal restitution
+
+    Returns
+    -------
+    numpy.ndarray
+        (...) angle [rad]; 2 acos(b) for an infinite mass at rest and an elastic collision
+
+    Examples
+    --------
+    >>> float(theory.scattering_angle(0.0)) == np.pi, float(theory.scattering_angle(1.0))
+    (True, 0.0)
     """
     b = np.minimum(np.abs(b), 1.0)
     kappa = 0.5 * (1 + restitution) / (1 + 1 / mass_ratio)
@@ -89,7 +183,28 @@ def rough_rates(xi: float, beta: float, inertia: float) -> tuple[float, float, f
 
 
 def rough_ratio(xi: float, beta: float, inertia: float) -> float:
-    """R / T that the cooling approaches, for Maxwell's velocities."""
+    """Return the ratio R / T of the two temperatures that cooling rough disks approach.
+
+    Luding, Huthmann, McNamara and Zippelius, Phys. Rev. E 57, 3416 (1998), for Maxwell's
+    velocities.
+
+    Parameters
+    ----------
+    xi, beta : float
+        normal and tangential restitution
+    inertia : float
+        moment of inertia over m r^2
+
+    Returns
+    -------
+    float
+        R / T, with R = I <omega^2> and T = m <v^2> / 2
+
+    Examples
+    --------
+    >>> round(theory.rough_ratio(1.0, 1.0, 0.5), 6)
+    1.0
+    """
     a, b, c = rough_rates(xi, beta, inertia)
     return float(((a - 2 * c) + np.sqrt((a - 2 * c) ** 2 + 8 * b**2)) / (2 * b))
 
@@ -97,7 +212,32 @@ def rough_ratio(xi: float, beta: float, inertia: float) -> float:
 def rough_temperatures(
     tau: np.ndarray, start: tuple[float, float], xi: float, beta: float, inertia: float
 ) -> np.ndarray:
-    """(2, ...) T and R after tau collisions per disk."""
+    """Return the temperatures of cooling rough disks after some collisions.
+
+    The theory is that of `rough_ratio`.
+
+    Parameters
+    ----------
+    tau : array_like
+        (T,) collisions per disk
+    start : tuple of float
+        temperatures of translation and of rotation at the start
+    xi, beta : float
+        normal and tangential restitution
+    inertia : float
+        moment of inertia over m r^2
+
+    Returns
+    -------
+    numpy.ndarray
+        (2, T) both temperatures
+
+    Examples
+    --------
+    >>> t, rotational = theory.rough_temperatures([0.0, 50.0], (1.0, 0.0), 0.9, 0.5, 0.5)
+    >>> round(float(t[0]), 6), bool(t[1] < 1), bool(rotational[1] > 0)
+    (1.0, True, True)
+    """
     a, b, c = rough_rates(xi, beta, inertia)
     values, vectors = np.linalg.eig(np.array([[-2 * a, 2 * b], [4 * b, -4 * c]]))
     parts = np.linalg.solve(vectors, np.array(start))
@@ -119,14 +259,34 @@ def pushed_width(
 
 
 def demon_share(climb: float, layers: float, xi: float) -> float:
-    """Share of a dilute gas that lasts in the fuller of two chambers; 1/2 above the threshold.
+    """Return the share of a dilute gas in the fuller of two chambers over a vibrating floor.
 
     A sawtooth floor of velocity V gives n disks of a chamber the power n m g V.  In a column of
-    even temperature collisions take n^2 m g s sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w, s the diameter,
-    w the width, and so T/m = (2 V w / (n s sqrt(pi) (1 - xi^2)))^2.  The flux through a hole at the
-    height h is as n^2 exp(-m g h / T) (J. Eggers, Phys. Rev. Lett. 83, 5322 (1999)), the same both
-    ways in a steady state; even shares grow apart where m g h > T.  `climb` is g h / V^2, `layers`
-    N s / w for all N disks, xi < 1.
+    even temperature collisions dissipate n^2 m g s sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w, s the
+    diameter, w the width, and so T/m = (2 V w / (n s sqrt(pi) (1 - xi^2)))^2.  The flux through a
+    hole at the height h is as n^2 exp(-m g h / T) (J. Eggers, Phys. Rev. Lett. 83, 5322 (1999)),
+    the same in both directions in a steady state; equal shares are unstable where m g h > T.
+
+    Parameters
+    ----------
+    climb : float
+        g h / V^2
+    layers : float
+        N s / w for all N disks
+    xi : float
+        restitution, below 1
+
+    Returns
+    -------
+    float
+        share of the fuller chamber; 1/2 above the threshold
+
+    Examples
+    --------
+    >>> theory.demon_share(0.1, 0.5, 0.9)
+    0.5
+    >>> theory.demon_share(20.0, 2.0, 0.8) > 0.9
+    True
     """
     steep = climb * np.pi * (layers * (1 - xi**2) / 2) ** 2  # m g h / T of all disks in one chamber
 
