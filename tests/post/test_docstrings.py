@@ -3,6 +3,7 @@
 import doctest
 import sys
 from importlib import import_module
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -25,6 +26,12 @@ GAS = {
         "observables_every_time": 0.004,
     },
 }
+HOT = {
+    "box.boundary": ("wall", "periodic"),
+    "contact.wall_rule": "normal",
+    "stop.collisions_per_disk": 200,
+}
+ROUGH = {"contact.restitution": 0.9, "contact.tangential_restitution": 0.5}
 CRATER = """&species name = 'bed' count = 60 packing_fraction = 0.5 region = 0, 1, 0, 0.5 /
 &species name = 'projectile' relative_to = 'bed' mass = 25 radius = 2 position = 0.5, 0.8
   velocity = 0, -5 /
@@ -53,6 +60,10 @@ def names(request, tmp_path_factory):
         "runs": runs,
         "cooling_runs": cooling_runs,
         "bed_run": made("bed", CRATER),
+        "heated_runs": [made("hot", GAS, **HOT)],
+        "rough_runs": [made(f"rough_{k}", GAS, **{"run.seed": k}, **ROUGH) for k in (1, 2)],
+        "small": {"species": {"count": 20, "radius": 0.01}, "stop": {"collisions": 20}},
+        "has_mdanalysis": bool(find_spec("MDAnalysis")),
         "walled_run": made("walls", GAS, **{"box.boundary": ("wall", "wall")}),
         **{name: import_module(f"ricochet.{name}") for name in MODULES},
         "folder": folder,
@@ -66,7 +77,7 @@ def test_the_examples_of_a_module_work(module, names):
     loaded = import_module(module)
     finder, runner = doctest.DocTestFinder(), doctest.DocTestRunner(optionflags=FLAGS)
     told: list[str] = []
-    for test in finder.find(loaded, globs={**names, **vars(loaded)}):
+    for test in finder.find(loaded, globs={**vars(loaded), **names}):
         runner.run(test, out=told.append, clear_globs=False)
     assert not runner.failures, "".join(told)
     assert runner.tries or module == "ricochet"

@@ -15,6 +15,18 @@ from ..reading.reader import Run
 from .statistics import Estimate, estimate, propagate_error
 from .thermodynamics import free_disks, kt_at_start, lightest_and_heaviest, packing
 
+__all__ = [
+    "energies",
+    "energy_left",
+    "exponent",
+    "first_rate",
+    "haff",
+    "rough",
+    "rough_law",
+    "soft_law",
+    "steady_ratio",
+]
+
 Curves = dict[str, np.ndarray | Estimate]
 
 WINDOW = 2.0  # collisions per disk over which a cooling rate is taken
@@ -36,10 +48,32 @@ def on_grid(x: Sequence[Any], y: Sequence[Any], points: int) -> tuple[np.ndarray
 
 
 def energies(runs: list[Run], points: int = 201) -> Curves:
-    """Of runs that differ by their seed: kinetic energies per disk of all and of each species.
+    """Average the kinetic energies of runs that differ by their seed.
 
-    `K_...` over that of all at the start, against `collisions_per_disk`; `ratio` of the
-    temperatures, heaviest to lightest species; `energy_...` against `time`.
+    Parameters
+    ----------
+    runs : list of Run
+        (R,) runs that cool by themselves
+    points : int
+        number of points of each curve
+
+    Returns
+    -------
+    dict of str to numpy.ndarray or Estimate
+        (points,) each: "K_all" and "K_SPECIES" over the first energy of all, against
+        "collisions_per_disk"; "energy_..." against "time"; "ratio" of the temperatures of the
+        heaviest and the lightest species
+
+    Raises
+    ------
+    Refused
+        if a run is driven, or starts with disks at rest
+
+    Examples
+    --------
+    >>> found = cooling.energies(cooling_runs)
+    >>> found["K_all"].mean.shape, bool(found["K_all"].mean[-1] < 0.1)
+    ((201,), True)
     """
     names, alone = ("all", *runs[0].names), TRAITS.keys() - SOURCES - {"collapsed", "gravity"}
     for run in runs:
@@ -73,7 +107,28 @@ def moving_energy(run: Run, name: str = "all") -> np.ndarray:
 
 
 def first_rate(run: Run) -> float:
-    """w0: collisions per disk and time at the start, by the equation of state, or as counted."""
+    """Return the collision rate per disk at the start, by the equation of state or as counted.
+
+    Parameters
+    ----------
+    run : Run
+        a run of smooth disks that cool in a periodic box
+
+    Returns
+    -------
+    float
+        w0 [1/time]
+
+    Raises
+    ------
+    Refused
+        if Haff's law does not apply to the run
+
+    Examples
+    --------
+    >>> bool(cooling.first_rate(cooling_runs[0]) > 0)
+    True
+    """
     law = "Haff's law is for smooth disks that only cool, in a periodic box"
     allow(run, law, *SMOOTH)
     if "inelastic" not in run.nature:
@@ -96,14 +151,48 @@ def counted_rate(run: Run) -> float:
 
 
 def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """w0 t, collisions per disk, K / K0 at the observables."""
+    """Return the kinetic energy of a gas that cools, at the observables.
+
+    Parameters
+    ----------
+    run : Run
+        a run of smooth disks that cool in a periodic box
+
+    Returns
+    -------
+    w0_t, tau, k : numpy.ndarray
+        (T,) time in units of the first mean free time, collisions per disk, energy over that at
+        the start
+
+    Examples
+    --------
+    >>> w0_t, tau, k = cooling.energy_left(cooling_runs[0])
+    >>> float(k[0]), bool(k[-1] < 0.1)
+    (1.0, True)
+    """
     time, tau = run.collisions_per_disk
     energy = moving_energy(run)
     return time * first_rate(run), tau, energy / energy[0]
 
 
 def soft_law(runs: list[Run]) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """w0 t, collisions per disk, K / K0 by the law of soft disks; None if they are not."""
+    """Return the cooling law of disks whose restitution depends on the impact velocity.
+
+    Parameters
+    ----------
+    runs : list of Run
+        (R,) runs of one law of restitution
+
+    Returns
+    -------
+    tuple of numpy.ndarray or None
+        w0 t, collisions per disk and K / K0; None for a constant restitution
+
+    Examples
+    --------
+    >>> cooling.soft_law(cooling_runs) is None
+    True
+    """
     if "soft_contacts" not in runs[0].nature:
         return None
     thermal = np.mean([np.sqrt(kt_at_start(run) / run.mass[0]) for run in runs])
@@ -116,12 +205,36 @@ def haff(
     soft: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
     points: int = 200,
 ) -> tuple[Curves, Estimate, float, Estimate]:
-    """What runs with the same restitution say, each as w0 t, collisions per disk, K / K0.
+    """Compare runs of one restitution with Haff's law.
 
-    Curves: K / K0 against w0 t, in logarithmic steps, and against collisions per disk, each with
-    its law, and the local cooling rate.  Then the cooling rate, or with the law of soft disks the
-    `exponent`, and where the homogeneous state ends, in collisions per disk, alone and with its
-    error: NaN if it does not.
+    Parameters
+    ----------
+    tracks : list of tuple
+        (R,) `energy_left` of each run
+    xi : float
+        restitution
+    soft : tuple, optional
+        `soft_law` of the runs
+    points : int
+        number of points of each curve
+
+    Returns
+    -------
+    curves : dict of str to numpy.ndarray or Estimate
+        (points,) K / K0 by time and by collisions, each with its law, and the cooling rate
+    rate : Estimate
+        the cooling rate per collision; with `soft` the `exponent`
+    end : float
+        collisions per disk at which the homogeneous state ends; NaN if it does not
+    end_error : Estimate
+        the same with its error
+
+    Examples
+    --------
+    >>> tracks = [cooling.energy_left(one) for one in cooling_runs]
+    >>> _, rate, *_ = cooling.haff(tracks, 0.9)
+    >>> bool(abs(rate.mean / hard_disks.haff_rate(0.9) - 1) < 0.3)
+    True
     """
     time = np.geomspace(max(t[1] for t, *_ in tracks), min(t[-1] for t, *_ in tracks), points)
     tau, by_tau = on_grid([c for _, c, _ in tracks], [(k, np.log(k)) for *_, k in tracks], points)
@@ -161,7 +274,24 @@ def haff(
 
 
 def exponent(time: np.ndarray, energy: np.ndarray) -> float:
-    """P of K ~ t^-p in the last decade of logarithmic times: 2 by Haff, 5/3 if disks are soft."""
+    """Fit the exponent p of K ~ t^-p in the last decade of time.
+
+    Parameters
+    ----------
+    time, energy : numpy.ndarray
+        (T,) the curve, in logarithmic steps of time
+
+    Returns
+    -------
+    float
+        p: 2 by Haff's law, 5/3 for viscoelastic disks
+
+    Examples
+    --------
+    >>> time = np.geomspace(1, 100, 50)
+    >>> round(cooling.exponent(time, time**-2.0), 6)
+    2.0
+    """
     late = time >= time[-1] / 10
     return float(-np.polyfit(np.log(time[late]), np.log(energy[late]), 1)[0])
 
@@ -178,7 +308,28 @@ def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray
 
 
 def rough_law(run: Run) -> tuple[float, float, float]:
-    """xi, beta, q of a run that the laws of rough disks are for."""
+    """Return the parameters of a run to which the theory of rough disks applies.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+
+    Returns
+    -------
+    tuple of float
+        normal and tangential restitution, and moment of inertia over m r^2
+
+    Raises
+    ------
+    Refused
+        if the theory does not apply
+
+    Examples
+    --------
+    >>> cooling.rough_law(rough_runs[0])
+    (0.9, 0.5, 0.5)
+    """
     law = "the laws are for equal rough disks that cool in a periodic box, without contact.friction"
     allow(run, law, "inelastic", "rough", "rotating")
     if "rough" not in run.nature:
@@ -197,7 +348,26 @@ def temperatures(run: Run) -> tuple[np.ndarray, np.ndarray]:
 
 
 def rough(runs: list[Run], points: int = 200) -> Curves:
-    """T, T_rot and their ratio against collisions per disk, of runs that differ by their seed."""
+    """Average the temperatures of rough disks that cool, over runs that differ by their seed.
+
+    Parameters
+    ----------
+    runs : list of Run
+        (R,) runs of rough disks
+    points : int
+        number of points of each curve
+
+    Returns
+    -------
+    dict of str to numpy.ndarray or Estimate
+        (points,) "T", "T_rot" and "ratio" against "collisions_per_disk"
+
+    Examples
+    --------
+    >>> found = cooling.rough(rough_runs, points=11)
+    >>> found["T"].mean.shape
+    (11,)
+    """
     own = [run.collisions_per_disk.value for run in runs]
     tau, both = on_grid(own, [temperatures(run) for run in runs], points)
     t, rotational = np.moveaxis(both, 1, 0)
@@ -206,7 +376,26 @@ def rough(runs: list[Run], points: int = 200) -> Curves:
 
 
 def steady_ratio(runs: list[Run], law: tuple[float, float, float]) -> Estimate:
-    """T_rot / T where it is `SETTLED`, or in the second half of runs where it is not yet."""
+    """Estimate the ratio of rotational to translational temperature in the late cooling state.
+
+    Parameters
+    ----------
+    runs : list of Run
+        (R,) runs of rough disks that differ by their seed
+    law : tuple of float
+        `rough_law` of the runs
+
+    Returns
+    -------
+    Estimate
+        the ratio, from the time on at which theory has settled
+
+    Examples
+    --------
+    >>> ratio = cooling.steady_ratio(rough_runs, cooling.rough_law(rough_runs[0]))
+    >>> bool(0 < ratio.mean < 2)
+    True
+    """
     ratios = []
     for run in runs:
         tau, (t, rotational) = run.collisions_per_disk.value, temperatures(run)

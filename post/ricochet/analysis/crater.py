@@ -96,7 +96,7 @@ def ended_by_time(run: Run, size: Crater) -> bool:
 
     Examples
     --------
-    >>> ended_by_time(bed_run, crater(bed_run))
+    >>> ended_by_time(bed_run, crater.crater(bed_run))
     False
     """
     return size.energy_left > energy_fraction(run) * (1 + 1e-9)
@@ -224,7 +224,7 @@ def crater(run: Run) -> Crater:
 
     Examples
     --------
-    >>> size = crater(bed_run)
+    >>> size = crater.crater(bed_run)
     >>> size.hit > 5, size.energy_left <= 0.1
     (True, True)
     """

@@ -21,6 +21,15 @@ from .statistics import Estimate, statistical_inefficiency, student
 from .structure import periods
 from .thermodynamics import after_start, free_disks, refuse_others
 
+__all__ = [
+    "Fields",
+    "Fluxes",
+    "fields",
+    "has_theory",
+    "places",
+    "prediction",
+]
+
 MOST_BLOCKS = 16  # of a run
 FEWEST_BLOCKS = 3  # of all runs, for an error
 FEWEST_DISKS = 3  # that all blocks but one have seen in a cell, for what is relative to their flow
@@ -176,7 +185,25 @@ def reach(run: Run, cells: Cells, axis: int, radius: float) -> tuple[np.ndarray,
 
 
 def places(run: Run, cells: Cells) -> np.ndarray:
-    """(C, 2) middles of the parts of the cells that centres can reach."""
+    """Return the centres of cells.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    cells : tuple of int
+        numbers of cells along x and y
+
+    Returns
+    -------
+    numpy.ndarray
+        (C, 2) centres [length], along x first
+
+    Examples
+    --------
+    >>> fields.places(run, (2, 1)).shape
+    (2, 2)
+    """
     ranges = (np.mean(reach(run, cells, k, run.radius.min()), axis=0) for k in (0, 1))
     return np.stack([part.ravel() for part in np.meshgrid(*ranges)], axis=1)
 
@@ -282,7 +309,34 @@ class Fields(NamedTuple):
 
 
 def fields(runs: list[Run], skip: float | None, cells: Cells) -> Fields:
-    """Means and errors over blocks of time of all runs; NaN where fewer than two saw a disk."""
+    """Measure density, flow, temperature, stress and heat flux in cells, over the steady state.
+
+    Parameters
+    ----------
+    runs : list of Run
+        (R,) runs of one input, which differ by their seed
+    skip : float, optional
+        collisions per disk that are left out at the start [the first half of each run]
+    cells : tuple of int
+        numbers of cells along x and y
+
+    Returns
+    -------
+    Fields
+        means and errors over blocks of time of all runs; NaN in cells where fewer than two
+        blocks had a disk
+
+    Raises
+    ------
+    RunError
+        if a run has too few frames, or a side that leaves its position
+
+    Examples
+    --------
+    >>> density = fields.fields(runs, None, (2, 2)).found["density"]
+    >>> bool(abs(density.mean.mean() / 64 - 1) < 0.1)
+    True
+    """
     blocks, most = blocks_of(runs, skip, cells)
     run = runs[0]
     areas = [accessible(run, cells, kind.radius) for kind in run.by_species]
@@ -377,7 +431,25 @@ def expected(
 
 
 def has_theory(runs: list[Run], axis: int) -> bool:
-    """Whether there are two walls and between them a gas that Enskog's theory is for."""
+    """Tell whether Enskog's theory applies to the gas between two opposite walls.
+
+    Parameters
+    ----------
+    runs : list of Run
+        (R,) runs
+    axis : int
+        axis across the walls: 0 for x, 1 for y
+
+    Returns
+    -------
+    bool
+        whether there are two such walls, and smooth elastic disks of one species
+
+    Examples
+    --------
+    >>> fields.has_theory(runs, 0)
+    False
+    """
     return all(
         not run.periodic[axis] and run.periodic[1 - axis] and run.nature <= LAWFUL for run in runs
     )
@@ -386,9 +458,35 @@ def has_theory(runs: list[Run], axis: int) -> bool:
 def prediction(
     measured: Fields, axis: int, x: np.ndarray
 ) -> tuple[dict[str, Estimate] | None, Fluxes]:
-    """What `expected` says at x, by name, and the fluxes that say it; both with errors.
+    """Predict profiles between two walls from the measured fluxes, by Enskog's theory.
 
-    None if there is no such gas.  Raises RunError if there are no disks in the middle.
+    Parameters
+    ----------
+    measured : Fields
+        fields in cells along the axis
+    axis : int
+        axis across the walls: 0 for x, 1 for y
+    x : numpy.ndarray
+        (P,) positions along the axis [length]
+
+    Returns
+    -------
+    profiles : dict of str to Estimate or None
+        (P,) "flow", "temperature" and "density"; None if no gas has such fluxes
+    fluxes : Fluxes
+        pressure, shear stress and heat flux that were measured at the walls
+
+    Raises
+    ------
+    RunError
+        if there are no disks in the middle
+
+    Examples
+    --------
+    >>> across = fields.fields(heated_runs, None, (8, 1))
+    >>> profiles, fluxes = fields.prediction(across, 0, np.array([0.3, 0.5, 0.7]))
+    >>> profiles["temperature"].mean.shape, bool(fluxes.pressure.mean > 0)
+    ((3,), True)
     """
     run, size = measured.blocks[0].run, len(measured.disks)
     cells = slice(size // 2 - 1, size // 2 + 1 + size % 2)

@@ -31,6 +31,12 @@ from . import thermodynamics as td
 from .correlations import Correlator
 from .statistics import Curve, SeriesMean, estimate, correlated_mean
 
+__all__ = [
+    "Found",
+    "coefficients",
+    "enskog_of",
+]
+
 PER_FREE_TIME = 4  # samples of the moments that are enough
 SUMS = ("helfand_stress", "virial_tensor", "helfand_heat", "heat_virial")
 #: Mean free times that heat lives, longest of all in a gas of equal disks when dilute; and after
@@ -179,10 +185,26 @@ class Found(NamedTuple):
 
 
 def enskog_of(run: Run, reduced: bool = False) -> dict[str, float]:
-    """Those of a run that keeps its kinetic energy, in its units and at its temperature.
+    """Return the transport coefficients of Enskog's theory for the disks of a run.
 
-    `reduced`: in units of the mean mass, the mean diameter and kT.  Of a mixture only what
-    `enskog_mixture` has; disks alike to a hundredth are one species.
+    Disks that are equal to a hundredth count as one species.
+
+    Parameters
+    ----------
+    run : Run
+        a run that conserves its kinetic energy
+    reduced : bool
+        whether the units are the mean mass, the mean diameter and kT, instead of those of the run
+
+    Returns
+    -------
+    dict of str to float
+        by name, as of `hard_disks.enskog` or, for a mixture, of `hard_disks.enskog_mixture`
+
+    Examples
+    --------
+    >>> sorted(transport.enskog_of(run))
+    ['D', 'bulk_viscosity', 'conductivity', 'viscosity']
     """
     eta, kt = td.packing(run), 1.0 if reduced else td.kt_at_start(run)
     z, area = hard_disks.henderson(eta), float(np.prod(run.edges))
@@ -266,10 +288,33 @@ def of_displacements(runs: list[Run], starts: list[float]) -> Found:
 
 
 def coefficients(runs: list[Run], skip: float | None = None) -> dict[str, Found]:
-    """All coefficients at one packing fraction, from `skip` collisions per disk on.
+    """Measure the transport coefficients of runs at one packing fraction, over those of Enskog.
 
-    "D" only of equal disks, where runs have more frames than the first and the last.  Raises
-    RunError.
+    Parameters
+    ----------
+    runs : list of Run
+        (R,) runs of one system, with `output.helfand`
+    skip : float, optional
+        collisions per disk that are left out at the start [until nothing drifts]
+
+    Returns
+    -------
+    dict of str to Found
+        "viscosity", "bulk_viscosity"; of equal disks also "conductivity", and "D" if the runs
+        have frames
+
+    Raises
+    ------
+    RunError
+        if a run is too short, or has no Helfand moments
+    Refused
+        if a run is not in equilibrium, or has walls
+
+    Examples
+    --------
+    >>> found = transport.coefficients(runs)
+    >>> bool(0.2 < statistics.combine_runs(found["viscosity"].members).mean < 5)
+    True
     """
     for run in runs:
         allow(run, TAKES, "mixture")

@@ -11,11 +11,27 @@ if TYPE_CHECKING:
 
 
 def mdanalysis_universe(run: Run) -> "MDAnalysis.Universe":
-    """The run as an MDAnalysis Universe (needs the package MDAnalysis).
+    """Return the run as a Universe of the package MDAnalysis, which must be installed.
 
-    MDAnalysis has three dimensions only: z = 0 is added.  Lengths and times keep their
-    numbers; the time between frames is their mean.  Selections go by species, such as
+    MDAnalysis has three dimensions only: z = 0 is added.  Lengths and times keep their numbers; the
+    time between frames is their mean.  Selections go by species, such as
     `u.select_atoms("type projectile")`; the analysis classes work on `u.trajectory`.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+
+    Returns
+    -------
+    MDAnalysis.Universe
+        all frames, in memory
+
+    Examples
+    --------
+    >>> universe = ricochet.mdanalysis_universe(run) if has_mdanalysis else None
+    >>> universe is None or len(universe.trajectory) == run.n_frames
+    True
     """
     import MDAnalysis
 

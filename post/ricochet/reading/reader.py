@@ -553,7 +553,28 @@ class Run:
 
 
 def read_run(path: str | Path) -> Run:
-    """Open a run, finished or not.  Raises RunError with a one-line reason."""
+    """Open the output file of a run, finished or not.
+
+    Parameters
+    ----------
+    path : str or Path
+        the file; of a run that goes on its `.part`
+
+    Returns
+    -------
+    Run
+        the run, up to the last frame that is complete
+
+    Raises
+    ------
+    RunError
+        if the file cannot be used; the message is one line
+
+    Examples
+    --------
+    >>> ricochet.read_run(run.path).n_disks
+    64
+    """
     path = Path(path)
     with open_file(path) as file:
         if DISKS not in file or "h5md" not in file:

@@ -45,12 +45,40 @@ def sweep(
     folder: str | Path,
     executor: Executor | None = None,
 ) -> "pandas.DataFrame":
-    """Run every combination of values, the first varying slowest; a DataFrame as of `ensemble`.
+    """Run every combination of values of some variables.
 
-    `system` is that of `ricochet.run`; a variable has a list of values (None is its default), or
-    one.  Members that are finished are left out, others go on where they were stopped: repeat the
-    call after an interrupt.  They run on all cores of this machine, or where an `executor` of
-    `concurrent.futures` takes them, which sees the same folder.
+    Members that are finished are left out, others continue where they were stopped: repeat the call
+    after an interrupt.
+
+    Parameters
+    ----------
+    system : str, Path or mapping
+        the input, as of `ricochet.run`
+    values : mapping of str to object
+        a list of values for each variable, or one value; None is the default; the first variable
+        varies slowest
+    folder : str or Path
+        folder for the files of the members
+    executor : concurrent.futures.Executor, optional
+        runs the members, and sees the same folder [all cores of this machine]
+
+    Returns
+    -------
+    pandas.DataFrame
+        the table of the members, as of `ensemble`
+
+    Raises
+    ------
+    ProgramError
+        if a member would refuse its input; no member has run then
+    ValueError
+        if there are no values
+
+    Examples
+    --------
+    >>> table = ricochet.sweep(small, {"contact.restitution": [1, 0.9]}, folder / "xi")
+    >>> list(table["state"])
+    ['finished', 'finished']
     """
     import pandas  # noqa: F401 (who has none hears of it before members run)
 
@@ -270,11 +298,30 @@ def failed(folder: Path, name: str) -> bool:
 
 
 def ensemble(folder: str | Path) -> "pandas.DataFrame":
-    """A pandas DataFrame (needs that package) of the members of a folder, a row for each.
+    """Return a table of the member runs in a folder.
 
-    Columns: member; one for each override, named in full; seed; state: 'finished', 'unfinished' or
-    'failed'; reason, why it is not finished; wall_time in s; and the last value of each observable
-    that is one number.
+    Parameters
+    ----------
+    folder : str or Path
+        folder of `sweep` or of runs/ensemble.sh
+
+    Returns
+    -------
+    pandas.DataFrame
+        a row for each member: its name; each override, named in full; seed; state: 'finished',
+        'unfinished' or 'failed'; reason, why it is not finished; wall_time [s]; and the last
+        value of each observable that is one number
+
+    Raises
+    ------
+    RunError
+        if there is no such folder, or no member in it
+
+    Examples
+    --------
+    >>> table = ricochet.sweep(small, {"run.seed": [1, 2]}, folder / "sweep")
+    >>> ricochet.ensemble(folder / "sweep").equals(table)
+    True
     """
     import pandas
 

@@ -50,14 +50,41 @@ def run(
     threads: int | None = None,
     progress: bool = True,
 ) -> Run:
-    """Simulate `system` and open the result.
+    """Simulate a system and open the result.
 
-    It is an input file, its text, or its groups as in `{"species": {"count": 9, "radius": 0.1}}`,
-    with a list of dictionaries for a repeated group.  `overrides` are those of --set, as
-    `{"species.gas.mass": 2}`; None gives a variable its default back.  `force` and `resume` are the
-    options of these names, `threads` is run.threads.  Without `output` the file is a temporary one,
-    which is there until Python ends.  `progress` shows how far it is, on a terminal and in a
-    notebook at once, else in a line every 30 s.
+    Parameters
+    ----------
+    system : str, Path or mapping
+        an input file, its text, or its groups, as in `{"species": {"count": 9, "radius": 0.1}}`,
+        with a list of dictionaries for a repeated group
+    overrides : mapping of str to object, optional
+        values of variables, as `{"species.gas.mass": 2}`; None means the default of a variable
+    output : str or Path, optional
+        the output file [a temporary file, which is removed when Python ends]
+    force, resume : bool
+        the options of these names of the program
+    threads : int, optional
+        `run.threads`
+    progress : bool
+        whether progress is shown: continuously on a terminal and in a notebook, else in a line
+        every 30 s
+
+    Returns
+    -------
+    Run
+        the finished run
+
+    Raises
+    ------
+    ProgramError
+        if the program reports a problem, with its lines as `message`, its exit code as `code`,
+        and as `path` the file with the part of the run that was done
+
+    Examples
+    --------
+    >>> result = ricochet.run(small, {"run.seed": 3}, progress=False)
+    >>> result.n_disks, result.seed
+    (20, 3)
     """
     program = find_program()
     work = Path(tempfile.mkdtemp(prefix="ricochet-"))

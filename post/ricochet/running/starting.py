@@ -24,11 +24,42 @@ def write_start(
     angular_velocity: ArrayLike | None = None,
     orientation: ArrayLike | None = None,
 ) -> Path:
-    """Write N disks for `file = 'PATH'` of a species; what is not given the input says.
+    """Write a starting file of disks, for `file = 'PATH'` of a species.
 
-    `position` and `velocity` are (N, 2), the others (N,) or one value for all; `species` has names
-    or numbers, from 1, of the species of the input.  `write_start("bed.txt", **np.load("a.npz"))`
-    takes the arrays of these names in a file of NumPy.  Numbers keep all their digits.
+    Variables that are not given follow from the input.  `write_start("bed.txt",
+    **np.load("a.npz"))` writes the arrays of these names in a file of NumPy.  Numbers keep all
+    their digits.
+
+    Parameters
+    ----------
+    path : str or Path
+        the text file to write
+    position : array_like
+        (N, 2) [length]
+    velocity : array_like, optional
+        (N, 2) [length/time]
+    radius, mass : array_like, optional
+        (N,) or one value for all
+    species : array_like, optional
+        (N,) or one: names or numbers, from 1, of the species of the input
+    angular_velocity, orientation : array_like, optional
+        (N,) or one [1/time], [rad]
+
+    Returns
+    -------
+    Path
+        the file
+
+    Raises
+    ------
+    ValueError
+        if an array has another shape, or values that are not allowed
+
+    Examples
+    --------
+    >>> path = ricochet.write_start(folder / "start.txt", run.position[-1], run.velocity[-1])
+    >>> len(path.read_text().splitlines())
+    65
     """
     position = table("position", position, width=2)
     columns = {"x": position[:, 0], "y": position[:, 1]}
