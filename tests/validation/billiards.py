@@ -1,14 +1,18 @@
 """Section 12: billiards."""
 
+import atexit
+from functools import cache, partial
 from math import pi, radians
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from ricochet import Run
 
-from .case import Case, Member, relative, within
-from .estimators import angular_momentum
-from .inputs import EVERY_EVENT, disk, namelist
+from .case import Case, Member, relative, sigmas, within
+from .estimators import angular_momentum, over
+from .inputs import EVERY_EVENT, PERIODIC, disk, namelist
 
 CONTAINER = {
     "box": {"lower": (-1, -1), "upper": (1, 1)},
@@ -97,6 +101,55 @@ def mean_path(radius: float, hole: float) -> float:
     return pi * (a**2 - pi * reach**2) / (4 * a + 2 * pi * reach)
 
 
+#: A random Lorentz gas: scatterers that may overlap per R^2, R = 1 the sum of the radii; speed 1.
+DENSITY, SCATTERERS, TRACER = 0.01, 100_000, 0.1
+FREE_TIME = 1 / (2 * DENSITY)  # exact: overlaps hide the same share of the rims and of the area
+
+
+@cache
+def scatterers() -> str:
+    """The path of a file of random circles, which ends with this process."""
+    folder = TemporaryDirectory()
+    atexit.register(folder.cleanup)
+    path = Path(folder.name) / "scatterers.txt"
+    side = np.sqrt(SCATTERERS / DENSITY)
+    places = np.random.default_rng(7).uniform(0, side, (SCATTERERS, 2))
+    rows = np.column_stack([places, np.full(SCATTERERS, 1 - TRACER)])
+    np.savetxt(path, rows, fmt="%.12g", header="x y radius", comments="")
+    return str(path)
+
+
+def among_scatterers(seed: int) -> str:
+    """One tracer, with a frame every ten mean free times."""
+    side = float(np.sqrt(SCATTERERS / DENSITY))
+    return namelist(
+        run={"seed": seed}, box={"upper": (side, side), **PERIODIC},
+        obstacle={"name": "scatterers", "file": scatterers()},
+        species={"name": "tracer", "count": 1, "radius": TRACER, "speed": 1.0},
+        stop={"events": 2_000_000}, output={"frames_every_time": 10 * FREE_TIME},
+    )  # fmt: skip
+
+
+LORENTZ = tuple(Member(partial(among_scatterers, seed)) for seed in range(1, 5))
+
+
+def free_time(run: Run) -> float:
+    """Mean time between the hits of a tracer."""
+    return run.time[-1] / last(run, "obstacle_collisions")
+
+
+def over_boltzmann(run: Run) -> float:
+    """D, from the slope of <dx^2> between 10 and 30 mean free times, over 3/(16 n)."""
+    x = run.position[:][:-1, 0] + run.image[:][:-1, 0] * run.edges  # the last frame is at the end
+    near, far = (np.mean(np.sum((x[lag:] - x[:-lag]) ** 2, axis=1)) for lag in (1, 3))
+    return float((far - near) / (4 * 20 * FREE_TIME) / (3 / (16 * DENSITY)))
+
+
+def boltzmann_over(n: float) -> float:
+    """D_0 / D of scatterers that may overlap, by the expansion in their density."""
+    return 1 - 4 / 3 * n * np.log(n) - 0.8775 * n + 4.519 * (n * np.log(n)) ** 2
+
+
 STEP = radians(150.733419431936)
 CASES = [
     Case(
@@ -138,5 +191,14 @@ CASES = [
             last(run, "collisions") / run.time[-1], last(run, "side_collisions") / run.time[-1]
         ],
         [0.511039, 1.518241], relative(0.005), "D, R",
+    ),
+    Case(
+        "P12-05", "random Lorentz gas of 100 000 scatterers: mean free time",
+        LORENTZ, over(free_time), FREE_TIME, sigmas(4, 0.005), "D",
+    ),
+    Case(
+        "P12-06", "random Lorentz gas, n R^2 = .01: diffusion over Boltzmann's",
+        LORENTZ, over(over_boltzmann), 1 / boltzmann_over(DENSITY), within(0.015),
+        "Weijland and van Leeuwen 1968",
     ),
 ]  # fmt: skip
