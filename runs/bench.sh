@@ -222,14 +222,45 @@ instructions() {
     name=${radii}_4000_$packing
     polydisperse "$radii" 4000 "$packing"
   fi
+  counted run "$name" "$collisions" "$@"
+}
+
+# counted COMMAND...: instructions of the program that a command runs by `run_by`.
+counted() {
   run_by=(valgrind --tool=callgrind --callgrind-out-file=/dev/null)
   run_by+=(--toggle-collect=__{event_driven_MOD_advance,event_driven_MOD_start,epochs_MOD_move_epoch}'*')
-  run "$name" "$collisions" "$@" >/dev/null 2>"$work/count" || { cat "$work/count" >&2; return 1; }
+  "$@" >/dev/null 2>"$work/count" || { cat "$work/count" >&2; return 1; }
   awk '/Collected/ { print $4 }' "$work/count"
 }
 
+# obstacles NAME: writes $work/NAME.nml, one disk among 1225 scatterers, one per unit of area; on a board with so many pegs; or
+# the Lorentz gas.
+obstacles() {
+  local file=$work/$1.nml kind=${1%_*} number=${1#*_}
+  case $kind in
+    scatterers)
+      awk -v n="$number" 'BEGIN { print "x y radius"; for (k = 0; k < n*n; k++) print k%n + 0.5, int(k/n) + 0.5, 0.31 }' >"$work/$1.txt"
+      echo "&box upper = $number, $number boundary = 'periodic', 'periodic' / &obstacle file = '$work/$1.txt' /
+        &species radius = 0.05 position = 0.02, 0.01 velocity = 0.6, 0.8 /" >"$file"
+      ;;
+    board)
+      awk -v n="$number" 'BEGIN { print "x y radius"; for (k = 0; k < n; k++) {
+        row = 2*int(k/11) + (k%11 > 5); print (row%2 ? k%11 - 5 : k%11 + 0.5), 7 - 0.8*row, 0.1 } }' >"$work/$1.txt"
+      echo "&box upper = 6, 8 gravity = 0, -1 / &obstacle file = '$work/$1.txt' /
+        &species radius = 0.1 position = 3.03, 7.5 velocity = 0.1, 0 /" >"$file"
+      ;;
+    *) sed '/^&stop/,$d' "input/$1.nml" >"$file" ;;
+  esac
+  echo '&stop events = 1 /' >>"$file"
+}
+
+# events NAME NUMBER: so many events of one disk among obstacles.
+events() {
+  "${run_by[@]}" "$program" "$work/$1.nml" -o "$work/bench.h5" --force --quiet --set "stop.events=$2"
+}
+
 check() {
-  local radii packing limit options count verdict=0
+  local radii packing name limit options count verdict=0
   while read -r radii packing limit options; do
     # shellcheck disable=SC2086 # several options, or none
     count=$((($(instructions "$radii" "$packing" 100000 $options) - $(instructions "$radii" "$packing" 1 $options))/100000))
@@ -249,6 +280,17 @@ lognormal 0.3 6920
 lognormal 0.1 5200
 uniform 0.7 2780
 uniform 0.5 4110
+LIMITS
+  while read -r name limit; do
+    obstacles "$name"
+    count=$((($(counted events "$name" 10200) - $(counted events "$name" 200))/10000))
+    printf 'one disk, %s: %s instructions per event, at most %s\n' "${name/_/ }" "$count" "$limit"
+    [ "$count" -gt 0 ] && [ "$count" -le "$limit" ] || verdict=1
+  done <<'LIMITS'
+scatterers_35 4000
+lorentz 6200
+board_1 3300
+board_36 11800
 LIMITS
   return $verdict
 }

@@ -13,6 +13,7 @@ module memory
   ! Measured with 100 000 to a million disks. [bytes]
   integer(int64), parameter :: per_disk = 410, per_shared_disk = 540, besides = 25000000
   integer(int64), parameter :: per_list = 270    !! of the neighbours of a disk, where sizes differ
+  integer(int64), parameter :: per_obstacle = 560
 
 contains
 
@@ -21,10 +22,14 @@ contains
     type(settings_t), intent(in) :: settings
     type(problem_list_t), intent(inout) :: problems
     integer(int64) :: needed, free
+    character(len=:), allocatable :: what
 
-    needed = settings%n_disks()*(per_disk + merge(per_list, 0_int64, sizes_differ(settings))) + besides
+    needed = settings%n_disks()*(per_disk + merge(per_list, 0_int64, sizes_differ(settings))) + besides &
+      + settings%box%n_obstacles()*per_obstacle
     free = free_memory("")
-    if (needed > free) call problems%add(0, "species.count", written(settings%n_disks())//" disks need about " &
+    what = written(settings%n_disks())//" disks"
+    if (settings%box%has_obstacles()) what = what//" and "//written(settings%box%n_obstacles())//" obstacles"
+    if (needed > free) call problems%add(0, "species.count", what//" need about " &
       //size_text(needed)//" of memory, and "//size_text(free)//" are free; use fewer disks")
   end subroutine check_memory
 
