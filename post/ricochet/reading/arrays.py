@@ -12,7 +12,7 @@ Number = TypeVar("Number", float, np.ndarray)
 
 
 def as_index(index: Index) -> int | slice | np.ndarray:
-    """An index as NumPy understands it along one axis, also where it is a tuple or a range."""
+    """Return an index as NumPy understands it along one axis, also of a tuple or a range."""
     if isinstance(index, int | np.integer | slice):
         return index if isinstance(index, slice) else int(index)
     array = np.asarray(index)
@@ -20,6 +20,6 @@ def as_index(index: Index) -> int | slice | np.ndarray:
 
 
 def chosen(count: int, index: Index) -> list[int]:
-    """The numbers, from 0, that an index chooses of `count` things."""
+    """Return the numbers, from 0, that an index chooses among `count` things."""
     found: list[int] = np.atleast_1d(np.arange(count)[as_index(index)]).tolist()
     return found

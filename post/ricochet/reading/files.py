@@ -11,16 +11,16 @@ import numpy as np
 
 
 class RunError(Exception):
-    """A file that cannot be used; the message is one line that says what and where."""
+    """Error for a file that cannot be used; the message names the file and the reason."""
 
 
 class Unsound(Exception):
-    """What is wrong inside a file; `open_file` adds which one."""
+    """Error for a fault inside a file; `open_file` adds the path."""
 
 
 @contextmanager
 def open_file(path: Path) -> Iterator[h5py.File]:
-    """The HDF5 file for reading; any fault found in it becomes a RunError."""
+    """Open an HDF5 file for reading; any fault that is found in it becomes a RunError."""
     with hdf5_file(path) as file:
         try:
             yield file
@@ -33,7 +33,7 @@ def open_file(path: Path) -> Iterator[h5py.File]:
 
 
 def hdf5_file(path: Path) -> h5py.File:
-    """The open file, also while a simulation writes it."""
+    """Open an HDF5 file, also while a simulation writes it."""
     if not path.exists():
         part = Path(f"{path}.part")
         hint = f", but there is {part} of an unfinished run" if part.exists() else None
@@ -53,12 +53,12 @@ def hdf5_file(path: Path) -> h5py.File:
 
 
 def did_you_mean(word: str, others: Iterable[str]) -> str:
-    """A suggestion, if one of the others is like the word."""
+    """Return a suggestion if one of the other words is similar, else an empty text."""
     return "".join(f"; did you mean {near}?" for near in get_close_matches(word, others, 1))
 
 
 def tree(group: h5py.Group) -> dict[str, Any]:
-    """A group as a dictionary of plain values; attributes and datasets alike."""
+    """Return an HDF5 group as a dictionary of plain values, from attributes and datasets alike."""
     values = {name: plain(value) for name, value in group.attrs.items()}
     for name, item in group.items():
         values[name] = tree(item) if isinstance(item, h5py.Group) else plain(item[()])
@@ -66,7 +66,7 @@ def tree(group: h5py.Group) -> dict[str, Any]:
 
 
 def plain(value: object) -> object:
-    """Text instead of bytes, Python numbers instead of NumPy's."""
+    """Convert bytes to text and numbers of NumPy to numbers of Python."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace").rstrip()
     if isinstance(value, np.ndarray) and value.dtype.kind == "S":
@@ -75,7 +75,10 @@ def plain(value: object) -> object:
 
 
 def destination(path: Path) -> Path:
-    """A place for a result: its folder is made, and only an ordinary file may be there before."""
+    """Prepare the path of a result: make its folder, and return the path.
+
+    Only an ordinary file that holds no HDF5 data may be replaced.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.is_symlink() or (path.exists() and not path.is_file()):
         raise RunError(f"{path}: is not an ordinary file; choose another name, or remove it")

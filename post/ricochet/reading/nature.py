@@ -66,40 +66,40 @@ SETTLED = TRAITS.keys() - UNSETTLED
 
 
 class Refused(RunError):
-    """A run that a law does not hold for; the message names the cause."""
+    """Error for a run to which a theory does not apply; the message names the reason."""
 
 
 class Nature(frozenset[str]):
-    """The traits of a run."""
+    """The traits of a run: a set of the words in `TRAITS`."""
 
     @property
     def closed(self) -> bool:
-        """Whether no energy comes or goes but what collisions lose."""
+        """Whether the energy changes by dissipation in collisions only."""
         return not self & SOURCES
 
     @property
     def driven(self) -> bool:
-        """Whether something gives the disks energy, or takes it, besides their collisions."""
+        """Whether something other than collisions changes the energy of the disks."""
         return not self.closed
 
     @property
     def cooling(self) -> bool:
-        """Whether disks only lose energy: nothing lasts."""
+        """Whether the disks only lose energy, so that there is no steady state."""
         return self.closed and "inelastic" in self
 
     @property
     def keeps_energy(self) -> bool:
-        """Whether the total energy is that of the start at any time."""
+        """Whether the total energy is conserved."""
         return self.closed and "inelastic" not in self
 
     @property
     def keeps_kinetic_energy(self) -> bool:
-        """Whether the energy of translation is that of the start at any time, and so is kT."""
+        """Whether the translational kinetic energy, and so kT, is conserved on average."""
         return self.keeps_energy and not self & {"gravity", "rough", "rotating"}
 
     @property
     def in_equilibrium(self) -> bool:
-        """Whether velocities settle to Maxwell's law, of one temperature everywhere."""
+        """Whether velocities relax to Maxwell's distribution of a uniform temperature."""
         return not self & UNSETTLED
 
 
@@ -111,10 +111,10 @@ def nature_of(
     turning: bool,
     collapsed: bool,
 ) -> Nature:
-    """The nature of a run, from the parameters that it uses and what its disks are and do.
+    """Return the nature of a run from its parameters and from the balance of its energy.
 
-    `lost` is the share of its largest energy that was lost in collisions so far: a simulation can
-    be asked at any time.
+    `lost` is the dissipated energy over the largest kinetic energy so far.  `rotating` means that
+    disks rotate, `collapsed` that an inelastic collapse occurred.
     """
     contact, drive = parameters.get("contact", {}), parameters.get("drive", {})
     box, kind = parameters.get("box", {}), drive.get("kind", "none")
@@ -171,7 +171,7 @@ def nature_of(
 
 
 def held_round(parameters: Mapping[str, Any]) -> bool:
-    """Whether nothing but one round container, which does not reach the sides, holds the disks."""
+    """Whether a single round container, which does not reach the sides, encloses the disks."""
     box, rows = parameters.get("box", {}), rows_of(parameters.get("obstacle", {}))
     if len(rows) != 1 or not rows[0].get("inside") or "wall" in parameters:
         return False
@@ -181,18 +181,18 @@ def held_round(parameters: Mapping[str, Any]) -> bool:
 
 
 def rows_of(group: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The obstacles, or the straight walls, one by one: the file has a column for each variable."""
+    """Return one dictionary for each obstacle or wall; the file has a column for each variable."""
     columns = {name: column for name, column in group.items() if np.ndim(column) > 0}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def known(value: Any) -> bool:
-    """Whether a variable was given: a wall among others that has none is NaN, or 0, there."""
+    """Whether a variable of an obstacle or wall was given; otherwise it is NaN or 0 in the file."""
     return value is not None and bool(np.isfinite(value)) and float(value) > 0
 
 
 def allow(run: Any, law: str, *traits: str) -> None:
-    """Refuse a run that has any trait but these; `law` says in words what is not for it."""
+    """Refuse a run that has any trait but these; `law` completes the message."""
     for trait, reason in TRAITS.items():
         if trait in run.nature and trait not in traits:
             raise Refused(f"{getattr(run, 'path', 'the simulation')}: {reason}; {law}")

@@ -40,11 +40,11 @@ WHOLE = (type(None), type(...), bool, np.bool_)  # as first index they do not ch
 
 
 class NoSuchFrame(RunError, IndexError):
-    """An index that the frames of a run do not have."""
+    """Error for an index beyond the frames of a run."""
 
 
 class Series(NamedTuple):
-    """An observable: `value` (T, ...) at `time` (T,), on its own clock."""
+    """An observable: values (T, ...) at times (T,), which are not those of the frames."""
 
     time: np.ndarray
     value: np.ndarray
@@ -53,8 +53,9 @@ class Series(NamedTuple):
 class EventLog(NamedTuple):
     """The event log: collisions of any kind in chronological order, (E,) each.
 
-    `j` is the id of the other disk, or 0, -1, -2, -3 for the left, right, bottom and top side, then
-    -4, -5, ... for the obstacles followed by the straight walls.
+    `j` is the id of the other disk; or 0, -1, -2, -3 for the left, right, bottom and top side; or
+    -4, -5, ... for the obstacles followed by the straight walls.  `momentum_change` is that of disk
+    i.
     """
 
     time: np.ndarray
@@ -65,7 +66,7 @@ class EventLog(NamedTuple):
 
 
 class Obstacle(NamedTuple):
-    """A circular wall, which keeps disks out, or in (`inside`)."""
+    """A circular obstacle; disks stay outside it, or inside it if `inside` is true."""
 
     centre: np.ndarray
     radius: float
@@ -73,7 +74,7 @@ class Obstacle(NamedTuple):
 
 
 class Species(NamedTuple):
-    """The disks of one species; those of a starting file may have masses and radii of their own."""
+    """The disks of one species; those of a starting file may differ in mass and radius."""
 
     name: str
     masses: np.ndarray  # (n,)
@@ -82,17 +83,17 @@ class Species(NamedTuple):
 
     @property
     def alike(self) -> bool:
-        """Whether all have one mass and one radius."""
+        """Whether all disks have the same mass and the same radius."""
         return bool(np.ptp(self.masses) == 0 and np.ptp(self.radii) == 0)
 
     @property
     def mass(self) -> float:
-        """The mass of each, or their mean."""
+        """Mass of a disk, or the mean mass."""
         return float(self.masses[0] if self.alike else self.masses.mean())
 
     @property
     def radius(self) -> float:
-        """The radius of each, or their mean."""
+        """Radius of a disk, or the mean radius."""
         return float(self.radii[0] if self.alike else self.radii.mean())
 
     @property
@@ -103,7 +104,7 @@ class Species(NamedTuple):
 
 @dataclass(frozen=True)
 class Frames:
-    """A per-disk quantity in time, read frame by frame when indexed; [:] reads all."""
+    """A quantity of each disk in time, read from the file when it is indexed; [:] reads all."""
 
     path: Path
     name: str
@@ -113,7 +114,7 @@ class Frames:
         return self.shape[0]
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        """All frames, for functions of NumPy."""
+        """Return all frames, for functions of NumPy."""
         if copy is False:
             raise ValueError(f"{self.path}: {self.name} is read from the file, that is copied")
         return self[:] if dtype is None else self[:].astype(dtype)
@@ -125,11 +126,11 @@ class Frames:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Of the numbers as they are read."""
+        """The type of the numbers that indexing returns."""
         return self.read(np.arange(0)).dtype
 
     def __getitem__(self, index: Any) -> np.ndarray:
-        """As NumPy has it: the first axis chooses in the file, the others in what was read."""
+        """Index as in NumPy; only the chosen frames are read from the file."""
         first, *rest = index if isinstance(index, tuple) and index else (index,)
         try:
             if type(first) in WHOLE or np.ndim(first) > 1:
@@ -144,7 +145,7 @@ class Frames:
             raise NoSuchFrame(f"{self.path}: {self.name} ({shape}): {problem}") from None
 
     def read(self, chosen: np.ndarray) -> np.ndarray:
-        """These frames, in this order."""
+        """Read these frames, in this order."""
         steps = np.unique(np.diff(chosen))
         with open_file(self.path) as file:
             if self.name not in file[DISKS]:
@@ -160,7 +161,10 @@ class Frames:
 
 
 class Restitution(NamedTuple):
-    """That of a contact; from a speed of approach on as given, below by a law of soft bodies."""
+    """Normal restitution of a contact.
+
+    It is `xi` for impact velocities above `speed`; below, it follows the law of soft bodies.
+    """
 
     xi: float
     law: str = "constant"
@@ -172,11 +176,14 @@ class Restitution(NamedTuple):
 
     @property
     def name(self) -> float | str:
-        """What tells it from others in a table."""
+        """The number, or a text with the law: it distinguishes contacts in a table."""
         return self.xi if self.law == "constant" else f"{self:g}"
 
     def at(self, g: np.ndarray) -> np.ndarray:
-        """Ramirez et al., Phys. Rev. E 60, 4465 (1999): 1 - y + c y^2 with y ~ g^(1/5)."""
+        """Return the restitution at normal impact velocities g, an array of any shape.
+
+        Ramirez et al., Phys. Rev. E 60, 4465 (1999): 1 - y + c y^2 with y ~ g^(1/5).
+        """
         c = {"power": 0.0, "viscoelastic": 0.6}[self.law]
         y = 2 * (1 - self.xi) / (1 + np.sqrt(1 - 4 * c * (1 - self.xi)))
         y = y * np.minimum(g / self.speed, 1.0) ** 0.2
@@ -185,7 +192,10 @@ class Restitution(NamedTuple):
 
 @dataclass(frozen=True)
 class Run:
-    """One run: constants as arrays, frames on demand, observables by name."""
+    """One run: constants as arrays, frames on demand, observables by name.
+
+    `read_run` opens it.  T frames, N disks; units are those of the input.
+    """
 
     path: Path
     time: np.ndarray  # (T,)
@@ -207,7 +217,7 @@ class Run:
     provenance: dict[str, Any]
 
     def __repr__(self) -> str:
-        """One line, however many disks there are."""
+        """Return one line, however many disks there are."""
         kinds = ", ".join(f"{np.sum(kind.disks)} {kind.name}" for kind in self.by_species)
         frames = f"{self.n_frames} frame{'s' * (self.n_frames > 1)}, t = {span(self.time)}"
         return f"<Run {self.path}: {kinds}; {frames}>"
@@ -229,13 +239,13 @@ class Run:
 
     @property
     def sides(self) -> list[dict[str, Any]]:
-        """What the input says of each side, in the order of `SIDES`; empty if nothing."""
+        """The variables of each side in the input, in the order of `SIDES`."""
         return [self.parameters.get("side", {}).get(name, {}) for name in SIDES]
 
     def corners_at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(..., 2) lower left and upper right corner of the box at a time; its sides may move.
+        """Return the lower left and the upper right corner of the box at some times, (..., 2) each.
 
-        One that disks push is between its places at the observables.
+        Sides may move.  The position of a piston is interpolated between the observables.
         """
         inwards = np.stack([displaced(side, np.asarray(time)) for side in self.sides], axis=-1)
         inwards = inwards + self.offsets
@@ -254,13 +264,13 @@ class Run:
 
     @cached_property
     def piston_positions(self) -> dict[int, Series]:
-        """Places of the sides that disks push, by their numbers in `sides`."""
+        """Positions of the pistons in time, by their numbers in `sides`."""
         free = [k for k, side in enumerate(self.sides) if side.get("motion") == "piston"]
         return {k: self.observable(f"sides/{SIDES[k]}/position") for k in free}
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """(2,) corners of what sides that move never leave: the box, and how far they go beyond."""
+        """(2,) corners of the smallest rectangle that contains the box at all times."""
         swings = np.array([outmost(side) for side in self.sides])
         swings = np.maximum(0.0, swings - self.offsets)
         for k, place in self.piston_positions.items():
@@ -270,7 +280,7 @@ class Run:
 
     @cached_property
     def by_species(self) -> tuple[Species, ...]:
-        """The species in the order of the input file."""
+        """The species, in the order of the input file."""
         masks = [self.of_species(name) for name in self.names]
         return tuple(
             Species(name, self.mass[mask], self.radius[mask], mask)
@@ -278,21 +288,21 @@ class Run:
         )
 
     def of_species(self, name: str) -> np.ndarray:
-        """(N,) mask of the disks of one species."""
+        """Return an (N,) mask of the disks of a species."""
         if name not in self.names:
             raise RunError(f"{self.path}: no species '{name}', there are {', '.join(self.names)}")
         return self.species == self.names.index(name) + 1
 
     def speed(self, frame: Index) -> np.ndarray:
-        """(..., N) length of the velocity."""
+        """Return the speeds (..., N) in some frames [length/time]."""
         return np.linalg.norm(self.velocity[as_index(frame)], axis=-1)
 
     def kinetic_energy(self, frame: Index) -> np.ndarray:
-        """(..., N) m v^2 / 2."""
+        """Return the translational kinetic energies (..., N) in some frames."""
         return 0.5 * self.mass * np.sum(self.velocity[as_index(frame)] ** 2, axis=-1)
 
     def unwrapped(self, frame: Index) -> np.ndarray:
-        """(..., N, 2) position with whole periods added: continuous in time.
+        """Return positions (..., N, 2) that are continuous in time: whole periods are added.
 
         In a sheared box (Lees and Edwards) the image above is displaced by gamma L_y t along x.
         """
@@ -307,23 +317,23 @@ class Run:
         return place
 
     def displacement(self, frame: Index, origin: int = 0) -> np.ndarray:
-        """(..., N) straight-line distance from the place in the frame `origin`."""
+        """Return distances (..., N) from the positions in the frame `origin` [length]."""
         return np.linalg.norm(self.unwrapped(frame) - self.unwrapped(origin), axis=-1)
 
     def per_disk(self, name: str) -> Frames:
-        """(T, N) what only some runs have of each disk, such as 'angular_velocity'."""
+        """Return a quantity (T, N) that only some runs have, such as 'angular_velocity'."""
         if name not in self.disk_data:
             raise RunError(f"{self.path}: has no {name} in its frames")
         return self.disk_data[name]
 
     @property
     def angular_velocity(self) -> Frames:
-        """(T, N) of disks that can turn."""
+        """(T, N) angular velocities [1/time]; RunError if the disks cannot rotate."""
         return self.per_disk("angular_velocity")
 
     @property
     def orientation(self) -> Frames:
-        """(T, N) angle to the x axis in radians, not wrapped; of disks that have a direction."""
+        """(T, N) angles to the x axis [rad], not wrapped; RunError without a direction."""
         return self.per_disk("orientation")
 
     @property
@@ -332,27 +342,28 @@ class Run:
         return float(self.parameter("contact", "inertia", 0.5)) * self.mass * self.radius**2
 
     def observable(self, name: str) -> Series:
-        """The observable `name`, such as 'total_energy' or 'sides/left/impulse'."""
+        """Return an observable by its name, such as 'total_energy' or 'sides/left/impulse'."""
         with open_file(self.path) as file:
             return series_of(file, name, self._samples)
 
     @cached_property
     def _samples(self) -> int:
-        """How many each observable has: as many as the first that is read, while a run goes on."""
+        """Number of samples of each observable; it stays the same while a run goes on."""
         with open_file(self.path) as file:
             return committed(file, "observables")
 
     @cached_property
     def observables(self) -> tuple[str, ...]:
-        """The names that `observable` knows."""
+        """The names of the observables."""
         with open_file(self.path) as file:
             return tuple(series_in(file["observables"]))
 
     def to_dataframe(self) -> "pandas.DataFrame":
-        """The observables as a pandas DataFrame (needs that package), a row per sample.
+        """Return the observables as a DataFrame of pandas, with a row for each sample.
 
-        The index is the time, the columns are called like the observables: `all/kinetic_energy`; of
-        those with several numbers `momentum_x`, `wall_collisions_left`, `virial_tensor_xy`, ...
+        The index is the time.  Columns are named as the observables, such as `all/kinetic_energy`;
+        vectors and tensors have a column for each component, such as `momentum_x` or
+        `virial_tensor_xy`.
         """
         import pandas
 
@@ -368,9 +379,10 @@ class Run:
         return pandas.DataFrame(columns, index=pandas.Index(time, name="time"))
 
     def to_xarray(self) -> "xarray.Dataset":
-        """The frames as an xarray Dataset (needs that package): time, disk, component ("x", "y").
+        """Return the frames as a Dataset of xarray, which must be installed.
 
-        What disks have in each frame, and mass, radius, species; path and seed are in its `attrs`.
+        Its dimensions are time, disk and component ("x", "y").  It contains all quantities of the
+        frames, mass, radius and species; path and seed are in its `attrs`.
         """
         try:
             import xarray
@@ -391,7 +403,7 @@ class Run:
         return xarray.Dataset(data, axes, {"path": str(self.path), "seed": self.seed})
 
     def event_log(self) -> EventLog:
-        """The event log; the input file must have `output.event_log = .true.`."""
+        """Return the event log; RunError unless the input has `output.event_log = .true.`."""
         return self._event_log
 
     @cached_property
@@ -410,14 +422,14 @@ class Run:
 
     @cached_property
     def collisions_per_disk(self) -> Series:
-        """2 C / N, C the pair collisions since the start, at the times of the observables."""
+        """2 C / N at the observables, C the number of pair collisions since the start."""
         time, collisions = self.observable("collisions")
         return Series(time, 2 * collisions / self.n_disks)
 
     def collisions_per_disk_at(self, time: np.ndarray) -> np.ndarray:
-        """The same at other times, by linear interpolation.
+        """Return the number of pair collisions per disk at other times, by interpolation.
 
-        Between few observables it goes with the collisions of any kind, which frames know better.
+        Where frames are more frequent than observables, it is interpolated in the number of events.
         """
         known, tau = self.collisions_per_disk
         if self.event_count is None or len(known) >= self.n_frames:
@@ -437,10 +449,11 @@ class Run:
         return np.array([self.event_count[k].mean() for k in range(self.n_frames)])
 
     def accessible_area(self, time: float | np.ndarray) -> np.ndarray:
-        """(...) area that disks can reach, of the box less its obstacles, or of a round container.
+        """Return the area (...) that disks can reach at some times: the box less its obstacles.
 
-        The box is that of the moment where a side moves at constant velocity or is a piston.  A
-        side that oscillates counts at its mean position, as in the program's own pressure.
+        A round container replaces the box.  The box is that of the moment where a side moves at
+        constant velocity or is a piston; a side that oscillates counts at its mean position, as in
+        the pressure that the program writes.
         """
         drifts = np.array([side.get("motion") in DRIFTING for side in self.sides])
         lower, upper = self.corners_at(time)
@@ -453,10 +466,11 @@ class Run:
         return area
 
     def pressure(self, t1: float, t2: float) -> float:
-        """The pressure from t1 to t2, moved to the nearest samples of the observables.
+        """Return the pressure between two times, which are moved to the nearest samples.
 
-        It is (<K> + dW / 2 dt) / <A>: K the kinetic energy relative to the flow of a sheared box, W
-        the virial, A the accessible area; means over time are by trapezoids over the samples.
+        It is (<K> + dW / 2 dt) / <A>: K is the kinetic energy relative to the flow of a sheared
+        box, W the virial, A the accessible area.  Means over time are by trapezoids over the
+        samples.
         """
         if self.shear_rate:
             return float(np.trace(self.pressure_tensor(t1, t2)) / 2)
@@ -466,10 +480,10 @@ class Run:
         return float((self.n_disks * time_mean(time, kinetic) + virial / (2 * duration)) / area)
 
     def pressure_tensor(self, t1: float, t2: float) -> np.ndarray:
-        """(2, 2) pressure tensor from t1 to t2, moved to the nearest samples of the observables.
+        """Return the pressure tensor (2, 2) between two times, moved to the nearest samples.
 
-        It is (<sum of m v_a v_b> + dW_ab / dt) / <A>, with the tensor W of the virial; its trace is
-        twice the `pressure`.  It takes `output.virial_tensor`, unless the run has that anyway.
+        It is (<sum of m v_a v_b> + dW_ab / dt) / <A>, with the virial tensor W; its trace is twice
+        the `pressure`.  Some runs need `output.virial_tensor = .true.` for it.
         """
         time, kinetic = self._between("kinetic_tensor", t1, t2)
         virial = np.subtract(*self._between("virial_tensor", t1, t2).value[[-1, 0]])
@@ -477,7 +491,7 @@ class Run:
         return ((time_mean(time, kinetic) + virial / duration) / area).reshape(2, 2)
 
     def _between(self, name: str, t1: float, t2: float) -> Series:
-        """The samples of an observable from the one nearest to t1 to the one nearest to t2."""
+        """Return the samples of an observable between those nearest to t1 and to t2."""
         time, value = self.observable(name)
         first, last = (int(np.argmin(np.abs(time - t))) for t in (t1, t2))
         if not time[first] < time[last]:
@@ -488,17 +502,17 @@ class Run:
         return Series(time[first : last + 1], value[first : last + 1])
 
     def parameter(self, group: str, variable: str, default: Any = None) -> Any:
-        """A variable of the input file as it was used."""
+        """Return a variable of the input as it was used, or the default if it has no value."""
         return self.parameters.get(group, {}).get(variable, default)
 
     @property
     def restitution(self) -> float:
-        """Restitution of disk on disk; NaN if it differs between pairs of species, or by speed."""
+        """Restitution of two disks; NaN if it depends on the species or on the velocity."""
         return self.contact_law.xi if self.contact_law.law == "constant" else np.nan
 
     @property
     def contact_law(self) -> Restitution:
-        """Restitution of disk on disk, NaN if it differs between pairs of species, and its law."""
+        """Restitution of two disks with its law; NaN if it depends on the species."""
         contact = self.parameters.get("contact", {})
         values = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
         xi = float(values[0]) if len(values) == 1 else float("nan")
@@ -508,13 +522,13 @@ class Run:
 
     @property
     def time_step(self) -> float:
-        """The dt of a run by time steps; 0 for an event-driven one."""
+        """Time step of a run with time steps; 0 of an event-driven one."""
         steps = self.parameter("run", "dynamics", "events") == "steps"
         return float(self.parameter("run", "dt")) if steps else 0.0
 
     @cached_property
     def nature(self) -> Nature:
-        """What kind of run this is: see `ricochet.nature`."""
+        """The traits of the run: see `ricochet.nature`."""
         lost = self.observable("dissipated_energy").value[-1]
         most = self.n_disks * self.observable("all/kinetic_energy").value[[0, -1]].max()
         return nature_of(
@@ -528,7 +542,7 @@ class Run:
 
     @property
     def termination_note(self) -> str:
-        """Why this is not a run that went on until a stop rule was met; empty if it is."""
+        """Why the run did not end by a stop rule; empty if it did."""
         note = "".join(filter(str.isprintable, str(self.provenance.get("note", ""))))
         if self.path.suffix != ".part":
             early = "" if note.startswith("passed") else "ended early: "
@@ -586,7 +600,7 @@ def read_run(path: str | Path) -> Run:
 
 
 def run_of(path: Path, file: h5py.File) -> Run:
-    """The run in an open file."""
+    """Return the run in an open file."""
     disks, count = file[DISKS], committed(file, DISKS)
     if {"pressure", "wall_collisions"} & set(file["observables"]):
         raise Unsound("is of an earlier version of Ricochet, with other names: run its input anew")
@@ -624,14 +638,14 @@ def run_of(path: Path, file: h5py.File) -> Run:
 
 
 def outmost(side: Mapping[str, Any]) -> float:
-    """How far outwards of its place a side ever is; one that only strikes does not leave it."""
+    """Return how far beyond its mean position a side moves outwards [length]."""
     if side.get("motion") == "constant_velocity":
         return max(0.0, -float(side["velocity"]) * float(side["end_time"] - side["start_time"]))
     return float(side["amplitude"]) if side.get("motion") in ("sine", "parabolic") else 0.0
 
 
 def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
-    """How far inwards of its place a side is at these times: see docs/theory.md."""
+    """Return how far inwards of its mean position a side is at some times: see docs/theory.md."""
     if side.get("motion") == "constant_velocity":
         start, end = side["start_time"], side["end_time"]
         return side["velocity"] * (np.clip(time, start, end) - start)
@@ -644,18 +658,18 @@ def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
 
 
 def time_mean(time: np.ndarray, value: np.ndarray) -> np.ndarray:
-    """Mean over time of samples (T, ...), by trapezoids."""
+    """Average samples (T, ...) over time, by trapezoids."""
     return np.trapezoid(value, time, axis=0) / (time[-1] - time[0])
 
 
 def span(values: np.ndarray) -> str:
-    """The values in short: the only one, or the smallest and the largest."""
+    """Return a text with the only value, or with the smallest and the largest."""
     ends = (f"{values.min():g}", f"{values.max():g}")
     return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 
 def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
-    """The names of the series in a group, and in its groups: of species, of sides and of each."""
+    """Yield the names of the series in a group and in its subgroups."""
     for name, item in group.items():
         if isinstance(item, h5py.Group):
             if "value" in item:
@@ -665,7 +679,7 @@ def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
 
 
 def series_of(file: h5py.File, name: str, count: int) -> Series:
-    """So many samples of an observable of an open file."""
+    """Return the first `count` samples of an observable of an open file."""
     if f"observables/{name}/value" not in file:
         near = did_you_mean(name, series_in(file["observables"]))
         raise Unsound(f"has no observable '{name}'{near}")
@@ -676,12 +690,12 @@ def series_of(file: h5py.File, name: str, count: int) -> Series:
 
 
 def committed(file: h5py.File, group: str) -> int:
-    """How many samples of a group are valid: a `.part` is allocated ahead."""
+    """Return the number of valid samples of a group; a `.part` is allocated in advance."""
     return int(file[group]["committed"][()])
 
 
 def rows(data: h5py.Dataset, count: int | None = None) -> np.ndarray:
-    """The first rows of a dataset [all], those with a fraction in double precision."""
+    """Return the first rows of a dataset [all]; floating-point numbers in double precision."""
     values = data[:count]
     if count is not None and len(values) < count:
         raise Unsound(f"{data.name} holds {len(values)} of {count} samples")
@@ -689,7 +703,7 @@ def rows(data: h5py.Dataset, count: int | None = None) -> np.ndarray:
 
 
 def obstacles_of(parameters: Mapping[str, Any]) -> tuple[Obstacle, ...]:
-    """The circular obstacles of a run, in the order of their codes in the event log."""
+    """Return the circular obstacles, in the order of their codes in the event log."""
     groups = parameters.get("obstacle", {})
     if "inside" not in groups:
         return ()
@@ -700,13 +714,13 @@ def obstacles_of(parameters: Mapping[str, Any]) -> tuple[Obstacle, ...]:
 
 
 def walls_of(parameters: Mapping[str, Any]) -> np.ndarray:
-    """(W, 2, 2) the straight walls of a run, in the order of their codes in the event log."""
+    """Return the straight walls (W, 2, 2), in the order of their codes in the event log."""
     rows = parameters.get("wall_rows", parameters.get("wall"))
     return np.stack([rows["from"], rows["to"]], axis=1) if rows else np.empty((0, 2, 2))
 
 
 def groups_of_rows(parameters: Mapping[str, Any], name: str) -> np.ndarray:
-    """(W,) the group, from 0, of each obstacle: one with a file or points has several."""
+    """Return the number (W,), from 0, of the group that each obstacle belongs to."""
     rows = parameters.get(f"{name}_rows")
     if rows:
         return np.asarray(rows["group"]) - 1

@@ -115,7 +115,7 @@ def sweep(
 
 
 def check(text: str, values: Mapping[str, list[Any]]) -> None:
-    """Refuse now what a member would refuse: each value, with the first of the other variables."""
+    """Refuse values that a member would refuse; each is checked with the first of all others."""
     first = {name: own[0] for name, own in values.items() if own}
     for name, own in values.items():
         for value in own[: 1 if name == "run.seed" else None]:
@@ -125,7 +125,7 @@ def check(text: str, values: Mapping[str, list[Any]]) -> None:
 
 
 def combinations(values: Mapping[str, list[Any]]) -> dict[str, dict[str, object]]:
-    """The settings of each member by its name, which is that of runs/ensemble.sh."""
+    """Return the settings of each member by its name, as runs/ensemble.sh names it."""
     choices = [[(name, value) for value in own] for name, own in values.items()]
     members = {}
     for settings in map(dict, itertools.product(*choices)):
@@ -141,12 +141,12 @@ def combinations(values: Mapping[str, list[Any]]) -> dict[str, dict[str, object]
 
 
 def words_of(settings: Mapping[str, object]) -> str:
-    """Overrides as a line of a manifest."""
+    """Return overrides as a line of a manifest."""
     return " ".join(f"--set {pair.replace(', ', ',')}" for pair in settings_of(settings))
 
 
 def read_manifest(folder: Path) -> dict[str, str]:
-    """The overrides of each member that a folder tells of."""
+    """Return the overrides of each member in a manifest."""
     path = folder / "manifest.txt"
     if not path.is_file():
         return {}
@@ -155,7 +155,7 @@ def read_manifest(folder: Path) -> dict[str, str]:
 
 
 def remember(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
-    """Write input.nml and manifest.txt; members with data must mean the same as before."""
+    """Write input.nml and manifest.txt; members that have data must keep their settings."""
     door = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(door, fcntl.LOCK_EX)  # one command at a time, as runs/ensemble.sh
@@ -165,7 +165,7 @@ def remember(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
 
 
 def remember_alone(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
-    """The same, while nobody else does."""
+    """Write both files while this process holds the lock."""
     before = read_manifest(folder)
     path = folder / "input.nml"
     old = path.read_text(encoding="utf-8", errors="surrogateescape") if path.is_file() else text
@@ -185,20 +185,20 @@ def remember_alone(folder: Path, text: str, overrides: Mapping[str, str]) -> Non
 
 
 def put(path: Path, text: str) -> None:
-    """A file, whole or not at all."""
+    """Write a file atomically."""
     new = path.with_name(f".new.{os.getpid()}.{path.name}")
     new.write_text(text, encoding="utf-8", errors="surrogateescape")
     new.replace(path)
 
 
 def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
-    """The finished and the unfinished file of a member, where there are."""
+    """Return the finished and the unfinished file of a member; None where there is none."""
     whole, part = folder / f"{name}.h5", folder / f"{name}.h5.part"
     return whole if whole.is_file() else None, part if part.is_file() else None
 
 
 def log_of(path: Path) -> TextIO:
-    """A member's log, open to append; nothing goes through a link, or into what has two names."""
+    """Open a member's log to append; refuse a link, or a file with two names."""
     log = os.fdopen(
         os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW, 0o666), "a"
     )
@@ -210,7 +210,7 @@ def log_of(path: Path) -> TextIO:
 
 
 def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
-    """Run a member to its end, unless it is there or another process is at it; its exit code."""
+    """Run a member to its end unless it is finished or another process runs it; its exit code."""
     if not wanted(mark):
         return STOPPED
     with log_of(folder / f"{name}.log") as log:
@@ -242,7 +242,7 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
 
 
 def is_there(pid: int) -> bool:
-    """Whether there is a process of this number here."""
+    """Whether a process of this number exists on this machine."""
     try:
         os.kill(pid, 0)
     except OSError as problem:
@@ -251,7 +251,7 @@ def is_there(pid: int) -> bool:
 
 
 def wanted(mark: Path) -> bool:
-    """Whether the call of `sweep` that left this mark goes on; of a killed Python it is removed."""
+    """Whether the call of `sweep` with this mark goes on; remove the mark of a killed one."""
     _, pid, _, host = mark.name.split(" ", 3)
     if host == os.uname().nodename and not is_there(int(pid)):
         mark.unlink(missing_ok=True)
@@ -259,7 +259,7 @@ def wanted(mark: Path) -> bool:
 
 
 def finished_with(command: list[Any], mark: Path, **pipes: Any) -> int:
-    """The exit code of a command, which ends, with a checkpoint, when nobody wants it any more."""
+    """Return the exit code of a command; stop it, with a checkpoint, once its mark is gone."""
     process: subprocess.Popen[bytes] = subprocess.Popen(tied(command), **pipes)
     try:
         while True:
@@ -275,21 +275,21 @@ def finished_with(command: list[Any], mark: Path, **pipes: Any) -> int:
 
 
 def pairs_of(overrides: str) -> Iterator[tuple[str, str]]:
-    """Variables and values of a line of a manifest."""
+    """Yield variables and values of a line of a manifest."""
     for part in overrides.split("--set ")[1:]:
         name, _, value = part.strip().partition("=")
         yield name.strip(), value.strip()
 
 
 def last_words(folder: Path, name: str) -> str:
-    """What a member has said last."""
+    """Return the last line of a member's log."""
     path = folder / f"{name}.log"
     lines = path.read_text(errors="replace").splitlines() if path.is_file() else []
     return lines[-1] if lines else ""
 
 
 def failed(folder: Path, name: str) -> bool:
-    """Whether a member has said why it cannot go on."""
+    """Whether a member reported why it cannot continue."""
     words = last_words(folder, name)
     return not (files_of(folder, name)[0] or GOES_ON.fullmatch(words))
 
@@ -329,7 +329,7 @@ def ensemble(folder: str | Path) -> "pandas.DataFrame":
 
 
 def gathered(folder: Path) -> list[dict[str, Any]]:
-    """The rows of `ensemble`."""
+    """Return the rows of `ensemble`."""
     if not folder.is_dir():
         raise RunError(f"{folder}: there is no such folder")
     overrides = read_manifest(folder)
@@ -343,13 +343,13 @@ def gathered(folder: Path) -> list[dict[str, Any]]:
 
 
 def in_order(name: str) -> list[tuple[int, float, str]]:
-    """Members by their names, numbers in them by size."""
+    """Return a key that sorts members by name, with the numbers in names by value."""
     parts = re.split(r"(\d+\.?\d*(?:e[+-]?\d+)?)", name)
     return [(0, float(part), "") if k % 2 else (1, 0.0, part) for k, part in enumerate(parts)]
 
 
 def row_of(folder: Path, name: str, overrides: str) -> dict[str, Any]:
-    """What there is of a member."""
+    """Return the row of a member in the table."""
     row: dict[str, Any] = {"member": name}
     row |= {variable: typed(value) for variable, value in pairs_of(overrides)}
     finished, unfinished = files_of(folder, name)
@@ -368,7 +368,7 @@ def row_of(folder: Path, name: str, overrides: str) -> dict[str, Any]:
 
 
 def typed(value: str) -> object:
-    """A value of an override as a number, a truth value, a tuple of numbers, or text."""
+    """Convert a value of an override to a number, a truth value, a tuple of numbers, or text."""
     if not value:
         return None
     if value.strip(".").lower() in ("true", "false", "t", "f"):
@@ -387,7 +387,7 @@ def typed(value: str) -> object:
 
 
 def last_values(path: Path) -> dict[str, Any]:
-    """Seed, wall time, and the last value of each scalar observable; the file is opened once."""
+    """Return seed, wall time and the last value of each scalar observable."""
     with open_file(path) as file:
         row = {"seed": plain(file["parameters/run"].attrs["seed"])}
         row["wall_time"] = plain(file["provenance"].attrs.get("wall_time", np.nan))

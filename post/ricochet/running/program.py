@@ -30,9 +30,10 @@ ESCAPES = re.compile(r"\033\[\??\d*[A-Za-z]")
 
 
 class ProgramError(RunError):
-    """The program could not run or finish; `message` is its own, `code` its exit code.
+    """Error for a program that cannot start or finish.
 
-    `path` is that of the file with what there is of the run, None if there is nothing.
+    `message` has the lines of the program, `code` its exit code; `path` is the file with the
+    part of the run that was done, or None.
     """
 
     def __init__(self, message: str, code: int, path: Path | None = None):
@@ -113,7 +114,7 @@ def run(
 
 
 def whole_threads(threads: int | None) -> int:
-    """The number of threads that somebody wants, 0 for what the input says."""
+    """Return the number of threads; 0 if the input decides."""
     if threads is None:
         return 0
     if not isinstance(threads, Integral) or not 1 <= threads <= 1024:
@@ -122,7 +123,7 @@ def whole_threads(threads: int | None) -> int:
 
 
 def find_program() -> str:
-    """What RICOCHET names, else build/ricochet of this clone, else the installed program."""
+    """Return the program that RICOCHET names, else build/ricochet of this clone, else on PATH."""
     root = HERE.parents[1]
     if wish := os.environ.get("RICOCHET"):
         places = [Path(wish)]
@@ -139,9 +140,9 @@ def find_program() -> str:
 
 
 def watched(command: list[str], progress: bool = True) -> tuple[int, list[str]]:
-    """Run the command with a progress bar; its exit code, and its messages.
+    """Run the command with a progress bar; return its exit code and its messages.
 
-    If Python is interrupted, or killed, the program writes a checkpoint and ends.
+    If Python is interrupted or killed, the program writes a checkpoint and ends.
     """
     import pty  # not on Windows, where files can be read nevertheless
 
@@ -176,17 +177,17 @@ def watched(command: list[str], progress: bool = True) -> tuple[int, list[str]]:
 
 
 def tied(command: list[str]) -> list[str]:
-    """A command that is stopped, with a checkpoint, when Python ends, however it ends.
+    """Return a command that is stopped, with a checkpoint, when Python ends in any way.
 
-    By setpriv of util-linux, where there is one: a function that runs between fork and exec is not
-    safe beside threads.
+    It uses setpriv of util-linux if there is one: a function between fork and exec is not safe
+    beside threads.
     """
     setpriv = shutil.which("setpriv") if sys.platform == "linux" else None
     return [setpriv, "--pdeathsig", "TERM", "--", *command] if setpriv else command
 
 
 def lines_from(terminal: int) -> Iterator[str]:
-    """What is written to a terminal, line by line; a line that is overwritten is one, too."""
+    """Yield the lines that a program writes to its terminal, overwritten ones included."""
     rest = b""
     while True:
         try:
@@ -203,7 +204,7 @@ def lines_from(terminal: int) -> Iterator[str]:
 
 
 def unseen(system: str | Path | Mapping[str, Any]) -> str | None:
-    """The text of an input that is no file: of groups, or the words themselves; None of a file."""
+    """Return the text of an input that is no file; None of a file."""
     if isinstance(system, Mapping):
         return namelist(system)
     if not isinstance(system, str | os.PathLike):
@@ -213,7 +214,7 @@ def unseen(system: str | Path | Mapping[str, Any]) -> str | None:
 
 
 def namelist(groups: Mapping[str, Any]) -> str:
-    """The text of an input file; whether it makes sense is for the program to say."""
+    """Return the text of an input file for groups of variables; the program checks it."""
     text = []
     for name, content in groups.items():
         for group in content if isinstance(content, list | tuple) else [content]:
@@ -230,7 +231,7 @@ def namelist(groups: Mapping[str, Any]) -> str:
 
 
 def settings_of(overrides: Mapping[str, Any]) -> list[str]:
-    """GROUP.VARIABLE=VALUE of each; without a value it is the default."""
+    """Return GROUP.VARIABLE=VALUE for each override; without a value it is the default."""
     if not isinstance(overrides, Mapping):
         kind = type(overrides).__name__
         raise TypeError(f"values are a dictionary as {{'run.seed': 2}}, not {kind}")
@@ -241,7 +242,7 @@ def settings_of(overrides: Mapping[str, Any]) -> list[str]:
 
 
 def named(message: str, text: str | None) -> str:
-    """The program's lines about an input that nobody sees, with names instead of its lines."""
+    """Replace line numbers in the program's messages by names, for an input that has no file."""
     if text is None:
         return message
     input_lines = text.splitlines()
@@ -257,7 +258,7 @@ def named(message: str, text: str | None) -> str:
 
 
 def value_text(name: str, value: object) -> str:
-    """A value as a namelist writes it; an array as the list of its numbers, row by row."""
+    """Return a value as a namelist writes it; an array as the list of its numbers, row by row."""
     if isinstance(value, np.floating):
         value = float(value)
     if isinstance(value, np.ndarray | np.generic):

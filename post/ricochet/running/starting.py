@@ -91,7 +91,7 @@ def write_start(
 
 
 def table(name: str, values: ArrayLike, count: int | None = None, width: int = 0) -> np.ndarray:
-    """Finite numbers: (count, width), or (count,)."""
+    """Return finite numbers of the shape (count, width), or (count,) for width 0."""
     values = np.asarray(values)
     if values.dtype.kind not in "iuf":
         raise ValueError(f"{name}: not an array of numbers")
@@ -104,7 +104,7 @@ def table(name: str, values: ArrayLike, count: int | None = None, width: int = 0
 
 
 def sized(name: str, values: np.ndarray, count: int) -> np.ndarray:
-    """As many values as disks; one is repeated."""
+    """Return `count` values; a single value is repeated."""
     if values.ndim == 0:
         return np.full(count, values)
     if len(values) != count or count == 0:
