@@ -41,7 +41,7 @@ SETTLED = 0.005  # the ratio has forgotten its start when by the law it is so cl
 
 
 def on_grid(x: Sequence[Any], y: Sequence[Any], points: int) -> tuple[np.ndarray, np.ndarray]:
-    """A grid from 0 to the last x of the shortest run, and the tracks y (K, T) there: (R, K, P)."""
+    """Interpolate tracks y (K, T) of each run on a common grid, up to the shortest run."""
     grid = np.linspace(0, min(own[-1] for own in x), points)
     each = zip(x, y, strict=True)
     return grid, np.array([[np.interp(grid, own, k) for k in tracks] for own, tracks in each])
@@ -96,7 +96,7 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
 
 
 def moving_energy(run: Run, name: str = "all") -> np.ndarray:
-    """(T,) kinetic energy per disk at the observables, of disks that moved at the start."""
+    """Return the kinetic energy per disk (T,) at the observables; refuse disks at rest."""
     energy = run.observable(f"{name}/kinetic_energy").value
     if name == "all" and not energy[0] > 0:
         raise Refused(f"{run.path}: starts with disks at rest; there is nothing to cool")
@@ -143,7 +143,7 @@ def first_rate(run: Run) -> float:
 
 
 def counted_rate(run: Run) -> float:
-    """w0 by the first collision of each disk; meanwhile Haff's law has slowed the disks down."""
+    """Return w0 from the first collision of each disk, corrected for the cooling meanwhile."""
     time, tau = run.collisions_per_disk
     first = min(int(np.searchsorted(tau, 1.0)), len(tau) - 1)
     slower = (1 - run.restitution**2) * tau[first] / 4
@@ -297,7 +297,7 @@ def exponent(time: np.ndarray, energy: np.ndarray) -> float:
 
 
 def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray) -> float:
-    """From where on the rate stays below `SLOW` of the law; NaN if it does not in the end."""
+    """Return the tau after which the rate stays below `SLOW` of the law; NaN if it does not."""
     slow = rate < SLOW * law
     if not slow[-1]:
         return float("nan")
@@ -341,7 +341,7 @@ def rough_law(run: Run) -> tuple[float, float, float]:
 
 
 def temperatures(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """T of translation and of rotation at the observables."""
+    """Return the temperatures of translation and of rotation, (T,) each, at the observables."""
     kinds = "temperature", "rotational_temperature"
     t, rotational = (run.observable(f"all/{kind}").value for kind in kinds)
     return t, rotational

@@ -136,10 +136,10 @@ def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
 
 
 class Correlator:
-    """Sums over pairs of samples of a run or a simulation, which come one after the other.
+    """Sums over pairs of samples of a run or a simulation, which are added one after the other.
 
-    Its memory does not grow: it keeps the samples that are still to be met again, some 16 for each
-    lag.  `pickle` keeps all of it, so that what is stopped goes on exactly.
+    Its memory is bounded: it keeps only the samples that have partners still to come, about 16 for
+    each lag.  `pickle` saves its whole state, so that a measurement can be continued exactly.
     """
 
     def __init__(
@@ -150,7 +150,7 @@ class Correlator:
         reach: float | None = None,
         lags: np.ndarray | None = None,
     ):
-        """For samples at these times, wave numbers [1/length] and lags [of the times]."""
+        """Prepare for these times, wavenumbers [1/length] and lags [those of the times]."""
         cools = {"inelastic"} if source.nature.cooling else set()
         what = "ways and memory are those of a steady state without flow"
         allow(source, what, *TRAITS.keys() - FLOWING - cools)
@@ -176,13 +176,13 @@ class Correlator:
         self.last = np.full(len(self.lags), -1.0)  # where in the time of a lag its last origin was
 
     def follow(self, source: Run | Simulation) -> Self:
-        """Take the samples that are to come: a simulation is advanced, a run may still grow."""
+        """Add the missing samples; a simulation is advanced, a run may be growing."""
         for place, velocity in samples(source, self.times[self.done :]):
             self.add(place, velocity)
         return self
 
     def add(self, place: np.ndarray, velocity: np.ndarray) -> None:
-        """The next sample: places (N, 2), continuous in time, and velocities."""
+        """Add a sample: positions (N, 2), continuous in time, and velocities (N, 2)."""
         place, velocity = (
             values - self.kept * np.average(values, axis=0, weights=self.mass)
             for values in (place, velocity)
@@ -208,7 +208,7 @@ class Correlator:
     def count(
         self, origins: np.ndarray, lags: np.ndarray, place: np.ndarray, v: np.ndarray
     ) -> None:
-        """Pairs of this sample with the origins (P,), at these lags."""
+        """Add the pairs of this sample with the origins (P,), at these lags (P,)."""
         before, v0 = (np.stack([self.held[k][part] for k in origins]) for part in (0, 1))
         way = place - before
         square, half = np.einsum("pna,pna->pn", way, way), np.einsum("pna,pna->pn", v0, way) / 2
@@ -222,7 +222,7 @@ class Correlator:
         np.add.at(self.sums, where, np.moveaxis(np.array(values) @ self.shares, 0, 2))
 
     def amounts(self, name: str, species: int) -> np.ndarray:
-        """(L, B) sums over the pairs that begin in a block; over their numbers they are means."""
+        """Return sums (L, B) over the pairs that begin in each block of time."""
         names = (*FIXED, *(f"F_s({k:g})" for k in self.waves))
         if name != "alpha2":
             return self.sums[:, :, species, names.index(name)]
@@ -233,13 +233,13 @@ class Correlator:
         return fourth / (2 * m2**2) - m4 / m2**3 * square + (m4 / m2**2 - 1) * self.pairs
 
     def means(self, name: str, species: int = 0) -> np.ndarray:
-        """(L,) over all pairs; NaN where there are none."""
+        """Return means (L,) over all pairs; NaN where there are none."""
         number = self.pairs.sum(axis=1)
         return self.amounts(name, species).sum(axis=1) / np.where(number > 0, number, np.nan)
 
 
 def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Places, continuous in time, and velocities at these times, as far as there are any."""
+    """Yield positions, continuous in time, and velocities at these times, while there are any."""
     if isinstance(source, Simulation):
         box = source.parameters["box"]
         edges = np.subtract(box["upper"], box["lower"])
@@ -258,7 +258,7 @@ def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.nd
 
 
 def mean_of(members: Sequence[Correlator], name: str, species: int, lags: np.ndarray) -> Estimate:
-    """The mean at these lags (by number), with its error."""
+    """Return the mean at these lags, given by number, with its error."""
     means = [one.means(name, species)[lags] for one in members]
     if len(means) > 1:
         return estimate(means)

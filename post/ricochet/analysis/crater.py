@@ -278,13 +278,13 @@ def hole(run: Run) -> np.ndarray:
 
 
 def area(ring: np.ndarray) -> float:
-    """Of a closed line (P, 2)."""
+    """Return the area inside a closed line (P, 2)."""
     x, y = ring.T
     return abs(float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))) / 2
 
 
 def packing_field(run: Run, frame: int, cells: int = 240) -> tuple[np.ndarray, ...]:
-    """Area fraction smoothed over a few disks: x and y of the cells and values (y, x)."""
+    """Return the area fraction smoothed over a few disks: x and y of the cells, values (y, x)."""
     here = bed(run)
     side = run.edges.max() / cells
     shape: Any = np.maximum(1, np.round(run.edges / side)).astype(int)

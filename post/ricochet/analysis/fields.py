@@ -42,7 +42,7 @@ Cells = tuple[int, int]
 
 
 class Fluxes(NamedTuple):
-    """What passes from one wall to the opposite one, per length and time."""
+    """Fluxes from one wall to the opposite one, per length and time."""
 
     pressure: Any  # momentum along the axis; a number or an `Estimate`
     shear: Any  # momentum along the walls; likewise
@@ -50,7 +50,7 @@ class Fluxes(NamedTuple):
 
 
 class Block(NamedTuple):
-    """A part of the steady state of a run, until the next one begins."""
+    """A part of the steady state of a run."""
 
     run: Run
     frames: list[int]
@@ -69,20 +69,23 @@ class Members(NamedTuple):
     share: np.ndarray  # of the sample that lies in the block
 
     def mean(self) -> np.ndarray:
-        """NaN of what fewer than two blocks have seen."""
+        """Return the mean; NaN where fewer than two blocks have data."""
         seen = self.share > 0
         mean = np.sum(self.share * np.where(seen, self.values, 0), axis=0)
         return np.where(seen.sum(axis=0) > 1, mean, np.nan)
 
     def rests(self) -> np.ndarray:
-        """(G, ...) whose squares have the sum of (standard error)^2."""
+        """Return deviations (G, ...) whose squares add up to the square of the standard error."""
         seen = self.share > 0
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.sqrt(self.share / (1 - self.share) / seen.sum(axis=0))
             return np.where(seen, root * (self.values - self.mean()), 0)
 
     def estimate(self, kinship: np.ndarray | float = 0.0) -> Estimate:
-        """Mean and error; `kinship` is twice the sum of products of neighbours over the squares."""
+        """Return mean and error.
+
+        `kinship` is twice the sum of products of neighbouring blocks over the sum of squares.
+        """
         with np.errstate(divide="ignore", invalid="ignore"):
             error = np.sqrt(np.sum(self.rests() ** 2, axis=0))
             samples = 1 / np.sum(self.share**2, axis=0)
@@ -93,7 +96,7 @@ class Members(NamedTuple):
 def jackknife(
     of: Callable[[np.ndarray], np.ndarray], sums: np.ndarray, weights: np.ndarray
 ) -> Members:
-    """What `of` makes of sums over all blocks, from the sums of each (G, ...) and its weight."""
+    """Return the pseudo-values of a function of sums over blocks, each (G, ...) with its weight."""
     with np.errstate(divide="ignore", invalid="ignore"):
         total = sums.sum(axis=0)
         rest = np.stack([of(total - one) for one in sums])
@@ -105,7 +108,7 @@ def jackknife(
 
 
 def steady_frames(run: Run, skip: float | None) -> list[int]:
-    """Frames after `skip` collisions per disk, else those of the second half."""
+    """Return the frames after `skip` collisions per disk, else those of the second half."""
     if any(side.get("motion") in ("constant_velocity", "piston") for side in run.sides):
         why = "has a side that leaves its place (motion), fields are those of cells that stay"
         raise RunError(f"{run.path}: {why}")
@@ -118,9 +121,9 @@ def steady_frames(run: Run, skip: float | None) -> list[int]:
 
 
 def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
-    """How many frames count as one for what lasts longest.
+    """Return the largest statistical inefficiency of slow quantities, in frames.
 
-    Looked at are mass, momentum and energy: in all, and their longest waves across the cells.
+    These are mass, momentum and energy, in total and in their longest waves across the cells.
     """
     place, v = (run.position[frames] - run.lower) / run.edges, run.velocity[frames]
     v[..., 0] -= run.shear_rate * run.edges[1] * (place[..., 1] - 0.5)
@@ -138,10 +141,10 @@ def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
 
 
 def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[Block], float]:
-    """Blocks of the steady state of all runs, and the most that neighbours know of each other.
+    """Return the blocks of the steady state of all runs, and the largest `kinship` to be expected.
 
-    See `kinship`: as much as means over parts of a series that forgets as exp(-t).  NaN if the
-    blocks are too few to have an error.
+    That is the one of means over parts of a series with the autocorrelation exp(-t); NaN if there
+    are too few blocks for an error.
     """
     refuse_others(runs)
     steady = [steady_frames(run, skip) for run in runs]
@@ -161,9 +164,10 @@ def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[B
 
 
 def kinship(members: Members, blocks: list[Block], most: float) -> np.ndarray:
-    """(F,) twice the products of neighbours in time over the squares, of fields (G, F, C).
+    """Return twice the products of neighbouring blocks over the squares, (F,) of fields (G, F, C).
 
-    From 0 to `most`, in all cells together: few blocks of one cell say little of that.
+    It is limited to 0 ... `most` and averaged over all cells, because few blocks of one cell do not
+    determine it.
     """
     size, same = len(blocks), [a.run is b.run for a, b in pairwise(blocks)]
     rest = np.nan_to_num(members.rests())
@@ -177,7 +181,7 @@ def kinship(members: Members, blocks: list[Block], most: float) -> np.ndarray:
 
 
 def reach(run: Run, cells: Cells, axis: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Where along an axis, between walls, the centres of disks can be: from, to, in each cell."""
+    """Return the range of the centres of disks along an axis, in each cell: start and end."""
     gap = 0 if run.periodic[axis] else radius
     sides = np.linspace(0, run.edges[axis], cells[axis] + 1)
     sides = run.lower[axis] + sides.clip(gap, run.edges[axis] - gap)
@@ -209,7 +213,7 @@ def places(run: Run, cells: Cells) -> np.ndarray:
 
 
 def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
-    """(C,) area where the centre of a disk can be; beside circles and walls to 0.5 % of a cell."""
+    """Return the area (C,) where centres of disks can be; beside obstacles to 0.5 % of a cell."""
     spans, inner = [], []
     step = np.sqrt(run.edges.prod() / POINTS)
     for k in (0, 1):
@@ -240,10 +244,10 @@ def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
 
 
 def sums(block: Block, cells: Cells, areas: list[np.ndarray]) -> np.ndarray:
-    """(12, C) over the disks of some frames in each cell, frame by frame but for the first.
+    """Return sums (12, C) over the disks of some frames in each cell.
 
-    Frames, disks, disks per area, and of m, m v, m v v (xx, xy, yy), m v^2 v / 2 and I omega^2.
-    In a sheared box v is that relative to the profile.
+    They are the numbers of frames and of disks, disks per area, and the sums of m, m v, m v v (xx,
+    xy, yy), m v^2 v / 2 and I omega^2.  In a sheared box v is relative to the profile.
     """
     run, frames, _ = block
     place = run.position[frames].reshape(-1, 2) - run.lower
@@ -271,10 +275,10 @@ BY_FRAMES = np.array([name.startswith(("density", "stress", "heat")) for name in
 
 
 def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
-    """(10, C) what `sums` say of the fields; NaN where there are no disks.
+    """Return the fields (10, C) that follow from `sums`; NaN where there are no disks.
 
-    Of one disk all is flow, and two carry no heat: fewer than `FEWEST_DISKS` have no kT, stress or
-    heat.  A flow that changes by g h across a cell is no heat: it is m (g h)^2 / 12 of m v v.
+    Cells with fewer than `FEWEST_DISKS` have no kT, stress or heat flux.  A flow that changes by g
+    h across a cell contributes m (g h)^2 / 12 to m v v, which is subtracted.
     """
     frames, n, dense, mass, mx, my, xx, xy, yy, qx, qy, turning = total
     u, v, density = mx / mass, my / mass, dense / frames
@@ -299,7 +303,7 @@ def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
 
 
 class Fields(NamedTuple):
-    """What runs of one input say."""
+    """Fields of runs of one input."""
 
     found: dict[str, Estimate]  # (C,) by name
     values: dict[str, np.ndarray]  # (G, C) as if each block had been measured alone
@@ -367,7 +371,7 @@ def fields(runs: list[Run], skip: float | None, cells: Cells) -> Fields:
 
 
 def gained(block: Block, name: str) -> np.ndarray:
-    """How much a sum over collisions has grown in a block."""
+    """Return by how much a sum over collisions has grown in a block."""
     time, value = block.run.observable(name)
     if len(time) < 2:
         raise RunError(f"{block.run.path}: too few observables in the steady state")
@@ -376,7 +380,7 @@ def gained(block: Block, name: str) -> np.ndarray:
 
 
 def fluxes(blocks: list[Block], axis: int) -> Members:
-    """(G, 3) `Fluxes` from what both walls have received."""
+    """Return the `Fluxes` (G, 3) from the impulses and energies that both walls received."""
     run, (near, far) = blocks[0].run, ACROSS[axis]
     length = 2 * run.edges[1 - axis]
     parts = []
@@ -393,11 +397,11 @@ def fluxes(blocks: list[Block], axis: int) -> Members:
 def expected(
     run: Run, axis: int, x: np.ndarray, flux: Fluxes, middle: tuple[float, float]
 ) -> np.ndarray:
-    """(C, 3) flow along the walls, kT and n at the places x, from those in the middle on.
+    """Integrate flow along the walls, kT and density (P, 3) from the middle to the positions x.
 
-    Pressure is the same everywhere; dT/dx = -(energy - shear u) / conductivity, du/dx = -shear /
-    viscosity.  Raises ValueError if a gas of these fluxes would have to be colder than 0, or denser
-    than disks can be.
+    The pressure is uniform; dT/dx = -(energy - shear u) / conductivity, du/dx = -shear / viscosity.
+    Raises ValueError if a gas of these fluxes would need a negative temperature, or a density
+    beyond that of close packing.
     """
     diameter, mass = 2 * run.radius[0], run.mass[0]
     per_disk = np.pi * diameter**2 / 4

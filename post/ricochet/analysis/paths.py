@@ -9,7 +9,7 @@ from ..reading.reader import EventLog, Run
 
 
 class Turns(NamedTuple):
-    """What collisions make of disks; frame by frame, disk by disk, in the order of time."""
+    """Velocities after collisions, ordered by frame, then by disk, then by time."""
 
     frame: np.ndarray  # (M,) which of the frames comes before
     disk: np.ndarray  # (M,) indices
@@ -18,7 +18,7 @@ class Turns(NamedTuple):
 
 
 def why_unknown(run: Run, log: EventLog) -> str:
-    """Why the log does not tell the paths between frames; empty if it does."""
+    """Return why the log does not determine the paths between frames; empty if it does."""
     if log.momentum_change is None:
         return "the log has no momentum_change"
     if run.nature & KICKED:
@@ -27,7 +27,7 @@ def why_unknown(run: Run, log: EventLog) -> str:
 
 
 def seen(run: Run, log: EventLog, frames: list[int]) -> np.ndarray:
-    """(T,) how many events of the log each frame has behind it."""
+    """Return how many events (T,) of the log precede each frame."""
     if run.event_count is None:
         return np.searchsorted(log.time, run.time[frames], "right")
     # This is clear even if several events have the same time.
@@ -36,7 +36,7 @@ def seen(run: Run, log: EventLog, frames: list[int]) -> np.ndarray:
 
 
 def turns_between(run: Run, log: EventLog, frames: list[int], ends: np.ndarray) -> Turns:
-    """All turns from the first of these frames, which have seen so many events, to the last."""
+    """Return all collisions between these frames; `ends` are the event numbers of the frames."""
     if log.momentum_change is None:
         raise ValueError("the log has no momentum_change")
     some = slice(ends[0], ends[-1])

@@ -24,7 +24,7 @@ MEMORY = 5.0  # collisions per disk after which a speed is independent
 
 
 def thermal_energy(run: Run, frames: Index) -> np.ndarray:
-    """(F, N) m v^2 / 2, v relative to the flow of a sheared box and to what never changes."""
+    """Return m v^2 / 2 (F, N) with v relative to the flow and to the conserved drift."""
     frames = chosen(run.n_frames, frames)
     velocity = run.velocity[frames]
     if run.shear_rate:
@@ -98,14 +98,14 @@ def reduced_speeds(run: Run, frames: Index, each: bool = False) -> np.ndarray:
 
 
 def moment(u: np.ndarray, power: int, independent: int) -> Estimate:
-    """Mean of a power of speeds whose mean square is 1, which is measured with them."""
+    """Return the mean of a power of speeds that are scaled to a mean square of 1."""
     mean = np.mean(u**power)
     rest = u**power - power / 2 * mean * u**2
     return Estimate(mean, np.std(rest) / np.sqrt(independent))
 
 
 def all_move(run: Run, frame: int) -> bool:
-    """Whether each species has speeds in a frame."""
+    """Whether in a frame at least one disk of each species moves."""
     energy = run.kinetic_energy(frame)
     return all(energy[kind.disks].any() for kind in run.by_species)
 

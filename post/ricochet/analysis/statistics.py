@@ -58,7 +58,7 @@ class Curve(NamedTuple):
 
 
 class LawTest(NamedTuple):
-    """A sample compared with a law."""
+    """Result of comparing a sample with a distribution."""
 
     n: int  # values that count as independent
     ks: float  # Kolmogorov-Smirnov distance, the largest between the two distribution functions
@@ -77,7 +77,7 @@ class PowerLaw(NamedTuple):
     free: int = 0  # degrees of freedom
 
     def misses(self, runs: int) -> bool:
-        """Whether points are farther off than errors over so many runs explain (Welch 1951)."""
+        """Whether the points deviate more than errors over so many runs explain (Welch 1951)."""
         if self.free < 1 or runs < FEWEST_RUNS:
             return False
         own, few = student(runs) ** 2 * self.chi2, (self.free + 2) * (runs - 1) / 3
@@ -216,7 +216,7 @@ FEWEST = 8  # samples from which an error can be had
 
 
 class SeriesMean(NamedTuple):
-    """The mean of a correlated series, and what is needed to trust it."""
+    """The mean of a correlated series, with its error and what qualifies it."""
 
     mean: float
     error: float  # half the 68 % interval; NaN if worth fewer than `FEWEST` samples
@@ -224,12 +224,12 @@ class SeriesMean(NamedTuple):
     drift: float  # second half less first half, over the error of that difference
 
     def scaled(self, factor: float, offset: float = 0.0) -> "SeriesMean":
-        """The same for offset + factor x."""
+        """Return the mean of offset + factor x."""
         return self._replace(mean=offset + factor * self.mean, error=abs(factor) * self.error)
 
 
 def cells(series: np.ndarray, count: int) -> np.ndarray:
-    """Means over `count` equal parts of a series (T,); samples too many for that lead and go."""
+    """Return means over `count` equal parts of a series (T,), without the rest at its start."""
     width = max(1, len(series) // count)
     return series[len(series) % width :].reshape(-1, width).mean(axis=1)
 
@@ -387,7 +387,7 @@ FEW = 10  # independent samples
 
 
 def scatter_p(means: Sequence[SeriesMean]) -> float:
-    """Probability that runs scatter more than this, if their errors are right."""
+    """Return the probability that runs scatter more than this if their errors are right."""
     mean, error, *_ = np.array(means).T
     if len(means) < 2 or not np.all(error > 0):
         return 1.0

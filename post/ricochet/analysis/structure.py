@@ -29,13 +29,13 @@ MOST_TERMS = 3e8  # of the sums over disks and wave vectors in a frame
 
 
 def periods(run: Run) -> np.ndarray:
-    """(M, 2) shifts of a thing to itself and to its periodic images next to the box."""
+    """Return the shifts (M, 2) to the box itself and to its neighbouring periodic images."""
     along = [(-1, 0, 1) if periodic else (0,) for periodic in run.periodic]
     return run.edges * np.array([(i, j) for i in along[0] for j in along[1]])
 
 
 def refuse(run: Run, *traits: str) -> None:
-    """The images here do not slide, and waves take a box without walls."""
+    """Refuse runs whose images slide, and runs with walls where wave vectors are needed."""
     law = "structure is found in boxes at rest" + ", S(k) in periodic ones" * ("walls" in traits)
     allow(run, law, *TRAITS.keys() - set(traits))
 
@@ -96,7 +96,7 @@ def pair_correlation(
 
 
 def masks(run: Run, pair: tuple[str, str] | None) -> list[np.ndarray]:
-    """(N,) which disks are of one and of the other species, once if it is the same; or all."""
+    """Return the masks (N,) of the species of a pair, one if they are equal, or of all disks."""
     return [run.of_species(name) for name in dict.fromkeys(pair)] if pair else [run.species > 0]
 
 

@@ -52,7 +52,7 @@ FLUID = ("walls", "thermal_walls", "thermostatted", "rough", "rotating", "mixtur
 
 
 class Steps(NamedTuple):
-    """What happened between one sample of the observables and the next, in equilibrium."""
+    """Changes from one sample of the observables to the next, in equilibrium."""
 
     time: np.ndarray  # (T,) how long it was
     kt: np.ndarray  # (T,) mean over that time
@@ -63,14 +63,14 @@ class Steps(NamedTuple):
 
 
 def refuse_others(runs: Sequence[Run]) -> None:
-    """Means are over runs of the same disks, which differ by their seed."""
+    """Refuse runs that are not of the same disks."""
     for run in runs:
         if run.names != runs[0].names or not np.array_equal(run.species, runs[0].species):
             raise RunError(f"{run.path}: its disks are not those of {runs[0].path}")
 
 
 def all_settle(runs: Sequence[Run]) -> bool:
-    """Whether the runs come to equilibrium: all of them, or none."""
+    """Whether all runs have an equilibrium; mixed runs are refused."""
     settled = [run.nature.in_equilibrium for run in runs]
     if any(settled) and not all(settled):
         one, other = runs[settled.index(False)], runs[settled.index(True)]
@@ -79,7 +79,7 @@ def all_settle(runs: Sequence[Run]) -> bool:
 
 
 def after_start(run: Run, skip: float | None = None) -> float:
-    """The time after `skip` collisions per disk, or else when speeds have forgotten the start.
+    """Return the time after `skip` collisions per disk, or by default after `SPEEDS_FORGET`.
 
     A run too short for that counts from its middle.
     """
@@ -207,9 +207,9 @@ def frames_from(
 
 
 def later(run: Run, skip: float | None = None) -> slice:
-    """Frames in the steady state, or of a gas that cools after the start.
+    """Return the frames in the steady state, or of a gas that cools after the start.
 
-    Without the last, which may be out of step.
+    The last frame is left out, because it may not be in step with the others.
     """
     first = int(np.searchsorted(run.time, start_of_steady_state(run, skip)))
     if run.n_frames - 1 - first < 2:
@@ -221,9 +221,9 @@ def later(run: Run, skip: float | None = None) -> slice:
 
 
 def unmoved(source: Run | Simulation) -> np.ndarray:
-    """(2,) along which axes nothing changes the total momentum, of a run or a simulation.
+    """Return along which axes (2,) nothing changes the total momentum, of a run or a simulation.
 
-    But for walls along the axis, and these only with `ALONG_WALLS`.
+    Walls along the axis are not considered; they conserve it unless the run has `ALONG_WALLS`.
     """
     box, drive = source.parameters.get("box", {}), source.parameters.get("drive", {})
     kicked = source.nature & KICKED and not drive.get("keep_momentum", False)
@@ -233,7 +233,7 @@ def unmoved(source: Run | Simulation) -> np.ndarray:
 
 
 def conserved(run: Run) -> np.ndarray:
-    """(2,) along which axes nothing ever changes the total momentum."""
+    """Return along which axes (2,) the total momentum is conserved."""
     kept = unmoved(run)
     if run.nature & ALONG_WALLS:
         carried = run.mass[:, None] * run.velocity[[0, -1]]
@@ -263,15 +263,15 @@ def free_disks(run: Run) -> float:
 
 
 def drift(run: Run) -> np.ndarray:
-    """(2,) conserved velocity of the centre of mass, which is no heat; 0 along other axes."""
+    """Return the conserved velocity (2,) of the centre of mass; 0 along other axes."""
     centre = np.average(run.velocity[0], axis=0, weights=run.mass)
     return np.where(conserved(run), centre, 0.0)
 
 
 def kt_of(run: Run, energy: np.ndarray) -> np.ndarray:
-    """kT, from the kinetic energy of all disks together.
+    """Return kT from the kinetic energy of all disks together, an array of any shape.
 
-    Where to divide by N and where by N - 1 is in docs/theory.md.
+    docs/theory.md explains where to divide by N and where by N - 1.
     """
     return (energy - 0.5 * run.mass.sum() * np.sum(drift(run) ** 2)) / free_disks(run)
 
@@ -298,12 +298,12 @@ def kt_at_start(run: Run) -> float:
 
 
 def has_few_observables(run: Run) -> bool:
-    """Whether frames are to tell how a run went, as they are more, and observables too few."""
+    """Whether the frames resolve a run better in time than its few observables."""
     return len(run.collisions_per_disk.time) < min(run.n_frames, 2 * FEWEST)
 
 
 def kt_in_time(run: Run) -> tuple[str, np.ndarray, np.ndarray]:
-    """Times and kT of the observables, or of the frames if those are few."""
+    """Return times and kT of the observables, or of the frames if these resolve it better."""
     if not has_few_observables(run):
         time, energy = run.observable("all/kinetic_energy")
         return "observables", time, kt_of(run, run.n_disks * energy)
@@ -350,7 +350,7 @@ def temperature(run: Run, skip: float | None = None) -> SeriesMean:
 
 
 def between(time: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Times from one sample to the next, and what the value adds up to in each of them."""
+    """Return durations between samples, and the integral of the value over each."""
     return np.diff(time), np.diff(time) * (value[1:] + value[:-1]) / 2
 
 
@@ -407,7 +407,7 @@ def packing(run: Run) -> float:
 
 
 def kinds_of_disks(run: Run) -> tuple[Species, ...]:
-    """The species, each of one mass and one radius, as laws by species are."""
+    """Return the species; refuse one whose disks differ in mass or radius."""
     for kind in run.by_species:
         if not kind.alike:
             raise Refused(f"{run.path}: the disks of '{kind.name}' are not of one mass and radius")
@@ -415,7 +415,7 @@ def kinds_of_disks(run: Run) -> tuple[Species, ...]:
 
 
 def lightest_and_heaviest(run: Run) -> tuple[int, int]:
-    """Indices of the species with the smallest and the largest mass, which must differ."""
+    """Return the indices of the species with the smallest and the largest mass."""
     masses = [kind.mass for kind in run.by_species]
     if min(masses) == max(masses):
         raise RunError(f"{run.path}: needs two species of different mass")
@@ -457,7 +457,7 @@ def mean_free_time(run: Run, start: float = 0.0) -> float:
 
 
 def steps(run: Run, skip: float | None = None) -> Steps:
-    """Differences of the observables that only grow, from the start of equilibrium on."""
+    """Return the changes of cumulative observables between samples, from equilibrium on."""
     time = run.collisions_per_disk.time
     first = int(np.searchsorted(time, start_of_equilibrium(run, skip)))
     if len(time) - first <= FEWEST:
@@ -483,16 +483,16 @@ def steps(run: Run, skip: float | None = None) -> Steps:
 
 
 def over_kt(amount: np.ndarray, s: Steps, power: float) -> tuple[np.ndarray, np.ndarray]:
-    """Two series: the ratio of their means is that of an amount per time, over kT^power.
+    """Return two series whose ratio of means is that of an amount per time over kT^power.
 
-    To first order, so that its error knows how the amount follows a kT that changes.
+    It is exact to first order, so that the error includes how the amount follows a varying kT.
     """
     kt = float(np.average(s.kt, weights=s.time))
     return amount * kt**-power, s.time * (1 + power * (s.kt / kt - 1))
 
 
 def virial_over_kt(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Series whose ratio of means is Z - 1, by the virial."""
+    """Return two series whose ratio of means is Z - 1, by the virial."""
     s = steps(run, skip)
     return over_kt(s.virial / (2 * run.n_disks), s, 1)
 
@@ -689,7 +689,7 @@ def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
 
 def has_log(run: Run) -> bool:
-    """Whether the collisions of the run are in its file."""
+    """Whether the file contains an event log."""
     return bool(run.parameter("output", "event_log", False))
 
 

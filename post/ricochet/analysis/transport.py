@@ -52,7 +52,7 @@ MOMENTS = ("viscosity", "bulk_viscosity", "conductivity")  # that grow from mome
 
 
 def in_step(times: np.ndarray) -> bool:
-    """Whether these times, two and more, are equally far apart."""
+    """Whether these times, two or more, are equally spaced."""
     steps = np.diff(times)
     return bool(np.ptp(steps) <= CLOSE * steps[0])
 
@@ -61,16 +61,16 @@ def in_step(times: np.ndarray) -> bool:
 
 
 def lags(frames: int, per_decade: int = 12) -> np.ndarray:
-    """Whole numbers of frames, in logarithmic steps, up to half the run."""
+    """Return whole numbers of frames in logarithmic steps, up to half the run."""
     last = max(1, frames // 2)
     count = 1 + int(per_decade * np.log10(last))
     return np.unique(np.geomspace(1, last, count).round().astype(int))
 
 
 def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
-    """(T, N, 2) positions, continuous in time, and velocities.
+    """Return positions (T, N, 2), continuous in time, and velocities.
 
-    Relative to the centre of mass, where that moves as at the start.
+    They are relative to the centre of mass where its velocity is conserved.
     """
     kept = td.conserved(run)
     place, velocity = (
@@ -81,9 +81,9 @@ def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
 
 
 def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
-    """In frames: until sound has crossed the box, so that disks feel its size.
+    """Return the lag, in frames, after which sound has crossed the box and disks feel its size.
 
-    Or an eighth of the shortest run.
+    It is at most an eighth of the shortest run.
     """
     run, shortest = runs[0], min(f.stop - f.start for f in frames)
     kt = td.temperature(run).mean
@@ -93,12 +93,12 @@ def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
 
 
 def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean]:
-    """D between the lags `lag` / 2 and `lag`, from the displacements and from the velocities.
+    """Estimate D between the lags `lag` / 2 and `lag`, from displacements and from velocities.
 
-    That is the mean over these lags of d<r^2>/dt / 4, and of half the integral of <v(0) v(t)>.  One
-    origin in time gives one value, so that the error knows what disks remember and share.  Between
-    frames the latter is a cubic curve, whose slopes <v(0) v(t)> are known: off by 0.2 % of D at
-    most, for a memory that falls exponentially, and by far less if D(t) has settled.
+    These are the means over the lags of d<r^2>/dt / 4, and of half the integral of <v(0) v(t)>.
+    Each origin in time contributes one value, so that the error includes all correlations.  Between
+    frames the integral is a cubic curve with the known slopes <v(0) v(t)>: its error is at most 0.2
+    % of D for an exponential correlation, and far less once D(t) is constant.
     """
     step, half = float(run.time[1] - run.time[0]), lag // 2
     x, v = motion(run, frames)
@@ -115,11 +115,11 @@ def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean
 
 
 def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
-    """From the time `start` on, at each sample of the observables.
+    """Return the sampling interval and the Helfand moments of the observables from a time on.
 
-    Their step, and by coefficient the moments (T, C) without their mean growth: of the momentum xy
-    and (xx - yy) / 2, of (xx + yy) / 2, of the energy x and y; all relative to the centre of mass.
-    Raises RunError where the run has not summed them up, or not equally far apart in time.
+    By coefficient these are the moments (T, C) without their mean growth: of the momentum xy and
+    (xx - yy) / 2, of (xx + yy) / 2, and of the energy x and y; all relative to the centre of mass.
+    Raises RunError if the run has none, or none at equal intervals.
     """
     allow(run, TAKES, "mixture")
     if "helfand_heat" not in run.observables:
@@ -147,24 +147,25 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
 
 
 def squares(moment: np.ndarray, lag: int) -> np.ndarray:
-    """(T - lag,) squares of what the moment (T, C) gains in `lag` samples, mean of the components.
+    """Return squares (T - lag,) of the increments of a moment (T, C) over `lag` samples.
 
-    The mean growth, which is that of the series itself, has taken lag / (T - 1) of them away.
+    They are averaged over components and corrected for the mean growth, which is that of the series
+    itself and removes the share lag / (T - 1).
     """
     gain = moment[lag:] - moment[: len(moment) - lag]
     return np.mean(gain**2, axis=1) / (1 - lag / (len(moment) - 1))
 
 
 def running(moment: np.ndarray, step: float, at: np.ndarray) -> np.ndarray:
-    """Half of the slope of the mean square between each of the lags (in samples) and the last."""
+    """Return half the slope of the mean square between each lag (in samples) and the one before."""
     mean = np.array([squares(moment, lag).mean() for lag in at])
     return np.diff(mean, prepend=0) / np.diff(at, prepend=0) / (2 * step)
 
 
 def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
-    """Half of the slope of the mean square between the lags `lag` / 2 and `lag`.
+    """Estimate half the slope of the mean square between the lags `lag` / 2 and `lag`.
 
-    One origin in time gives one value, as for the diffusion coefficient.
+    Each origin in time contributes one value, as for the diffusion coefficient.
     """
     half = lag // 2
     near, far = squares(moment, half), squares(moment, lag)
@@ -175,7 +176,7 @@ def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
 
 
 class Found(NamedTuple):
-    """A coefficient at one packing fraction, over Enskog's."""
+    """A transport coefficient at one packing fraction, over that of Enskog's theory."""
 
     members: list[SeriesMean]  # of the runs
     curve: Curve  # against the lag, in mean free times
@@ -221,7 +222,7 @@ def enskog_of(run: Run, reduced: bool = False) -> dict[str, float]:
 
 
 def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
-    """Viscosities and, but of a mixture, conductivity."""
+    """Return the viscosities and, of equal disks, the conductivity."""
     each = [moments(run, start) for run, start in zip(runs, starts, strict=True)]
     theories = [enskog_of(run, reduced=True) for run in runs]
     units = [enskog_of(run) for run in runs]
@@ -260,7 +261,7 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
 
 
 def frames_in_step(run: Run, start: float) -> slice:
-    """Frames in equilibrium that are equally far apart, as all but the last must be."""
+    """Return the equally spaced frames in equilibrium, without the last one."""
     frames = slice(int(np.searchsorted(run.time, start)), run.n_frames - 1)
     if len(run.time[frames]) < 17 or not in_step(run.time[frames]):
         raise RunError(
@@ -271,7 +272,7 @@ def frames_in_step(run: Run, start: float) -> slice:
 
 
 def of_displacements(runs: list[Run], starts: list[float]) -> Found:
-    """The diffusion coefficient."""
+    """Return the diffusion coefficient."""
     frames = [frames_in_step(run, start) for run, start in zip(runs, starts, strict=True)]
     lag = diffusion_lag(runs, frames)
     at, pairs = lags(4 * lag), list(zip(runs, frames, strict=True))

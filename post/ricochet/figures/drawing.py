@@ -40,7 +40,7 @@ LABELS = {
 
 
 def caption(runs: list[Run]) -> str:
-    """What a reader must know: number of disks, restitution, what else varies, seeds."""
+    """Return the number of disks, restitution, varying parameters and seeds, for a figure."""
     parts = [f"N = {listed({run.n_disks for run in runs})}"]
     restitutions = {run.restitution for run in runs}
     if all(map(np.isfinite, restitutions)):
@@ -56,19 +56,19 @@ def caption(runs: list[Run]) -> str:
 
 
 def titled(runs: list[Run]) -> str:
-    """Title of the input and what else a reader must know."""
+    """Return the title of the input followed by the caption."""
     title = str(runs[0].parameter("run", "title", ""))
     return "\n".join(filter(None, (title, caption(runs))))
 
 
 def listed(values: set[float]) -> str:
-    """A few numbers, or from where to where they go."""
+    """Return a few numbers as text, or the first and the last of many."""
     words = [f"{value:g}" for value in sorted(values)]
     return ", ".join(words) if len(words) < 5 else f"{words[0]} to {words[-1]}"
 
 
 def numbers_of(run: Run) -> dict[str, float]:
-    """The numbers of the input that say what system it is, by name, less those of any caption."""
+    """Return the numbers of the input that identify a system, without those of captions."""
     found = {**run.parameters.get("box", {}), **run.parameters.get("contact", {})}
     if found.get("wall_restitution") == run.restitution:
         del found["wall_restitution"]
@@ -89,21 +89,21 @@ def numbers_of(run: Run) -> dict[str, float]:
 
 
 def colours(count: int, first: int = 0) -> list[str]:
-    """A colour for each of so many things, from the `first` of COLOURS on; of many from a scale."""
+    """Return so many colours: from `COLOURS`, starting at `first`, or from a colour map."""
     if first + count <= len(COLOURS):
         return COLOURS[first : first + count]
     return [to_hex(colour) for colour in plt.get_cmap()(np.linspace(0, 0.9, count))]
 
 
 def panel_grid(count: int, aspect: float) -> tuple[int, int]:
-    """Rows and columns for `count` panels of this height over width, wider than high."""
+    """Return rows and columns for `count` panels of this height over width."""
     columns = int(np.clip(np.ceil(np.sqrt(count * aspect * 1.4)), 1, count))
     rows = int(np.ceil(count / columns))
     return rows, int(np.ceil(count / rows))
 
 
 def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
-    """(..., N) the number that colours each disk, see `LABELS`; psi6 of one frame only."""
+    """Return the number (..., N) that colours each disk, see `LABELS`."""
     if colour == "collisions" and run.event_count is not None:
         return run.event_count[as_index(frame)].astype(float)
     if colour == "psi6":
@@ -113,9 +113,9 @@ def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
 
 
 def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
-    """The upper end of a scale for a film, without the few largest values.
+    """Return the upper end of a colour scale for a film; the few largest values lie above it.
 
-    From some frames, or from the last one: disks are displaced ever farther.
+    It is taken from some frames, or from the last one for displacements, which keep growing.
     """
     some = [] if colour == "displacement" else frames[:: max(1, len(frames) // 40)]
     values = values_of(run, sorted({*some, frames[-1]}), colour)
@@ -124,12 +124,12 @@ def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
 
 
 def colour_map(colour: str) -> str:
-    """The colours of values; a direction comes back to where it was."""
+    """Return the name of the colour map; it is cyclic for directions."""
     return "hsv" if colour == "psi6" else "viridis"
 
 
 def chosen_colour(run: Run, wish: str | None) -> str:
-    """The wish if the run has the data; without one by species where there are several."""
+    """Return the wished colouring, or the default of the run; refuse what it has no data for."""
     known = ("species", *LABELS)
     if wish is not None and wish not in known:
         hint = did_you_mean(wish, known)
@@ -140,21 +140,21 @@ def chosen_colour(run: Run, wish: str | None) -> str:
 
 
 def aspect_of(run: Run) -> float:
-    """Height over width of what is drawn."""
+    """Return height over width of the box with its moving sides."""
     width, height = run.bounds[1] - run.bounds[0]
     return height / width
 
 
 def lone(x: np.ndarray) -> dict[str, Any]:
-    """Style of a curve: a single point is not seen without a marker."""
+    """Return the style of a curve: a single point needs a marker."""
     return {"marker": "o", "ms": 3, "clip_on": False} if len(x) < 2 else {}
 
 
 def draw_box(axes: Axes, run: Run, time: float | None = None) -> None:
-    """Walls solid, periodic sides dashed, obstacles grey; equal scales, ticks at the corners.
+    """Draw walls solid, periodic sides dashed, obstacles grey; equal scales, ticks at the corners.
 
-    Sides that move are drawn where they are at this time [their own places], what lies beyond them
-    grey.  Walls that heat or slide say so.
+    Moving sides are drawn at their positions at this time [their mean positions]; the area beyond
+    them is grey.  Thermal and sliding walls are labelled.
     """
     low, high = run.bounds
     (x0, y0), (x1, y1) = (run.lower, run.upper) if time is None else run.corners_at(time)
@@ -182,7 +182,7 @@ def draw_box(axes: Axes, run: Run, time: float | None = None) -> None:
 
 
 def draw_circles(axes: Axes, run: Run, grey: dict[str, Any]) -> None:
-    """Circular obstacles, with those of their periodic images that reach into the box."""
+    """Draw circular obstacles, with the periodic images that reach into the box."""
     if any(obstacle.inside for obstacle in run.obstacles):
         axes.add_patch(Rectangle((run.lower[0], run.lower[1]), *run.edges, zorder=0, **grey))
     width = min(1.0, 20 / np.sqrt(max(len(run.obstacles), 1)))  # of lines: many circles are small
@@ -201,7 +201,7 @@ def draw_circles(axes: Axes, run: Run, grey: dict[str, Any]) -> None:
 
 
 def name_walls(axes: Axes, run: Run) -> None:
-    """Along each side and wall its temperature, and how fast and where to it slides."""
+    """Label each side and wall with its temperature and surface velocity."""
     (x0, y0), (x1, y1) = run.bounds
     ends_of = [((x0, y0), (x0, y1), 1), ((x1, y0), (x1, y1), -1)]
     ends_of += [((x0, y0), (x1, y0), -1), ((x0, y1), (x1, y1), 1)]
@@ -230,7 +230,7 @@ def name_walls(axes: Axes, run: Run) -> None:
 
 
 def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Indices and places of the disks, and of their periodic images that reach into the box."""
+    """Return indices and positions of disks and of their images that reach into the box."""
     which, places = [np.arange(run.n_disks)], [position]
     for shift in periods(run):
         if shift.any():
@@ -244,9 +244,9 @@ def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) -> EllipseCollection:
-    """Disks of true size at `position` (N, 2) and their periodic images.
+    """Draw disks of true size at `position` (N, 2), and their periodic images.
 
-    Of their style `array` (N,) colours them by value, or else `facecolors`.
+    `array` (N,) in `style` colours them by value, `facecolors` directly.
     """
     which, places = with_images(run, position)
     size, flat = 2 * run.radius[which], np.zeros(len(which))
@@ -259,7 +259,7 @@ def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) ->
 
 
 def radius_marks(axes: Axes, run: Run, frame: int) -> LineCollection | None:
-    """A radius of each disk that shows how it has turned; None where disks have no orientation."""
+    """Draw a radius of each disk at its orientation; return None if disks have none."""
     if "orientation" not in run.disk_data:
         return None
     which, places = with_images(run, run.position[frame])
@@ -272,37 +272,37 @@ def radius_marks(axes: Axes, run: Run, frame: int) -> LineCollection | None:
 
 
 def band(axes: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, **style: Any) -> None:
-    """A line with its error."""
+    """Draw a line with its error band."""
     axes.plot(x, y, **style)
     axes.fill_between(x, y - error, y + error, color=style["color"], alpha=0.25, lw=0)
 
 
 def bars(axes: Axes, height: Estimate, bins: np.ndarray, **style: Any) -> None:
-    """A histogram with its errors."""
+    """Draw a histogram with its errors."""
     axes.stairs(height.mean, bins, **style)
     middle = (bins[1:] + bins[:-1]) / 2
     axes.errorbar(middle, *height, fmt="none", color=style["color"], elinewidth=1)
 
 
 def noise_band(axes: Axes, count: int, colour: str) -> None:
-    """Within which a2 of so many speeds lies in 95 % of all cases if they are Maxwellian."""
+    """Draw the band that contains a2 of Maxwellian speeds with a probability of 95 %."""
     reach = 2 * kurtosis_noise(count)
     axes.axhspan(-reach, reach, color=colour, alpha=0.12, lw=0, zorder=0)
 
 
 def dilute_limit(axes: Axes, points: np.ndarray, of: str = "") -> None:
-    """Points (P, 2) of a solution of the Boltzmann equation as open circles."""
+    """Draw points (P, 2) of a solution of the Boltzmann equation as open circles."""
     label = f"{of}dilute limit (Boltzmann equation)"
     axes.plot(*points.T, ls="", marker="o", mfc="none", color="black", label=label)
 
 
 def species_colours(run: Run) -> list[str]:
-    """A colour for each disk."""
+    """Return a colour for each disk."""
     return [COLOURS[(s - 1) % len(COLOURS)] for s in run.species]
 
 
 def species_legend(figure: Figure, run: Run) -> None:
-    """Which colour is which species, below all panels; nothing for a single one."""
+    """Add a legend of the species below all panels, if there are several."""
     handles = [
         Line2D([], [], ls="", marker="o", color=COLOURS[k % len(COLOURS)])
         for k in range(len(run.names))
@@ -312,7 +312,7 @@ def species_legend(figure: Figure, run: Run) -> None:
 
 
 def warn(figure: Figure, notes: Sequence[str]) -> None:
-    """Below the figure, what speaks against its numbers; at most three notes in full."""
+    """Write the notes below a figure, at most three of them in full."""
     if not notes:
         return
     rest = len(notes) - 3
@@ -327,7 +327,7 @@ def warn(figure: Figure, notes: Sequence[str]) -> None:
 
 
 def save(figure: Figure, path: Path, runs: list[Run], title: str) -> None:
-    """Write the figure, its source in the metadata; missing folders are made."""
+    """Write the figure with its sources in the metadata; make missing folders."""
     sources = ", ".join(run.path.name for run in runs[:20]) + (", ..." if len(runs) > 20 else "")
     commits = sorted({str(run.provenance.get("git_commit", "unknown")) for run in runs})
     origin = f"{sources} (ricochet {', '.join(commits)})"

@@ -9,10 +9,10 @@ from ..reading.reader import Run
 
 
 class Film:
-    """A film of a run, which a notebook shows and `save` writes to a file."""
+    """A film of a run, which a notebook displays and `save` writes to a file."""
 
     def __init__(self, run: Run, colour: str | None = None, height: int = 700):
-        """`colour` is that of the disks: "species", "speed", ...; `height` is in pixels."""
+        """Make the page; `colour` is that of the disks, `height` is in pixels."""
         if str(SCRIPTS) not in sys.path:
             sys.path.append(str(SCRIPTS))
         import player
@@ -24,5 +24,5 @@ class Film:
         return f'<iframe title="a film" style="{style}" srcdoc="{html.escape(self.page)}"></iframe>'
 
     def save(self, path: str | Path) -> None:
-        """Write the page, which any browser opens."""
+        """Write the page to a file that any browser opens."""
         Path(path).write_text(self.page, encoding="utf-8")
