@@ -37,9 +37,12 @@ contains
     call check_name(text_of(path), error)
     if (.not. allocated(error)) call input_from_text(session%input%text, session%input%path, session%input%overrides, input, &
       error, stepped=.true.)
-    if (.not. allocated(error)) call new_simulation(input, silent, first, error)
-    first%changes = session%sim%changes               ! which makes work an observable
-    if (first%changes > 0) input%changes = session%input%changes
+    if (session%sim%changes > 0) then                 ! the start had another input
+      first = session%sim
+      input%changes = session%input%changes
+    else if (.not. allocated(error)) then
+      call new_simulation(input, silent, first, error)
+    end if
     input%saved_at = session%sim%time()
     if (.not. allocated(error)) call output%claim(text_of(path), error)
     if (.not. allocated(error)) call output%open(input, first, force /= 0, error)

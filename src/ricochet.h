@@ -56,8 +56,8 @@ int ricochet_next_events(ricochet *, int most, double records[][6]);
 
 /* --- libricochet_files.so --- */
 
-/* Writes OUT.h5.part, as a run of this input would have left it that was stopped now, but with samples of its start only:
-   `ricochet INPUT -o OUT.h5 --resume` goes on from it. `path` is OUT.h5. */
+/* Writes OUT.h5.part, as a run of this input would have left it that was stopped now, but with samples of its start only,
+   or after a change with samples of now only: `ricochet INPUT -o OUT.h5 --resume` goes on from it. `path` is OUT.h5. */
 int ricochet_save(ricochet *, const char *path, int force, char *message, int room);
 
 /* The simulation of the last checkpoint of a run, finished or not. */

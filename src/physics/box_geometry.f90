@@ -55,6 +55,7 @@ module box_geometry
     procedure :: has_rough_walls
     procedure :: highest_temperature
     procedure :: highest_speed
+    procedure :: does_work
     procedure :: gives_energy
     procedure :: reach
     procedure :: side_position
@@ -237,12 +238,20 @@ contains
     highest = max(maxval(abs(self%surface%law%speed)), maxval(self%surface%motion%top_speed()), abs(self%slip()))
   end function highest_speed
 
+  !> Whether surfaces can do work on disks: they slide or move, disks push them, or the box is sheared.
+  pure function does_work(self) result(yes)
+    class(box_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%highest_speed() > 0 .or. any(self%surface%motion%kind == piston)
+  end function does_work
+
   !> Whether disks can get energy from a wall, or from shear.
   pure function gives_energy(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
 
-    yes = self%highest_temperature() > 0 .or. self%highest_speed() > 0 .or. any(self%surface%motion%kind == piston)
+    yes = self%highest_temperature() > 0 .or. self%does_work()
   end function gives_energy
 
   !> How far sides may be from their places, and disks beyond: left and bottom, right and top.

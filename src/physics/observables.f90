@@ -69,7 +69,7 @@ contains
       call list%add("obstacle_collisions", real([sum(hits(n_sides + 1:))], real64), is_count=.true.)
     end associate
     if (sim%box%highest_temperature() > 0 .or. sim%changes > 0) call list%add("heat", [sim%tally%total(heat)])
-    if (sim%box%highest_speed() > 0 .or. sim%changes > 0) call list%add("work", [sim%tally%total(work)])
+    if (sim%box%does_work() .or. sim%changes > 0) call list%add("work", [sim%tally%total(work)])
     if (sim%with%stress) then
       call list%add("virial_tensor", sim%tally%total([stress, stress + 1, stress + 2, stress + 3]))
       call list%add("kinetic_tensor", sums(tensor, 0))

@@ -32,7 +32,12 @@ MOST_EVENTS, MOST_STEPS, MOST_KICKS = 600, 300, 30  #: between two changes
 DEEPEST = 1e-12  #: overlap, of the larger of diameter and box
 LAW = ("restitution", "rule", "tangential_restitution", "friction", "temperature", "speed")
 MOTION = ("motion", "velocity", "amplitude", "period", "phase", "start_time", "end_time")
-MOTION += ("mass", "force", "position")
+MOTION += ("mass", "force")
+DRIVE = ("kind", "interval", "strength", "keep_momentum", "temperature", "fraction", "speed")
+DRIVE += ("rotational_diffusion", "species")
+CONTACT = ("restitution", "pair_restitution", "wall_restitution", "restitution_law")
+CONTACT += ("restitution_speed", "wall_rule", "tangential_restitution", "friction", "inertia")
+CONTACT += ("wall_tangential_restitution", "wall_friction")
 SAMPLED = ("total_energy", "dissipated_energy", "heat", "work", "drive_energy")
 SAMPLED += ("all/kinetic_energy",)
 #: Features whose course depends on more than the state of the disks at one moment.
@@ -55,7 +60,7 @@ class Change(NamedTuple):
 
 def settings(group: str, words: str, reset: tuple[str, ...] = ()) -> list[str]:
     """GROUP.VARIABLE=VALUE of the words of a group; variables to reset get their defaults."""
-    values = dict(re.findall(r"(\w+) = ('\w+'|[^ ]+(?:, [^ ]+)*)", words))
+    values = dict(re.findall(r"(\w+) = ('\w+'|[^ ,]+(?:, [^ ,]+)*)", words))
     return [f"{group}.{name}={values.get(name, '')}" for name in {**dict.fromkeys(reset), **values}]
 
 
@@ -66,13 +71,16 @@ def drawn_change(simulation: Simulation, draw: Draw) -> Change:
     walls = sorted(wall for wall in walls if wall.startswith(("obstacle.", "wall.")))
     sides = [f"side.{name}" for k, name in enumerate(SIDES) if not draw.periodic[k // 2]]
     kinds = ["velocity", "velocity", "contact", "box", "drive", *["law"] * bool(walls + sides)]
-    match rng.choice([*kinds, *["motion"] * bool(sides)]):
+    match rng.choice([*kinds, *["motion"] * min(len(sides), 3)]):
         case "velocity":
             return Change([], drawn_velocity(simulation, draw))
         case "law":
             return Change(settings(rng.choice(walls + sides), draw.law(), LAW))
         case "motion":
             words = draw.side_motion() if draw.chance(0.8) else ""
+            words = re.sub(
+                "(?<=_time = )[^ ]+", lambda t: repr(float(t[0]) + simulation.time), words
+            )
             return Change(settings(rng.choice(sides), words, MOTION))
         case "box":
             unit = rng.choice([0, 1, 10, 1e6]) * draw.speed**2 / max(draw.edges)
@@ -81,9 +89,11 @@ def drawn_change(simulation: Simulation, draw: Draw) -> Change:
         case "drive":
             driven, draw.driven = draw.driven, True
             words, draw.driven = draw.drive(), driven
-            names = tuple(re.findall(r"(\w+) =", words))
-            return Change(settings("drive", words if draw.chance(0.7) else "", names))
-    return Change(settings("contact", draw.contact()))
+            return Change(settings("drive", words if draw.chance(0.7) else "", DRIVE))
+    words = draw.contact()
+    if simulation.parameters["contact"]["contact_time"] == 0:
+        words = re.sub(" contact_time = [^ ]+", "", words)
+    return Change(settings("contact", words, CONTACT))
 
 
 def drawn_velocity(simulation: Simulation, draw: Draw) -> np.ndarray:
@@ -149,8 +159,10 @@ class Course:
                 self.look(simulation)
                 self.attempt(simulation, change)
                 self.look(simulation)
+            before = simulation.events
             self.advance(simulation)
             self.look(simulation)
+            self.lively = simulation.events > before
         except ProgramError as error:
             self.message = str(error)
         self.judge_energy()
@@ -274,7 +286,12 @@ class Course:
             names, columns = [*names, "omega"], [*columns, simulation.angular_velocity]
         Path("frame.txt").write_text(starting_file(names, np.column_stack(columns)))
         text = re.sub(r"&species.*?\n/\n", "", text, flags=re.DOTALL)
-        new = Simulation(text + "&species name = 's0' file = 'frame.txt' /\n")
+        try:
+            new = Simulation(text + "&species name = 's0' file = 'frame.txt' /\n")
+        except ProgramError as error:
+            if not re.search("not wholly|overlaps", str(error)):  # by rounding
+                self.faults.append(f"no start from the last frame: {error}")
+            return
         begin, met = simulation.time, set()
         events = zip(simulation.next_events(20), new.next_events(20), strict=False)
         for (time, i, j), (new_time, new_i, new_j) in events:
@@ -329,7 +346,8 @@ def faults(program: Path, seed: str) -> list[str]:
         elif (first.changes, first.input) != (other.changes, without_ways(other.input)):
             course.faults.append(f"{name} has another input")
     if not course.message:
-        course.start_from_last_frame(first)
+        if course.lively:
+            course.start_from_last_frame(first)
         course.continue_by_program(first)
     return course.faults
 
@@ -406,3 +424,42 @@ def test_a_cold_gas_ends_at_the_same_time_in_memory_and_by_the_program(
     ran(program, "gas.nml", "-o", "gas.h5", "--resume", f"--set=stop.time={end}", check=True)
     assert (gas.advance(time=end).time == end) is reached
     assert read_run("gas.h5").time[-1] == gas.time
+
+
+def test_a_piston_without_force_does_work():
+    """Disks push it; it pushes back others."""
+    disks = {"name": "a", "count": 30, "packing_fraction": 0.1, "speed": 1}
+    piston = {"name": "right", "motion": "piston", "mass": 10, "force": 0}
+    gas = Simulation({"species": disks, "side": piston}).advance(events=300)
+    assert gas.observable("work") != 0
+    assert gas.observable("total_energy") - gas.observable("work") == pytest.approx(15, rel=1e-12)
+
+
+def test_a_held_piston_is_released_where_it_is_and_held_there():
+    """At any time; the saved input has its position."""
+    disks = {"name": "a", "count": 30, "packing_fraction": 0.1, "speed": 1}
+    gas = Simulation({"species": disks}).advance(time=0.5)
+    gas.change({"side.right.motion": "piston", "side.right.mass": 20, "side.right.force": 25})
+    assert gas.observable("sides/right/position") == 1
+    gas.advance(time=1.7)
+    place = gas.observable("sides/right/position")
+    assert 0 < place != 1
+    undone = {f"side.right.{name}": None for name in ("mass", "force")}
+    gas.change({"side.right.motion": "still", **undone}).advance(time=2.9)
+    assert gas.parameters["side"]["right"]["position"] == place
+    assert np.all(gas.position[:, 0] < place - gas.radius[0] + 1e-12)
+
+
+def test_a_changed_simulation_whose_start_would_not_fit_is_saved(program, tmp_path, monkeypatch):
+    """A disk of the start lies where the side is held now."""
+    monkeypatch.chdir(tmp_path)
+    disks = {"name": "a", "radius": 0.05, "position": [0.3, 0.5, 0.94, 0.5], "speed": 1}
+    side = {"name": "right", "motion": "constant_velocity", "velocity": 0.5, "end_time": 1}
+    gas = Simulation({"species": disks, "side": side}).advance(time=0.4)
+    undone = {f"side.right.{name}": None for name in ("velocity", "end_time")}
+    gas.change({"side.right.motion": "still", **undone}).advance(time=0.7)
+    gas.save("gas.h5", input="gas.nml")
+    ran(program, "gas.nml", "-o", "gas.h5", "--resume", "--set=stop.time=2", check=True)
+    run = read_run("gas.h5")
+    assert run.time[0] == 0.7 and run.time[-1] == 2
+    assert np.array_equal(run.position[-1], gas.advance(time=2).position)

@@ -105,8 +105,9 @@ class Simulation:
     def save(self, path: str | Path, force: bool = False, input: str | Path | None = None) -> Path:
         """Write `path`.part, from which `ricochet INPUT -o path --resume` goes on; its path.
 
-        It has the samples of the start, and the state of now.  After a change INPUT is another than
-        that of the start: the file `input`, which this writes, too.  That is a new file, or one
+        It has the samples of the start (after a change: of now), and the state of now.  After a
+        change INPUT is another than that of the start: the file `input`, which this writes, too.
+        That is a new file, or one
         that `save` has written and nobody has edited since.
         """
         path = Path(path)
