@@ -32,7 +32,7 @@ work(scene)"""
 
 
 def routes(lab: Lab) -> dict:
-    """What answers at each address."""
+    """Return the function that answers at each address."""
     data = {"table": lab.table, "inputs": chooser([*lab.inputs.values()])}
 
     async def formed(request: web.Request) -> web.Response:
@@ -63,7 +63,7 @@ async def open_lab(lab: Lab, port: int, visit: bool) -> None:
 
 
 def port(text: str) -> int:
-    """The number of a port."""
+    """Parse a port number."""
     if not text.isdecimal() or int(text) > 65535:
         raise ArgumentTypeError(f"'{text}' is not a port: 0 (any that is free) to 65535")
     return int(text)

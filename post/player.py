@@ -56,10 +56,10 @@ MOST_AT_ONCE = 200000  # disks of the frames that are read together
 
 
 def frames_that_fit(run: Run, room: float) -> int:
-    """How many frames the file can hold.
+    """Return how many frames the file can hold.
 
     Each disk needs two 16-bit positions and velocities, 8 bits of collisions, 32 bits of an angle.
-    Up to half of the room is for collisions between frames.
+    Up to half of the size is for collisions between frames.
     """
     more = (run.event_count is not None) + (run.image is not None)
     more += 4 * ("orientation" in run.disk_data)
@@ -70,18 +70,18 @@ def frames_that_fit(run: Run, room: float) -> int:
 
 
 def quantities(run: Run) -> list[str]:
-    """What disks can be coloured by, apart from their species."""
+    """Return the quantities that can colour disks, besides their species."""
     return ["speed", "displacement"] + ["collisions"] * (run.event_count is not None)
 
 
 def in_room(run: Run, place: np.ndarray) -> np.ndarray:
-    """Places in units of what the page shows: the box, with room for sides that move."""
+    """Return positions in units of the visible region: the box and its moving sides."""
     lower, upper = run.bounds
     return (place - lower) / (upper - lower)
 
 
 def sides(run: Run) -> list[dict]:
-    """Of each side its place, how it moves about it or was pushed, heats and slides."""
+    """Return position, motion, temperature and surface velocity of each side."""
     places = [end[axis] for axis in (0, 1) for end in (run.lower, run.upper)]
     found = [
         {"place": float(side.get("position", at))}
@@ -95,23 +95,23 @@ def sides(run: Run) -> list[dict]:
 
 
 def thinned(count: int, most: int) -> np.ndarray:
-    """Numbers of at most so many of `count` samples."""
+    """Return at most so many of the numbers 0 to `count` - 1, evenly spread."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
 
 def laws_of(run: Run, group: str) -> list[dict]:
-    """How each obstacle or wall heats and slides."""
+    """Return temperature and surface velocity of each obstacle or wall."""
     rows = rows_of(run.parameters.get(group, {}))
     laws = [{k: float(row[k]) for k in LAWS[-2:] if known(row.get(k))} for row in rows]
     return [laws[k] for k in groups_of_rows(run.parameters, group)]
 
 
 def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
-    """What differs from frame to frame, of all disks, read in parts.
+    """Return the arrays that change from frame to frame, of all disks, read in parts.
 
-    Positions in units of the room, as 16-bit integers, velocities in those of the fastest component
-    in the frame, likewise; of few disks with every digit.  Collisions as places 0 to 255 on their
-    scale up to `top`; periods crossed along x and y since the frame before, four bits each; angles.
+    Positions are 16-bit integers in units of the visible region, velocities in units of the fastest
+    component in the frame; of few disks they keep every digit.  Collisions are places 0 to 255 on
+    their scale up to `top`; periods crossed along x and y since the last frame take four bits each.
     """
     found: dict[str, bytearray] = defaultdict(bytearray)
     at_once = max(1, MOST_AT_ONCE // run.n_disks)
@@ -139,10 +139,10 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
 
 
 def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[str, np.ndarray]]:
-    """Collisions per disk in each frame, events and paths; these need a log that is not too long.
+    """Return collisions per disk in each frame, events and paths, from a log that is not too long.
 
-    Events as their times and partners.  Of each gap between two frames the number of turns; of each
-    turn its disk, and three numbers: when, as share of the gap, and the velocity afterwards.
+    Events are times and partners.  Each interval between frames has a number of collisions; each
+    collision has a disk, a share of the interval, and the velocity afterwards.
     """
     exact, facts = run.n_disks <= FEW_DISKS, {"known": False, "events": False}
     try:
@@ -171,7 +171,7 @@ def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[st
 
 
 def species(run: Run) -> list[dict]:
-    """What the disks of each species have in common."""
+    """Return the common properties of the disks of each species."""
     colours = [c if c != "#000000" else "#8a8a8a" for c in map(to_hex, COLOURS)]
     return [
         {
@@ -187,7 +187,7 @@ def species(run: Run) -> list[dict]:
 
 
 def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """The radii that there are, as few as a byte can number, and which of them each disk has."""
+    """Return at most 256 different radii, and the number of the radius of each disk."""
     radii = np.unique(run.radius)
     if len(radii) > MOST_RADII:
         radii = np.geomspace(radii[0], radii[-1], MOST_RADII)
@@ -195,10 +195,10 @@ def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
 
 
 def curves(run: Run) -> dict:
-    """Of as many samples as a plot can show: time, energies of each species, pressure.
+    """Return time, energies of each species and pressure, with as many samples as a plot can show.
 
-    The observables are closer together than frames.  What is not there is None, and so is the
-    pressure before the first collision: a bed that nobody has hit has none.
+    Observables are more frequent than frames.  Missing values are None, and so is the pressure
+    before the first collision.
     """
     series, found = {}, {}
     for name in (
@@ -228,9 +228,9 @@ def curves(run: Run) -> dict:
 
 
 def scene(run: Run) -> tuple[dict, dict]:
-    """What stays as it is: the box and what stands in it, species, and of each disk which it has.
+    """Return the constant part of a film: box, obstacles, species, properties of disks.
 
-    `run` may also be anything else that has these attributes of a run.
+    `run` may be any object with these attributes of a run.
     """
     radii, own = radii_of(run)
     facts = {
@@ -267,7 +267,7 @@ def film(
     traced: list[int],
     room: float = ROOM,
 ) -> tuple[dict, dict]:
-    """What the page needs to know, and the arrays that move as name -> bytes."""
+    """Return the facts for the page, and the arrays that change as name -> bytes."""
     tops = {name: scale_top(run, frames, name) for name in quantities(run)}
     told, blocks = told_by_log(run, frames, room / 2 // TURN)
     blocks = {name: block.tobytes() for name, block in blocks.items()}
@@ -288,12 +288,12 @@ def film(
 
 
 def texts(facts: dict, blocks: dict) -> dict:
-    """The film in letters: what every page can hold, and the server of --live can send."""
+    """Return the film as text, for a page or for the server of --live."""
     return {"facts": facts, "blocks": {k: base64.b64encode(v).decode() for k, v in blocks.items()}}
 
 
 def page(run: Run, film: dict | None) -> str:
-    """The whole file; without a film it asks the server of --live for one."""
+    """Return the whole page; without a film it asks the server of --live for one."""
     title = str(run.parameter("run", "title", "")) or run.path.stem
     commit = run.provenance.get("git_commit", "unknown")
     words = {
@@ -306,12 +306,12 @@ def page(run: Run, film: dict | None) -> str:
 
 
 def view() -> str:
-    """The page as a part of the laboratory, which tells it what to show."""
+    """Return the page as a part of the laboratory, which controls it."""
     return paged(None, dict.fromkeys(("title", "caption", "warning", "source"), ""))
 
 
 def paged(film: dict | None, words: dict[str, str]) -> str:
-    """The page with these words; without a film it may ask its server."""
+    """Return the page with these texts; without a film it may ask its server."""
     style = text_of("style.css")
     script = "\n".join(text_of(f"{name}.js") for name in SCRIPTS)
     fillings = {name: html.escape(text) for name, text in words.items()} | {
@@ -324,7 +324,7 @@ def paged(film: dict | None, words: dict[str, str]) -> str:
 
 
 def lab_page(data: dict) -> str:
-    """The laboratory: `data` has the number of the page, the table of variables, the inputs."""
+    """Return the page of the laboratory; `data` has its number, the variables, the inputs."""
     style, script = text_of("style.css") + text_of("lab.css"), text_of("lab.js")
     more = "connect-src 'self'", "img-src data:", "frame-src 'self'"
     fillings = {"policy": policy(style, script, *more), "style": style, "script": script}
@@ -332,7 +332,7 @@ def lab_page(data: dict) -> str:
 
 
 def chooser(paths: list[Path]) -> list[dict]:
-    """What the laboratory shows of each input: title, subject, sentence, sliders, picture."""
+    """Return the entry of each input in the laboratory: title, text, sliders, picture."""
     known = json.loads((INPUTS / "chooser.json").read_text(encoding="utf-8"))
     found = []
     for path in paths:
@@ -347,29 +347,29 @@ def chooser(paths: list[Path]) -> list[dict]:
 
 
 def picture_of(path: Path) -> str:
-    """The picture of an input, as a page can hold it."""
+    """Return the picture of an input as a data URL."""
     drawn = (INPUTS / "pictures" / f"{path.stem}.png").read_bytes()
     return f"data:image/png;base64,{base64.b64encode(drawn).decode()}"
 
 
 def filled(name: str, fillings: dict[str, str]) -> str:
-    """A page with its blanks filled in."""
+    """Return a page with its placeholders replaced."""
     blank = re.compile("{{(" + "|".join(fillings) + ")}}")
     return blank.sub(lambda found: fillings[found[1]], text_of(name))
 
 
 def text_of(name: str) -> str:
-    """A part of the page."""
+    """Return a part of the page."""
     return (PAGE / name).read_text(encoding="utf-8")
 
 
 def enclosed(data: object) -> str:
-    """Data as a script of a page may hold it: no sign of it opens a tag."""
+    """Return data as a script element can contain it, without an opening tag."""
     return json.dumps(data, allow_nan=False).replace("<", "\\u003c")
 
 
 def policy(style: str, script: str, *more: str) -> str:
-    """What a page may do: run its own script in its own style, and load nothing but `more`."""
+    """Return the content security policy: own script and style only, and no requests but `more`."""
     rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'", *more]
     for tag, own in (("script", script), ("style", style)):
         digest = base64.b64encode(hashlib.sha256(own.encode()).digest()).decode()
@@ -378,14 +378,14 @@ def policy(style: str, script: str, *more: str) -> str:
 
 
 def chosen_film(run: Run, args: Namespace, room: float) -> tuple[list[int], tuple[dict, dict]]:
-    """The film that the options ask for, and its frames."""
+    """Return the film that the options request, and its frames."""
     frames = chosen_frames(run, args.frames, args.count or frames_that_fit(run, room))
     traced = chosen_disks(run, args.disks or [])
     return frames, film(run, frames, chosen_colour(run, args.colour), traced, room)
 
 
 def whole(run: Run, colour: str | None = None) -> str:
-    """The page with a film of the whole run, coloured as on the command line."""
+    """Return the page with a film of the whole run, coloured as on the command line."""
     args = Namespace(frames=None, count=None, colour=colour, disks=None)
     return page(run, texts(*chosen_film(run, args, ROOM)[1]))
 

@@ -35,7 +35,7 @@ Table = dict[str, Iterable] | list[dict]  # columns by name, or rows
 
 
 def frame_list(text: str) -> tuple[int | slice, ...]:
-    """Frame numbers and ranges (first:end:step, as in Python) such as '0,10,-1' or '100:200'."""
+    """Parse frame numbers and ranges (first:end:step, as in Python), '0,10,-1' or '100:200'."""
 
     def chosen(part: str) -> int | slice:
         if ":" not in part:
@@ -52,7 +52,7 @@ def frame_list(text: str) -> tuple[int | slice, ...]:
 
 
 def disk_list(text: str) -> list[int]:
-    """Ids of disks such as '1,5,9'."""
+    """Parse ids of disks such as '1,5,9'."""
     try:
         return [int(part) for part in text.split(",")]
     except ValueError:
@@ -61,14 +61,14 @@ def disk_list(text: str) -> list[int]:
 
 
 def positive(text: str) -> int:
-    """A number of things on the command line."""
+    """Parse a whole number above 0."""
     if not text.isdecimal() or int(text) == 0:
         raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
     return int(text)
 
 
 def not_negative(text: str) -> float:
-    """A number on the command line."""
+    """Parse a number from 0 on."""
     value = float(text)
     if not 0 <= value < float("inf"):
         raise argparse.ArgumentTypeError(f"'{text}' is not a number from 0 on")
@@ -98,7 +98,7 @@ SPELLINGS = {"colour": ["--color"]}
 
 
 class Parser(argparse.ArgumentParser):
-    """Wants options in full, and answers a wrong one with the right one."""
+    """A parser that accepts no abbreviations and suggests the right word for a wrong one."""
 
     def parse_args(self, args: Sequence[str] | None = None, namespace=None) -> argparse.Namespace:
         words = joined(sys.argv[1:] if args is None else args)
@@ -120,9 +120,9 @@ class Parser(argparse.ArgumentParser):
 
 
 def finished(paths: list[Path]) -> list[Path]:
-    """The runs that have finished, if any has; the others are counted and named.
+    """Return the finished runs, if there are any, and warn of the others.
 
-    If those of a whole ensemble are given, so are its members without a file.
+    Members of an ensemble without a file are counted too, if all its files are given.
     """
     whole = [path for path in paths if path.suffix != ".part"]
     if not whole:
@@ -140,7 +140,7 @@ def finished(paths: list[Path]) -> list[Path]:
 
 
 def distinct(runs: list[Run]) -> list[Run]:
-    """Each run once: one that ends as another, to the last digit, says nothing of its own."""
+    """Return each run once: runs with identical last states carry the same information."""
     found: dict[bytes, list[Run]] = {}
     for run in runs:
         parts = run.time[-1:], run.position[-1], run.velocity[-1], run.mass, run.radius
@@ -152,7 +152,7 @@ def distinct(runs: list[Run]) -> list[Run]:
 
 
 def joined(words: Iterable[str]) -> list[str]:
-    """The words, with a list such as '-10:' joined to its option, lest it be taken for one."""
+    """Join a list such as '-10:' to its option, because it looks like an option itself."""
     result: list[str] = []
     for word in words:
         if re.fullmatch(r"-\d+[,:][-\d,:]*", word) and result and result[-1].startswith("--"):
@@ -165,12 +165,12 @@ def joined(words: Iterable[str]) -> list[str]:
 def command_line(
     doc: str, output: str, one: bool = False, csv: bool = True, repeated: bool = False, **defaults
 ) -> Parser:
-    """A parser whose help is the script's docstring and whose output has this default.
+    """Return a parser whose help is the script's docstring, with this default output.
 
-    It opens `one` run or any number, as `runs`, each once unless they may be `repeated`, of several
-    those that have finished unless one belongs to the next (`paired`).  It takes --csv if there are
-    numbers to write, and those of the shared `OPTIONS` that are named, with their defaults (None:
-    no default).
+    It opens `one` run or any number of them as `runs`.  Equal runs count once unless they may be
+    `repeated`, and unfinished ones are left out unless runs belong together (`paired`).  There is a
+    --csv if there are numbers to write, and those of the shared `OPTIONS` that are named, with
+    their defaults (None: no default).
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
@@ -190,7 +190,7 @@ def command_line(
 
 
 def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | None) -> list[int]:
-    """Numbers of the frames of --frames [all], at most --count of them, evenly spread."""
+    """Return the frames of --frames [all], at most --count of them, evenly spread."""
     frames: list[int] = []
     for part in which if which is not None else [slice(None)]:
         if isinstance(part, int) and not -run.n_frames <= part < run.n_frames:
@@ -204,9 +204,10 @@ def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | No
 
 
 def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
-    """Frames of the steady state among --frames, --min-separation apart; the last if none is late.
+    """Return frames of the steady state among --frames, --min-separation apart.
 
-    The notes of `args` say if these are fewer than were asked for, or early.
+    If there is none, it is the last one.  The notes of `args` say if these are fewer than
+    requested, or too early.
     """
     frames, start = (
         chosen_frames(run, args.frames, None),
@@ -230,7 +231,7 @@ def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
 
 
 def chosen_disks(run: Run, ids: list[int]) -> list[int]:
-    """Indices of the disks of --disks, whose ids count from 1."""
+    """Return the indices of the disks of --disks, whose ids count from 1."""
     for number in ids:
         if not 1 <= number <= run.n_disks:
             raise RunError(f"{run.path}: no disk {number}, there are {run.n_disks}")
@@ -238,7 +239,7 @@ def chosen_disks(run: Run, ids: list[int]) -> list[int]:
 
 
 def recorded(run: Run, name: str) -> float:
-    """A number above 0 that a run records when it has finished."""
+    """Return a positive number that finished runs record in their provenance."""
     value = float(run.provenance.get(name, 0))
     if value <= 0:
         what = name.replace("_", " ")
@@ -247,18 +248,18 @@ def recorded(run: Run, name: str) -> float:
 
 
 def grouped(runs: Iterable[Run], key: Callable[[Run], float]) -> list[tuple[float, list[Run]]]:
-    """Runs with the same value of `key` together, in ascending order."""
+    """Group runs by the value of `key`, in ascending order."""
     ordered = sorted(runs, key=key)
     return [(value, list(group)) for value, group in groupby(ordered, key=key)]
 
 
 def by_restitution(runs: Iterable[Run]) -> list[tuple[Restitution, list[Run]]]:
-    """Runs of the same restitution, and law of it, together."""
+    """Group runs by restitution and its law."""
     return grouped(runs, lambda run: run.contact_law)
 
 
 def by_packing(runs: Iterable[Run]) -> list[tuple[float, list[Run]]]:
-    """Runs of the same packing fraction together."""
+    """Group runs by packing fraction."""
     return grouped(runs, lambda run: round(packing(run), 6))
 
 
@@ -274,8 +275,8 @@ def report(
 ) -> None:
     """Print the tables, save the figure, write `data` (else the first table) to --csv.
 
-    `notes` say what speaks against the numbers, and so does a run that did not end as it should: on
-    stderr, and on the figure.
+    `notes` are reasons to doubt the numbers.  They appear on stderr and on the figure,
+    together with those of runs that ended early.
     """
     if any(tables):
         print("\n\n".join(text_of(table) for table in tables if table), flush=True)
@@ -296,7 +297,7 @@ def report(
 
 
 def once(notes: Iterable[str], names: set[str]) -> list[str]:
-    """What is said of several runs, but for their names and numbers, once with their number."""
+    """Merge notes about several runs that differ only in names and numbers; add their count."""
     kinds: dict[str, list[str]] = {}
     for note in notes:
         name = re.match(r".*?\.h5(\.part)?(?=[: ])", note)
@@ -309,9 +310,9 @@ def once(notes: Iterable[str], names: set[str]) -> list[str]:
 def measured(
     name: str, estimate: Estimate | SeriesMean | None, at: int | tuple = ()
 ) -> dict[str, float | None]:
-    """Two cells of a row: a mean and its error, of one point of a curve or of a number.
+    """Return two cells of a row: a mean and its error, of one point of a curve or of a number.
 
-    None where there is nothing to measure.
+    They are None if there is no estimate.
     """
     parts = (None, None) if estimate is None else (estimate.mean, estimate.error)
     values = [part if part is None else float(np.asarray(part)[at]) for part in parts]
@@ -321,13 +322,13 @@ def measured(
 def over_runs(
     name: str, members: Sequence[SeriesMean], notes: list[str], about: str
 ) -> dict[str, float | None]:
-    """The cells of what runs say together; to the notes goes what speaks against it."""
+    """Return the cells of a mean over runs; its diagnostics are added to the notes."""
     notes += diagnostics(about, members)
     return measured(name, combine_runs(members))
 
 
 def spread(results: dict[str, dict]) -> dict[str, np.ndarray]:
-    """Columns of arrays and estimates, with the errors of these; each name ends as said."""
+    """Return columns of arrays and of estimates with errors; names get the given endings."""
     columns = {}
     for end, found in results.items():
         for name, values in found.items():
@@ -339,7 +340,7 @@ def spread(results: dict[str, dict]) -> dict[str, np.ndarray]:
 
 
 def points(names: Sequence[str], curves: dict[tuple, Curve]) -> list[dict]:
-    """A row of these columns for each point of the curves: the key of the curve, x, y, error."""
+    """Return a row for each point of the curves: the key of the curve, x, y, error."""
     return [
         dict(zip(names, (*key, *map(float, point)), strict=True))
         for key, curve in curves.items()
@@ -348,7 +349,7 @@ def points(names: Sequence[str], curves: dict[tuple, Curve]) -> list[dict]:
 
 
 def without_error(tables: Sequence[Table]) -> list[str]:
-    """Why some numbers have no error, in at most one sentence; where no number is, none is due."""
+    """Return why some numbers have no error, in at most one sentence."""
     names = [
         name.removesuffix("_error")
         for table in map(columns, tables)
@@ -362,19 +363,19 @@ def without_error(tables: Sequence[Table]) -> list[str]:
 
 
 def is_nan(value: object) -> bool:
-    """Whether it is the number that is none."""
+    """Whether a value is the float NaN."""
     return isinstance(value, float) and bool(np.isnan(value))
 
 
 def columns(table: Table) -> dict[str, Iterable]:
-    """A table by columns; rows must have the same keys."""
+    """Return a table by columns; its rows must have the same keys."""
     if isinstance(table, dict):
         return table
     return {name: [row[name] for row in table] for name in (table[0] if table else ())}
 
 
 def write_csv(path: Path, table: Table) -> None:
-    """A table with one header line; numbers keep all their digits."""
+    """Write a table with one header line; numbers keep all their digits."""
     table = columns(table)
     with destination(path).open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -383,7 +384,7 @@ def write_csv(path: Path, table: Table) -> None:
 
 
 def text_of(table: Table) -> str:
-    """A table for people: aligned, six digits."""
+    """Return a table as aligned text with six digits."""
     table = columns(table)
     rows = [
         ["-" if v is None else f"{v:.6g}" if isinstance(v, float) else str(v) for v in row]
@@ -401,9 +402,9 @@ def text_of(table: Table) -> str:
 
 
 def launch(main: Callable[[], None]) -> None:
-    """Run a script; whatever it cannot use is one line on stderr and exit code 2, or 1 (`Refused`).
+    """Run a script; a failure is one line on stderr and exit code 2, or 1 (`Refused`).
 
-    That includes numbers it can make no sense of: `python -X dev` shows where.
+    Unexpected errors are reported in the same way; `python -X dev` shows their traceback.
     """
     name = Path(sys.argv[0]).name
     if not sys.flags.dev_mode:
@@ -424,6 +425,6 @@ def launch(main: Callable[[], None]) -> None:
 
 
 def give_up(name: str, reason: str, code: int = 2) -> NoReturn:
-    """One line and the exit code: 1 where a law does not hold for a run, else 2."""
+    """Print one line and exit: with 1 where a theory does not apply to a run, else with 2."""
     print(f"{name}: {' '.join(reason.split())}", file=sys.stderr)
     sys.exit(code)

@@ -30,13 +30,13 @@ NAME = re.compile(r"[\w.-]{1,200}")  # of a variable or a group
 
 
 def printed(*words: str | Path) -> object:
-    """The JSON that the program prints; mistakes of an input do not matter here."""
+    """Return the JSON that the program prints; problems with the input are ignored."""
     said = subprocess.run([find_program(), *words], capture_output=True, text=True, check=False)
     return json.loads(said.stdout or "[]")
 
 
 def form(path: Path) -> dict:
-    """What an input file says about itself, and gives, group by group."""
+    """Return the description of an input file and its values, group by group."""
     head = path.read_text(errors="replace").split("\n&")[0]
     groups = [
         {
@@ -50,7 +50,7 @@ def form(path: Path) -> dict:
 
 
 def setting(value: object) -> str:
-    """A value as --set has it."""
+    """Return a value as --set expects it."""
     if isinstance(value, list):
         return ",".join(map(setting, value))
     return value if isinstance(value, str) else value_text("", value).removesuffix(".0")
@@ -60,10 +60,10 @@ def setting(value: object) -> str:
 
 
 class Lab:
-    """The inputs, the program's table of variables, and all processes."""
+    """The inputs, the program's table of variables, and all worker processes."""
 
     def __init__(self, inputs: list[Path], folders: list[Path], command: list[str]) -> None:
-        """Take input files, folders whose files inputs may name, and how a worker is started."""
+        """Take input files, the folders that inputs may name files of, and the worker's command."""
         self.inputs = {path.stem: path for path in inputs}
         self.folders = [folder.resolve() for folder in folders]
         self.command = command
@@ -87,7 +87,7 @@ class Lab:
         return worker
 
     def prepare(self) -> None:
-        """Have a worker ready."""
+        """Start a worker in advance."""
         if not (self.spare or self.closed):
             self.spare = asyncio.create_task(self.begun())
 
@@ -169,9 +169,9 @@ class Lab:
         await socket.close(message=ENDED if self.closed else DIED)
 
     def allowed(self, wish: dict) -> dict:
-        """A wish, with the text of its input and the groups that are added if it is for a run.
+        """Return a request of a page with the text of its input, after checking it.
 
-        Raises LookupError, TypeError or ValueError if it is no wish.
+        Raises LookupError, TypeError or ValueError if it is malformed.
         """
         if wish["do"] not in ("start", "scan"):
             return wish
@@ -190,7 +190,7 @@ class Lab:
         return wish | {"text": text}
 
     def allow(self, file: str) -> None:
-        """Refuse a file of disks that is not where those of inputs are."""
+        """Refuse a starting file outside the folders of the inputs."""
         path = Path(re.fullmatch(r"""(['"]?)([^'"]*)\1""", file.strip())[2]).resolve()
         if not any(path.is_relative_to(folder) for folder in self.folders):
             raise RunError(f"{file}: lies elsewhere; start the laboratory with --files FOLDER")
@@ -203,13 +203,13 @@ async def say(socket: web.WebSocketResponse, news: dict) -> None:
 
 
 def terminate(worker: Process) -> None:
-    """End it, whatever it does; unless it is busy with a file, which it removes first."""
+    """End a worker; while it writes a file, wait until it has removed it."""
     with suppress(ProcessLookupError):
         worker.terminate()
 
 
 def wrong(problem: object) -> dict:
-    """What a page is told of a wish that cannot be."""
+    """Return the answer to a request that is refused."""
     lines = [{"place": "", "text": str(problem)}]
     return {"is": "problems", "change": False, "problems": lines}
 

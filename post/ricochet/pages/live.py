@@ -60,7 +60,10 @@ async def guarded(request: web.Request, handler: Callable) -> web.StreamResponse
 
 
 def application(paths: Mapping[str, Callable], frames: str = "'none'") -> web.Application:
-    """A server with a function for each path; `frames`: whose pages may show its own as a part."""
+    """Return a server with a function for each path.
+
+    `frames` names the origins whose pages may contain its own.
+    """
     app = web.Application(middlewares=[guarded], client_max_size=LONGEST)
     app[SERVER] = {"heard": set()}  # connections that have asked for something
     app.add_routes([web.get(path, handler) for path, handler in paths.items()])
@@ -117,7 +120,7 @@ async def serving(app: web.Application, port: int = 0):
 
 
 def page_of(text: str) -> Callable:
-    """What answers with a page."""
+    """Return a function that answers with a page."""
 
     async def answer(_: web.Request) -> web.Response:
         return web.Response(text=text, content_type="text/html")
@@ -131,12 +134,12 @@ def page_of(text: str) -> Callable:
 class Live:
     """The newest film of a run that may still be going on.
 
-    The file is opened anew for each look, without locks, and only what is committed is read: the
-    run does not notice.
+    For each look the file is opened anew, without locks, and only committed data are read, so that
+    the run is not disturbed.
     """
 
     def __init__(self, run: Run, filmed: Callable[[Run], dict]) -> None:
-        """Take the run, and what makes a film of a run."""
+        """Take the run and the function that makes a film of it."""
         self.final = run.path.with_suffix("") if run.path.suffix == ".part" else run.path
         self.part, self.filmed = Path(f"{self.final}.part"), filmed
         self.claim = Path(f"{self.final}.lock")  # there, and locked, while the program writes
@@ -147,7 +150,7 @@ class Live:
 
     @property
     def end(self) -> str:
-        """Empty while the run goes on.  The final name means that it has finished."""
+        """Why the run has ended; empty while it goes on."""
         if not self.part.exists():
             return "has ended" if self.final.exists() else ""
         if abandoned(self.claim):
@@ -155,7 +158,7 @@ class Live:
         return "" if self.claim.exists() else "has stopped"
 
     def answer(self, known: str) -> tuple[bytes, bool]:
-        """What a page does not know yet, nothing if there is nothing new; whether it is the end."""
+        """Return what is new for a page, and whether the run has ended."""
         with self.lock:
             end = self.end
             # Caught at an unlucky moment, as when the file is renamed: the next look will do.
@@ -181,10 +184,9 @@ class Live:
 
 
 def abandoned(lock: Path) -> bool:
-    """Whether a lock file is there that nobody holds: the kernel has dropped the lock of a run.
+    """Whether a lock file is there that no process holds: the run has died.
 
-    A lock that is held is left alone, and one that is not for a moment only.  Where there are no
-    locks nobody knows.
+    A lock that is free is taken for a moment only.  Where file locks do not work the answer is no.
     """
     import fcntl  # not on Windows, where files can be read nevertheless
 
@@ -204,10 +206,10 @@ def abandoned(lock: Path) -> bool:
 def serve(
     run: Run, page: str, filmed: Callable[[Run], dict], visit: Callable[[str], object] | None = None
 ) -> str:
-    """Show the run until it has ended, or until Ctrl-C or TERM; returns what happened.
+    """Show the run until it has ended, or until Ctrl-C or TERM; return how it ended.
 
-    `visit` is called with the address of the page.
-    Raises RunError if there is nothing to show or the run has died.
+    `visit` is called with the address of the page.  Raises RunError if there is nothing to show,
+    or if the run has died.
     """
     if run.path.suffix != ".part":
         raise RunError(f"{run.path}: has finished; leave out --live")

@@ -61,10 +61,10 @@ DEATH = 1  # prctl's PR_SET_PDEATHSIG
 
 
 class Bench:
-    """A simulation, and how fast it is shown."""
+    """A simulation, and the speed at which it is shown."""
 
     def __init__(self, pictured: Callable[[Run], tuple[dict, dict]]) -> None:
-        """`pictured` makes of a run what stays as it is in a picture: facts, blocks of bytes."""
+        """Take the function that returns the constant part of a picture: facts and arrays."""
         self.pictured = pictured
         self.simulation: Simulation | None = None
         self.playing, self.ended, self.reason = False, False, ""
@@ -79,7 +79,7 @@ class Bench:
     # --- what it is told ---
 
     def start(self, wish: dict) -> None:
-        """Another simulation in the place of this one, if it can be."""
+        """Replace the simulation by another one, if its input is accepted."""
         pace = max(0.0, float(wish["pace"] or 0.0))
         try:
             other = Simulation._of(wish["text"], told(wish["settings"]))
@@ -97,7 +97,7 @@ class Bench:
         self.renew(changed=False)
 
     def renew(self, changed: bool) -> None:
-        """Show what is there now, of which something but the state is new."""
+        """Send the present scene; something other than positions and velocities has changed."""
         run = self.run = pictured_run(self.simulation)
         self.settles = run.nature.in_equilibrium
         self.samples.clear()
@@ -117,7 +117,7 @@ class Bench:
         self.tell_state()
 
     def change(self, wish: dict) -> None:
-        """Let something else act on the disks from now on."""
+        """Change what acts on the disks from now on."""
         settings = wish["settings"]
         self.act("change", settings, lambda: self.simulation._change(told(settings)))
 
@@ -127,7 +127,7 @@ class Bench:
         self.act("heat", factor, lambda: speed_up(self.simulation, factor))
 
     def act(self, what: str, value: object, change: Callable[[], object]) -> None:
-        """Do something at a time that can be reached again."""
+        """Do something at a time that another run can reach exactly."""
         try:
             now = self.simulation._settle()
             change()
@@ -142,32 +142,32 @@ class Bench:
         self.renew(changed=True)
 
     def play(self, _: dict) -> None:
-        """Go on."""
+        """Continue."""
         self.playing, self.goal, self.due = True, None, time.perf_counter()
         self.tell_state()
 
     def pause(self, _: dict) -> None:
-        """Stand still."""
+        """Pause."""
         self.playing, self.goal = False, None
         self.speak()
         self.tell_state()
 
     def set_pace(self, wish: dict) -> None:
-        """So much time passes in a second."""
+        """Set how much simulated time passes in a second."""
         self.pace = max(0.0, float(wish["pace"]))
 
     def got(self, _: dict) -> None:
-        """The page has drawn a frame."""
+        """Note that the page has drawn a frame."""
         self.unseen = max(0, self.unseen - 1)
 
     def step(self, wish: dict) -> None:
-        """Go on by some time, and stand still."""
+        """Advance by some time, then pause."""
         if not (more := float(wish["time"])) >= 0:
             raise ValueError("a step goes on")
         self.playing, self.goal = False, (self.simulation.time + more, NEVER, NEVER)
 
     def event(self, wish: dict) -> None:
-        """Go on by one event, and stand still."""
+        """Advance by one event, then pause."""
         coming = [] if self.run.time_step else self.simulation.next_events(1)
         if not coming and not self.run.time_step:
             self.pause(wish)  # nothing will happen
@@ -176,7 +176,7 @@ class Bench:
         self.happened = coming[0] if coming else None
 
     def keep(self, wish: dict) -> None:
-        """What the run was, as a file: `input`, `script` or `output`."""
+        """Send a file of the run: `input`, `script` or `output`."""
         name, part = self.wish["input"], wish["part"]
         try:
             end = self.simulation.time if self.ended else self.simulation._settle()
@@ -195,7 +195,7 @@ class Bench:
         tell({"is": "file", "name": name + ENDINGS[part], "body": letters})
 
     def saved(self, name: str) -> bytes:
-        """The output file; a signal that ends this process waits until its folder is gone."""
+        """Return the output file; signals wait until its folder is removed."""
         ends: list[int] = []  # not blocked: another thread of a library would take the signal
         before = signal.signal(signal.SIGTERM, lambda number, _: ends.append(number))
         try:
@@ -209,12 +209,12 @@ class Bench:
     # --- what it does ---
 
     def moves(self) -> bool:
-        """Whether it is to go on now."""
+        """Whether the simulation should advance now."""
         ready = self.simulation and not self.ended and self.unseen < AHEAD
         return bool(ready and (self.goal or (self.playing and self.pace > 0)))
 
     def go_on(self) -> None:
-        """To the time of the next frame, or as far as the engine comes in a while."""
+        """Advance to the time of the next frame, or as far as possible in a short while."""
         now = time.perf_counter()
         passed, self.due = min(now - self.due, 0.1), now
         stepping = self.goal
@@ -259,7 +259,7 @@ class Bench:
             self.happened = None
 
     def tell_state(self) -> None:
-        """What it does, and what was changed on the way."""
+        """Send the state of the simulation, and its changes so far."""
         changes = [
             (when, name, value)
             for when, what, values, _ in self.actions
@@ -271,7 +271,7 @@ class Bench:
         tell({"is": "state", "changes": changes} | state)
 
     def speak(self) -> None:
-        """The energies of now, and means with errors since something was changed."""
+        """Send the present energies, and means with errors since the last change."""
         self.spoken = time.perf_counter()
         run, value = self.run, observed(self.simulation)
         now = value["time"]
@@ -301,7 +301,7 @@ class Bench:
 
 @dataclass(frozen=True)
 class Pictured(Run):
-    """The moment of a scene as a run with one frame; observables are those of now."""
+    """The present state of a simulation as a run with one frame and the present observables."""
 
     simulation: Simulation
 
@@ -315,7 +315,7 @@ class Pictured(Run):
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """With some way left for such sides."""
+        """The corners of the box, with some room for sides that move."""
         way = np.zeros(4)
         way[[*self.piston_positions]] = WAY * self.edges.max()
         lower, upper = Run.bounds.func(self)
@@ -327,7 +327,7 @@ class Pictured(Run):
 
 
 def pictured_run(simulation: Simulation) -> Pictured:
-    """The present moment as a run."""
+    """Return the present state of a simulation as a run."""
     parameters = simulation.parameters
     box, kinds = parameters["box"], parameters["species"]
     lower, upper = (np.asarray(box[name], dtype=float) for name in ("lower", "upper"))
@@ -358,15 +358,15 @@ def pictured_run(simulation: Simulation) -> Pictured:
 
 
 def observed(simulation: Simulation) -> dict[str, float]:
-    """The time, and the observables of now; of those with several numbers the first."""
+    """Return the time and the present observables; of vectors the first component."""
     seen = simulation._observed().items()
     return {name: part[0].item() for name, part in seen} | {"time": simulation.time}
 
 
 def sampled(count: int, value: dict) -> tuple[float, ...]:
-    """What means are made of: time, kinetic energy, virial, and the area for disks of this moment.
+    """Return the quantities that means are made of: time, kinetic energy, virial, accessible area.
 
-    That is what makes the observable `virial_pressure` of the two before it.
+    The observable `virial_pressure` follows from them.
     """
     time, kinetic, virial = (value[name] for name in ("time", "all/kinetic_energy", "virial"))
     whole = count * kinetic + (virial / (2 * time) if time else 0.0)
@@ -374,17 +374,18 @@ def sampled(count: int, value: dict) -> tuple[float, ...]:
 
 
 def pressure_between(samples: np.ndarray, count: int) -> SeriesMean:
-    """Mean pressure from the first to the last of these samples; sides may move meanwhile."""
+    """Estimate the mean pressure between the first and the last sample; sides may move."""
     (kinetic, virial, area), apart = samples[1:4], np.diff(samples[0])
     gain = count * kinetic[1:] * apart + np.diff(virial) / 2
     return correlated_mean(gain / area[1:], apart)
 
 
 def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
-    """Temperature, mean speed and pressure: value, error, and what theory has for them.
+    """Return temperature, mean speed and pressure: value, error, and the value of theory.
 
-    Of what settles they are means over the time since it has settled, with the error of its
-    series; else the values of now.  The pressure is between first and last of these samples.
+    In a run that relaxes to equilibrium they are means since it has relaxed, with the error of the
+    series; otherwise the present values.  The pressure is that between the first and the last
+    sample.
     """
     time, kt, speed = samples[[0, 4, 5]]
     found = {
@@ -425,7 +426,7 @@ def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
 
 
 def told(settings: dict[str, str]) -> list[str]:
-    """GROUP.VARIABLE=VALUE of each, as --set has it."""
+    """Return GROUP.VARIABLE=VALUE of each setting, as --set expects it."""
     lines = [f"{name}={value}" for name, value in settings.items()]
     if any("\n" in line or "\r" in line for line in lines):
         raise ValueError("a value has no line ends")
@@ -433,7 +434,7 @@ def told(settings: dict[str, str]) -> list[str]:
 
 
 def problems(reason: Exception) -> list[dict]:
-    """The program's lines, each with the variable it is about, as --set names it."""
+    """Return the program's messages, each with the variable that it concerns."""
     found = []
     for line in str(reason).splitlines():
         place = line.removeprefix("--set ").partition("=")[0] if line.startswith("--set ") else ""
@@ -443,17 +444,17 @@ def problems(reason: Exception) -> list[dict]:
 
 
 def refuse(reason: Exception, change: bool = False) -> None:
-    """Answer with what is wrong."""
+    """Answer with the problems of a request."""
     tell({"is": "problems", "change": change, "problems": problems(reason)})
 
 
 def speed_up(simulation: Simulation, factor: float) -> None:
-    """Multiply all velocities."""
+    """Multiply all velocities of a simulation."""
     simulation.velocity = factor * simulation.velocity
 
 
 def script(name: str, text: str, actions: list[tuple], end: float) -> str:
-    """A script that does the same again, up to a time."""
+    """Return a script that repeats the run with all its changes, up to a time."""
     lines = [f'"""What was done with {name} in the laboratory, to the last bit."""', ""]
     quoted = repr(text) if "\\" in text or '"""' in text else f'"""{text}"""'
     lines += ["from ricochet import Simulation", "", f"INPUT = {quoted}", ""]
@@ -470,13 +471,13 @@ def script(name: str, text: str, actions: list[tuple], end: float) -> str:
 
 
 def send(kind: bytes, body: bytes) -> None:
-    """One answer."""
+    """Write one answer."""
     sys.stdout.buffer.write(kind + struct.pack(">I", len(body)) + body)
     sys.stdout.buffer.flush()
 
 
 def tell(message: dict) -> None:
-    """One answer in words."""
+    """Write one answer as JSON."""
     try:
         text = json.dumps(message, allow_nan=False)
     except ValueError:  # what is not known, or has no bounds, is null
@@ -485,7 +486,7 @@ def tell(message: dict) -> None:
 
 
 def wishes(wait: float | None) -> list[dict]:
-    """What has been asked for meanwhile; waits so long if that is nothing, None for ever."""
+    """Return the requests that have arrived; wait for the first one so long, None for ever."""
     if select.select([0], [], [], wait)[0]:
         news = os.read(0, 1 << 20)
         if not news:
@@ -499,7 +500,7 @@ def wishes(wait: float | None) -> list[dict]:
 
 
 def scan(wish: dict) -> None:
-    """Runs with one variable at some values, and what was measured in each, or why nothing was."""
+    """Simulate some values of one variable; send the result of each, or its problem."""
     for index, value in enumerate(wish["values"]):
         try:
             lines = told(wish["settings"] | {wish["variable"]: value})
@@ -511,9 +512,10 @@ def scan(wish: dict) -> None:
 
 
 def measured(text: str, lines: list[str], name: str) -> tuple[float, float | None]:
-    """Mean over time of an observable, or the rate of one that counts; its error if it settles.
+    """Return the mean over time of an observable, or the rate of one that counts, with an error.
 
-    In the second half of `LOOKS` samples, between which each disk has half a collision or so.
+    It is taken from the second half of `LOOKS` samples, about half a collision per disk apart.
+    There is an error only if the run relaxes to equilibrium.
     """
     samples, began = [], time.perf_counter()
     with Simulation._of(text, lines) as simulation:
@@ -536,7 +538,7 @@ def measured(text: str, lines: list[str], name: str) -> tuple[float, float | Non
 
 
 def work(pictured: Callable[[Run], tuple[dict, dict]]) -> None:
-    """Do what is asked for until the laboratory ends."""
+    """Answer requests until the laboratory ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is the laboratory that ends
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(DEATH, signal.SIGTERM)
