@@ -36,7 +36,7 @@ from tqdm import tqdm
 
 
 def film_path(wish: Path | None, run: Run) -> Path:
-    """Where to write: -o, else the name of the run in the current folder."""
+    """Return the path of the film: -o, else the name of the run in the current folder."""
     if not animation.FFMpegWriter.isAvailable():  # by the system
         with suppress(ImportError, RuntimeError):
             from imageio_ffmpeg import get_ffmpeg_exe
@@ -56,7 +56,7 @@ def film_path(wish: Path | None, run: Run) -> Path:
 def animate(
     run: Run, frames: list[int], colour: str | None = None, fps: float = 25
 ) -> animation.FuncAnimation:
-    """A film of these frames, `fps` of them per second.
+    """Write a film of these frames, `fps` of them per second.
 
     `colour` is "species" or a word of `LABELS`.
     """

@@ -21,13 +21,13 @@ DASHES = ("--", ":", "-.", (0, (5, 1)), (0, (1, 3)), (0, (8, 3)))  # of the spec
 
 
 def in_time(found: Curves, name: str) -> Estimate:
-    """An energy over that of all disks at the start, against time."""
+    """Draw an energy over that of all disks at the start, against time."""
     first = found["energy_all"].mean[0]
     return Estimate(*(part / first for part in found[f"energy_{name}"]))
 
 
 def draw_ratio(axes: plt.Axes, groups: list, results: list[Curves]) -> None:
-    """The temperature ratio against collisions, beside the dilute limit."""
+    """Draw the temperature ratio against collisions, with the dilute limit."""
     for (xi, _), found, colour in zip(groups, results, colours(len(groups), 2), strict=True):
         if "ratio" in found:
             tau, ratio = found["collisions_per_disk"], found["ratio"]
@@ -45,7 +45,7 @@ def draw_ratio(axes: plt.Axes, groups: list, results: list[Curves]) -> None:
 
 
 def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
-    """Against time, against collisions; below the ratio.  Colours: restitution."""
+    """Draw energies against time and collisions, and the ratio; colours mean restitution."""
     rows = 1 + any("ratio" in found for found in results)
     figure = plt.figure(figsize=(11, 4.5 + 3 * (rows - 1)))
     grid = figure.add_gridspec(rows, 2, height_ratios=(1.5, 1)[:rows])
@@ -75,7 +75,7 @@ def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
 
 
 def table(groups: list, results: list[Curves]) -> list[dict]:
-    """A row per restitution: energy and temperature ratio at the end."""
+    """Return a row for each restitution: energy and temperature ratio at the end."""
     return [
         {
             "restitution": xi.name,

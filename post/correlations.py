@@ -76,7 +76,7 @@ NUMBERS = ("D_displacement", "D_velocities", "psi6_local", "psi6_global")
 
 
 class Found(NamedTuple):
-    """Of the runs at one packing fraction: what has an error; curves by name."""
+    """Results of the runs at one packing fraction: numbers with errors, and curves by name."""
 
     members: dict[str, list[SeriesMean]]
     curves: dict[str, Curve]
@@ -84,7 +84,7 @@ class Found(NamedTuple):
 
 
 def check(run: Run, first: Run) -> None:
-    """Refuse what is not alike everywhere."""
+    """Refuse runs that are not homogeneous."""
     allow(run, "correlations are those of disks in an empty box", *FLUID, *RESTLESS)
     if run.n_disks < 3:
         raise RunError(f"{run.path}: needs three disks and more")
@@ -95,7 +95,7 @@ def check(run: Run, first: Run) -> None:
 
 
 def bins(run: Run) -> dict[str, np.ndarray]:
-    """Of distances and wave numbers, in mean diameters."""
+    """Return the bins of distances and of wavenumbers, in mean diameters."""
     half = 0.5 * run.edges.min() / (2 * run.radius.mean())
     least = float(run.radius.min() / run.radius.mean())
     found = {
@@ -106,7 +106,7 @@ def bins(run: Run) -> dict[str, np.ndarray]:
 
 
 def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Curve]]:
-    """psi6 of each run; and curves of all disks, of a mixture of each pair of species, too."""
+    """Return psi6 of each run, and the curves of all disks and of each pair of species."""
     some = [evenly(run, own) for run, own in zip(runs, frames, strict=True)]
     psi = {(r.path, k): bond_order(r, k) for r, own in zip(runs, some, strict=True) for k in own}
     each = [[psi[run.path, k] for k in own] for run, own in zip(runs, some, strict=True)]
@@ -130,13 +130,13 @@ def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Cur
 
 
 def free_time(runs: list[Run], frames: list[slice]) -> float:
-    """The mean free time in these frames."""
+    """Return the mean free time in these frames."""
     each = zip(runs, frames, strict=True)
     return float(np.mean([mean_free_time(run, run.time[own.start]) for run, own in each]))
 
 
 def motion(runs: list[Run], frames: list[slice], skip: float | None, wave: float) -> dict:
-    """Curves against w t of memory and diffusion: of all disks, and of each species."""
+    """Return the time correlations of all disks and of each species, against w t."""
     first, diameter = runs[0], 2 * runs[0].radius.mean()
     members = correlators(runs, [wave / diameter], skip=skip)
     found, unit, curves = curves_of(members), free_time(runs, frames), {}
@@ -162,13 +162,13 @@ def motion(runs: list[Run], frames: list[slice], skip: float | None, wave: float
 
 
 def kurtosis(runs: list[Run], until: int) -> Curve:
-    """a2 against collisions per disk in the first frames."""
+    """Return a2 against collisions per disk in the first frames."""
     tau, a2 = zip(*(relaxation(run, frames=until) for run in runs), strict=True)
     return Curve(np.mean(tau, axis=0), *estimate(a2))
 
 
 def analysed(runs: list[Run], skip: float | None, wave: float = 2 * np.pi) -> Found:
-    """All that runs at one packing fraction say."""
+    """Return all results of the runs at one packing fraction."""
     frames = [later(run, skip) for run in runs]
     pairs, settled = list(zip(runs, frames, strict=True)), all_settle(runs)
     try:
@@ -194,7 +194,7 @@ def analysed(runs: list[Run], skip: float | None, wave: float = 2 * np.pi) -> Fo
 
 
 def table(groups: list, results: list[Found]) -> tuple[list[dict], list[str]]:
-    """A row per packing fraction; and what speaks against it."""
+    """Return a row for each packing fraction, and the notes."""
     rows, notes = [], []
     for (eta, runs), found in zip(groups, results, strict=True):
         row = {"packing": eta, "runs": len(runs), "D_time": found.lag}
@@ -212,7 +212,7 @@ def table(groups: list, results: list[Found]) -> tuple[list[dict], list[str]]:
 
 
 def curves(groups: list, results: list[Found]) -> list[dict]:
-    """What has an error, then all curves, one below the other."""
+    """Return the numbers with errors, then all curves one below the other."""
     names, rows = ("what", "packing", "x", "y", "error"), []
     for (eta, _), found in zip(groups, results, strict=True):
         for what, members in found.members.items():
@@ -241,7 +241,7 @@ LINES = ("-", "--", ":", "-.")  # of all disks, and of species
 
 
 def parts(shown: dict[str, Curve], panel: str) -> dict[str, Curve]:
-    """The curves of a panel by species or pair of them, that of all disks as ""."""
+    """Return the curves of a panel by species or pair; that of all disks as ""."""
     names = [one for one in shown if one == panel or one.startswith(f"{panel}_")]
     return {one[len(panel) + 1 :]: shown[one] for one in names if one != "vacf_tail"}
 
@@ -249,7 +249,7 @@ def parts(shown: dict[str, Curve], panel: str) -> dict[str, Curve]:
 def draw_group(
     panels: dict[str, plt.Axes], found: Found, row: dict, colour: str, count: int, keyed: bool
 ) -> None:
-    """One packing fraction in all panels; `count` disks in all of its runs; lines `keyed`."""
+    """Draw one packing fraction in all panels; `count` is the number of disks of all its runs."""
     line, label, shown = {"color": colour, "lw": 1}, f"η = {row['packing']:.3g}", found.curves
 
     def positive(curve: Curve) -> Curve:
@@ -282,7 +282,7 @@ def draw_group(
 def draw(
     groups: list[tuple[float, list[Run]]], results: list[Found], rows: list[dict], wave: float
 ) -> plt.Figure:
-    """Motion above, structure below, as far as there is any."""
+    """Draw motion above and structure below, where there are any."""
     there = set().union(*(one.curves for one in results))
     of = {"tail": "vacf", "D": "D_displacement(t)"}
     shown = {name: style for name, style in AXES.items() if of.get(name, name) in there}

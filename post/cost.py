@@ -24,7 +24,7 @@ LABELS = {
 
 
 def costs(runs: list[Run]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Search -> N and the least time per collision in microseconds, in ascending N."""
+    """Return N and the least time per collision in microseconds for each search, in ascending N."""
     least: dict[str, dict[int, float]] = {}
     for run in runs:
         points = least.setdefault(str(run.parameter("run", "search", "cells")), {})
@@ -34,7 +34,7 @@ def costs(runs: list[Run]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 
 def fits(measured: dict, low: float, high: float) -> dict[str, PowerLaw]:
-    """Search -> power of N through the points with N from `low` to `high`, three or more."""
+    """Return a power law of N for each search, through the points from `low` to `high`."""
     laws = {}
     for search, (n, cost) in measured.items():
         inside = (n >= low) & (n <= high)
@@ -48,7 +48,7 @@ def fits(measured: dict, low: float, high: float) -> dict[str, PowerLaw]:
 def draw(
     runs: list[Run], measured: dict, laws: dict[str, PowerLaw], low: float, high: float
 ) -> plt.Figure:
-    """Doubly logarithmic; the fits are dotted outside their range."""
+    """Draw doubly logarithmic; the fits are dotted outside their range."""
     figure, axes = plt.subplots(figsize=(7, 5.5))
     for search, colour, marker in zip(LABELS, COLOURS, "osD", strict=False):
         if search in measured:

@@ -21,7 +21,7 @@ SHOWN = 60  # runs in a panel
 
 
 def naive_error(run: Run, skip: float | None) -> float:
-    """Standard error of Z by the virial, if samples had no memory."""
+    """Return the standard error of Z by the virial if samples were independent."""
     amount, per = virial_over_kt(run, skip)
     return float(scipy.stats.sem(amount - per * np.sum(amount) / np.sum(per)) / np.mean(per))
 

@@ -24,7 +24,7 @@ from matplotlib.ticker import LogLocator
 
 
 def draw_state(axes: plt.Axes, run: Run, frame: int, values: np.ndarray, limits: tuple):
-    """Bed disks coloured by value, the projectile black."""
+    """Draw the bed coloured by value, and the projectile black."""
     draw_box(axes, run, run.time[frame])
     colours = plt.get_cmap("viridis")(plt.Normalize(*limits)(values))
     colours[projectile(run)] = (0, 0, 0, 1)
@@ -33,7 +33,7 @@ def draw_state(axes: plt.Axes, run: Run, frame: int, values: np.ndarray, limits:
 
 
 def hull(run: Run) -> np.ndarray:
-    """(P, 2) outline of the first positions of the displaced disks; empty of hardly any."""
+    """Return the outline (P, 2) of the first positions of displaced disks; it may be empty."""
     points = run.position[0][displaced(run)]
     if len(points) < 4:
         return points[:0]
@@ -42,14 +42,14 @@ def hull(run: Run) -> np.ndarray:
 
 
 def draw_outline(axes: plt.Axes, ring: np.ndarray, label: str) -> None:
-    """A line around what the label says, if there is one."""
+    """Draw a line around the region that the label names, if there is one."""
     if len(ring):
         axes.plot(*ring.T, color=COLOURS[1], lw=1.4, zorder=4, label=label)
         axes.legend(loc="upper left")
 
 
 def draw_energy(axes: plt.Axes, run: Run) -> None:
-    """Energy left, and collisions, against time."""
+    """Draw the remaining energy and the collisions against time."""
     time, energy = run.observable("all/kinetic_energy")
     axes.semilogy(time, energy / energy[0], color=COLOURS[0], label="kinetic energy $E/E_0$")
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -69,7 +69,7 @@ def draw_energy(axes: plt.Axes, run: Run) -> None:
 
 
 def draw(run: Run, size: Crater) -> plt.Figure:
-    """Before, after, collisions per disk, energy."""
+    """Draw the state before and after, collisions per disk, and energy."""
     figure, ((before, after), (hits, energy)) = plt.subplots(2, 2, figsize=(9.4, 10.6))
     moved = run.displacement(-1)
     limits = (0, drawing.scale_top(run, [run.n_frames - 1], "displacement"))

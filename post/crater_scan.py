@@ -69,7 +69,7 @@ Scans = dict[str, list[list[Point]]]  # by parameter: curves of points in ascend
 
 
 def key_of(run: Run) -> tuple[float, ...]:
-    """Mass ratio, speed, radius ratio, restitution."""
+    """Return mass ratio, speed, radius ratio and restitution."""
     if np.isnan(run.restitution):
         raise RunError(f"{run.path}: has no single restitution, as a scan needs it")
     tip, lying = projectile(run), np.flatnonzero(bed(run))[0]
@@ -79,7 +79,7 @@ def key_of(run: Run) -> tuple[float, ...]:
 
 
 def point(key: tuple[float, ...], runs: list[Run]) -> Point:
-    """The mean over runs."""
+    """Average over runs."""
     craters = [crater(run) for run in runs]
     sizes = {name: estimate([getattr(c, name) for c in craters]) for name in ALL}
     left, hits = (
@@ -92,12 +92,12 @@ def point(key: tuple[float, ...], runs: list[Run]) -> Point:
 
 
 def others(axis: str, curve: list[Point]) -> dict[str, float]:
-    """The parameters that the points of a curve share."""
+    """Return the parameters that the points of a curve share."""
     return {name: value for name, value in curve[0].values.items() if name != axis}
 
 
 def scanned(points: list[Point]) -> Scans:
-    """The curves that have more than a point; else the largest of the points."""
+    """Return the curves with several points, or else the largest one."""
     scans = {}
     for axis in AXES:
         families = grouped(points, lambda p, axis=axis: tuple(others(axis, [p]).values()))
@@ -108,7 +108,7 @@ def scanned(points: list[Point]) -> Scans:
 
 
 def unused(points: list[Point], scans: Scans) -> list[str]:
-    """The runs that are on no curve."""
+    """Return the runs that are on no curve."""
     drawn = [p.values for scan in scans.values() for curve in scan for p in curve]
     return [
         f"not drawn: {listed(p.values)} (runs: {p.runs}), from which no other run differs in one "
@@ -119,22 +119,22 @@ def unused(points: list[Point], scans: Scans) -> list[str]:
 
 
 def fewest(curve: list[Point]) -> int:
-    """Runs of a point that is fitted."""
+    """Return the smallest number of runs of a point that is fitted."""
     return min(p.runs for p in curve if p.free)
 
 
 def listed(values: dict[str, float]) -> str:
-    """Parameters in words."""
+    """Return parameters as text."""
     return ",  ".join(f"{name} {value:g}" for name, value in values.items())
 
 
 def abscissa(axis: str, x: np.ndarray) -> np.ndarray:
-    """What a size is fitted against."""
+    """Return the variable of a fit."""
     return 1 - np.square(x) if axis == "restitution" else np.asarray(x, dtype=float)
 
 
 def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
-    """A power law for a size; few runs say too little of their errors to weigh by."""
+    """Fit a power law to a size; points of few runs have equal weights."""
     free = [p for p in curve if p.free]
     x = abscissa(axis, [p.values[axis] for p in free])
     y, error = np.array([p.sizes[name] for p in free]).reshape(-1, 2).T
@@ -143,7 +143,7 @@ def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
 
 
 def power(axis: str, curve: list[Point], fit: PowerLaw | None) -> str:
-    """The law of a fit, for a legend."""
+    """Return the power law of a fit, for a legend."""
     if not fit:
         return ""
     exponent = "\\pm".join(rounded_to_error(fit.exponent, fit.exponent_error))
@@ -154,7 +154,7 @@ def power(axis: str, curve: list[Point], fit: PowerLaw | None) -> str:
 def draw_size(
     axes: plt.Axes, axis: str, curve: list[Point], name: str, fit: PowerLaw | None, **style
 ) -> None:
-    """One size with its fit."""
+    """Draw one size with its fit."""
     x, y, error = np.array([(p.values[axis], *p.sizes[name]) for p in curve]).T
     error, free = np.nan_to_num(error), np.array([p.free for p in curve])
     if fit:
@@ -168,7 +168,7 @@ def draw_size(
 
 
 def draw_sizes(axes: plt.Axes, axis: str, scan: list[list[Point]], names: dict, own: list) -> None:
-    """Some of the sizes: of a single curve each has a colour, of a family each curve."""
+    """Draw several sizes; colours mean sizes on a single curve, and curves in a family."""
     shared = [others(axis, curve) for curve in scan]
     varying = [name for name in shared[0] if len({values[name] for values in shared}) > 1]
     for curve, values, shade in zip(scan, shared, colours(len(scan)), strict=True):
@@ -185,7 +185,7 @@ def draw_sizes(axes: plt.Axes, axis: str, scan: list[list[Point]], names: dict, 
 
 
 def draw(runs: list[Run], scans: Scans) -> plt.Figure:
-    """Panels for each parameter: numbers of disks above, width and depth below."""
+    """Draw panels for each parameter: numbers of disks above, width and depth below."""
     rows, columns = panel_grid(len(scans), 1)
     figure = plt.figure(figsize=(5.5 * max(columns, 1.3), 5.5 * rows))
     grid = figure.add_gridspec(2 * rows, columns, height_ratios=(1.3, 1) * rows)
@@ -220,7 +220,7 @@ def draw(runs: list[Run], scans: Scans) -> plt.Figure:
 
 
 def tables(scans: Scans) -> tuple[list[dict], list[dict], list[str]]:
-    """A row per point of each curve, a row per fit, and which fits miss their points."""
+    """Return a row for each point, a row for each fit, and notes on fits that miss their points."""
     rows, fits, missed = [], [], []
     for axis, curve in ((axis, curve) for axis, scan in scans.items() for curve in scan):
         for p in curve:

@@ -53,7 +53,7 @@ Curves = dict[str, tuple[np.ndarray, np.ndarray]]  # time and value by species, 
 
 
 def temperature(run: Run) -> Curves:
-    """At the observables, which are about the mean motion: of one disk nothing is left."""
+    """Return the temperature about the mean motion, at the observables."""
     if run.n_disks < 2:
         raise Refused(f"{run.path}: holds one disk; a temperature is about the motion of all")
     time, value = run.observable("all/temperature")
@@ -61,7 +61,7 @@ def temperature(run: Run) -> Curves:
 
 
 def noise_law(run: Run) -> float | None:
-    """The temperature at which noise and collisions balance."""
+    """Return the temperature at which driving balances dissipation."""
     drive = run.parameters.get("drive", {})
     known = {"noise_driven", "inelastic"} <= run.nature <= {"noise_driven", "inelastic", "rotating"}
     if not known or drive.get("species"):
@@ -71,7 +71,7 @@ def noise_law(run: Run) -> float | None:
 
 
 def temperature_law(run: Run) -> np.ndarray | float | None:
-    """What lasts under noise, or the adiabat at the observables."""
+    """Return the steady temperature of driven disks, or the adiabat at the observables."""
     side = only_moving(run, "constant_velocity")
     if side is None:
         return noise_law(run)
@@ -80,40 +80,40 @@ def temperature_law(run: Run) -> np.ndarray | float | None:
 
 
 def only_moving(run: Run, motion: str) -> int | None:
-    """The number of the only side that moves, if it does so, and equal elastic disks are inside."""
+    """Return the number of the only moving side around equal elastic disks, or None."""
     moves = [k for k, side in enumerate(run.sides) if side.get("motion", "still") != "still"]
     plain = run.nature <= {"moving_sides", "piston", "walls", "rotating"} and len(moves) == 1
     return moves[0] if plain and run.sides[moves[0]]["motion"] == motion else None
 
 
 def widths(run: Run, side: int) -> np.ndarray:
-    """(S,) widths of the box along the way of a side, at the observables."""
+    """Return widths (S,) of the box along the motion of a side, at the observables."""
     lower, upper = run.corners_at(run.observable("total_energy").time)
     return (upper - lower)[:, side // 2]
 
 
 def adiabat(run: Run, side: int, widths: np.ndarray) -> np.ndarray:
-    """T over that at the first of the widths (W,)."""
+    """Return temperatures over that at the first of the widths (W,)."""
     height, walled = float(run.edges[1 - side // 2]), not run.periodic[1 - side // 2]
     return hard_disks.adiabat(widths, height, run.n_disks, float(run.radius[0]), walled)
 
 
 def width(run: Run) -> Curves:
-    """Of the box along the way of a side that disks push."""
+    """Return the width of the box along the motion of a piston."""
     if not run.piston_positions:
         raise Refused(f"{run.path}: has no piston (side.motion = 'piston')")
     return {"": (run.observable("total_energy").time, widths(run, min(run.piston_positions)))}
 
 
 class Room(NamedTuple):
-    """A width that fluctuates."""
+    """Mean and standard deviation of a fluctuating width."""
 
     mean: float
     deviation: float
 
 
 def width_law(run: Run) -> Room | None:
-    """At constant enthalpy, of a fluid; the side is at rest at first."""
+    """Return the width of a fluid at constant enthalpy; the piston starts at rest."""
     side = only_moving(run, "piston")
     if side is None or not run.sides[side]["force"] > 0:
         return None
@@ -130,7 +130,7 @@ def width_law(run: Run) -> Room | None:
 
 
 def balances(run: Run) -> tuple[float, float]:
-    """The largest changes of what disks and side have together: of enthalpy, and of momentum."""
+    """Return the largest changes of the enthalpy, and of the momentum of disks and piston."""
     k = min(run.piston_positions)
     side = run.sides[k]
     time, energy = run.observable("total_energy")
@@ -144,17 +144,17 @@ def balances(run: Run) -> tuple[float, float]:
 
 
 def share(run: Run) -> Curves:
-    """Of the disks in the left half, at the frames."""
+    """Return the share of the disks in the left half, at the frames."""
     middle = run.lower[0] + run.edges[0] / 2
     return {"": (run.time, np.mean(run.position[:][..., 0] < middle, axis=1))}
 
 
 def fuller(share: np.ndarray) -> np.ndarray:
-    """Shares (T,) of one half as those of the half that had more of the disks.
+    """Return shares (T,) of one half as those of the half that contained more disks.
 
-    The first third of the time tells which half that was in the last third, and the last in the
-    first, for the half that is called fuller by its own disks has more than 1/2 even of none but
-    chance.  The middle lets the thirds forget each other.
+    The half is chosen in the last third of the time for the first third, and the other way round:
+    chosen by its own disks, a half would contain more than 1/2 by chance alone.  The middle third
+    makes the two independent.
     """
     third = max(1, len(share) // 3)
     ends = share[:third], share[-third:]
@@ -163,7 +163,7 @@ def fuller(share: np.ndarray) -> np.ndarray:
 
 
 def demon_law(run: Run) -> float | None:
-    """The share in the fuller half that lasts; a wall from the floor up parts the halves."""
+    """Return the lasting share in the fuller half; a wall separates the halves."""
     floor = run.parameters.get("side", {}).get("bottom", {})
     middle = run.lower[0] + run.edges[0] / 2
     parting = [wall for wall in run.walls if np.allclose(wall[:, 0], middle)]
@@ -181,7 +181,7 @@ def demon_law(run: Run) -> float | None:
 
 
 def height(run: Run) -> Curves:
-    """Mean height above the floor of each species, at the frames."""
+    """Return the mean height above the floor of each species, at the frames."""
     y = run.position[:][..., 1] - run.lower[1]
     several = len(run.names) > 1
     return {
@@ -190,14 +190,14 @@ def height(run: Run) -> Curves:
 
 
 def cluster(run: Run) -> Curves:
-    """Share of the disks in the largest cluster, at the frames."""
+    """Return the share of the disks in the largest cluster, at the frames."""
     gap = GAP * 2 * float(run.radius.mean())
     shares = [largest_cluster(run, frame, gap) / run.n_disks for frame in range(run.n_frames)]
     return {"": (run.time, np.array(shares))}
 
 
 def viscosity(run: Run) -> Curves:
-    """-P_xy over the shear rate."""
+    """Return -P_xy over the shear rate."""
     if "sheared" not in run.nature:
         raise Refused(f"{run.path}: is not sheared; a viscosity takes box.shear_rate")
     time, first = np.unique(run.observable("kinetic_tensor").time, return_index=True)
@@ -218,20 +218,20 @@ QUANTITIES = {
 
 
 def on_average(laws: list) -> np.ndarray | float | Room | None:
-    """That of runs that differ by their seed, and so in how much energy they start with."""
+    """Average over runs that differ by their seed, and so in their first energy."""
     rooms = all(isinstance(law, Room) for law in laws)
     return Room(*map(float, np.mean(laws, axis=0))) if rooms else laws[0]
 
 
 def levels(law: np.ndarray | float | Room | None, compared: Callable) -> list:
-    """Where lines of a law are drawn."""
+    """Return the heights of the lines of a prediction."""
     if isinstance(law, Room):
         return [law.mean, law.mean - law.deviation, law.mean + law.deviation]
     return [] if law is None else [law, 1 - law] if compared is fuller else [law]
 
 
 def by_input(runs: list[Run]) -> dict[str, list[Run]]:
-    """Runs that differ by their seed alone together, under what sets them apart from the others."""
+    """Group runs that differ only by their seed, under what distinguishes them from the others."""
     own = [{"N": run.n_disks, "ξ": run.restitution, **drawing.numbers_of(run)} for run in runs]
     names = [name for name in own[0] if len({numbers.get(name) for numbers in own}) > 1]
     groups: dict[str, list[Run]] = {}
@@ -244,7 +244,7 @@ def by_input(runs: list[Run]) -> dict[str, list[Run]]:
 def draw_curves(
     axes: plt.Axes, tracks: dict[tuple[str, str], list], laws: dict, fine: bool
 ) -> None:
-    """Solid what was measured, dashed what should last."""
+    """Draw measured curves solid and predictions dashed."""
     for (key, curves), colour in zip(tracks.items(), drawing.colours(len(tracks)), strict=True):
         label = ", ".join(filter(None, key)) or "measured"
         for k, (time, value) in enumerate(curves):
@@ -264,7 +264,7 @@ def draw_curves(
 def draw(
     groups: dict[str, list[Run]], tracks: dict, laws: dict, label: str, fine: bool
 ) -> plt.Figure:
-    """The curves, and pictures."""
+    """Draw the curves and the pictures."""
     runs = [run for own in groups.values() for run in own]
     pictures = [(own[0], -1, name) for name, own in groups.items()][:MOST_PICTURES]
     if len(groups) == 1:

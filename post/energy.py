@@ -25,12 +25,12 @@ WINDOWS = 60  # of time
 
 
 def method(run: Run) -> str:
-    """How the run was integrated, for the legend."""
+    """Return how the run was integrated, for the legend."""
     return f"time steps, Δt = {run.time_step:g}" if run.time_step else "event driven"
 
 
 def balance(run: Run) -> tuple[np.ndarray, str]:
-    """What is to be kept, at the observables, and in words, with the terms that are not 0."""
+    """Return the conserved quantity at the observables, and its terms in words."""
     energy, words = run.observable("total_energy").value, "total"
     size = 1e-9 * np.abs(energy).max()
     for sign, term in ((1, "dissipated_energy"), (-1, "heat"), (-1, "work"), (-1, "drive_energy")):
@@ -42,7 +42,7 @@ def balance(run: Run) -> tuple[np.ndarray, str]:
 
 
 def change(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Time and the relative change of what is to be kept."""
+    """Return time and relative change of the conserved quantity."""
     time, total = run.observable("total_energy")
     if len(time) < 2:
         raise RunError(f"{run.path}: has one sample of the energies so far; nothing has changed")
@@ -55,7 +55,7 @@ def change(run: Run) -> tuple[np.ndarray, np.ndarray]:
 def means_of_windows(
     time: np.ndarray, value: np.ndarray, spaced: Callable = np.geomspace
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Means of a series over windows of time that grow by a factor, at their mean times."""
+    """Return means of a series over windows of growing length, at their mean times."""
     cuts = spaced(time[0], time[-1], WINDOWS + 1)[1:-1]
     parts = np.searchsorted(cuts, time)
     number = np.bincount(parts)
@@ -65,7 +65,7 @@ def means_of_windows(
 
 
 def draw_species(axes: plt.Axes, run: Run) -> None:
-    """Kinetic solid, potential dotted, a colour per species; faint: every sample."""
+    """Draw kinetic energy solid and potential dotted, a colour for each species."""
     curves = [(name, "kinetic", "-") for name in run.names]
     if np.any(run.gravity):
         curves += [(name, "potential", ":") for name in run.names]
@@ -82,7 +82,7 @@ def draw_species(axes: plt.Axes, run: Run) -> None:
 
 
 def draw(runs: list[Run]) -> plt.Figure:
-    """Two rows with one time axis."""
+    """Draw two rows with one time axis."""
     figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(9, 7.5))
     draw_species(top, runs[0])
     for run, colour in zip(runs, colours(len(runs), 2), strict=True):

@@ -27,7 +27,7 @@ WAYS = {"virial": "virial", "rate": "collision rate", "walls": "force on the wal
 
 
 def likeness(runs: list[Run]) -> float:
-    """<r>^2 / <r^2>, for which the curves are: 1 for equal disks, and much the same for all."""
+    """Return <r>^2 / <r^2>, 1 for equal disks, which the curves depend on."""
     found = np.array([np.mean(run.radius) ** 2 / np.mean(run.radius**2) for run in runs])
     equal = np.array([np.ptp(run.radius) == 0 for run in runs])
     other = (np.abs(found - found[0]) > UNLIKE) | (equal != equal[0])
@@ -40,7 +40,7 @@ def likeness(runs: list[Run]) -> float:
 
 
 def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
-    """A row per packing fraction, empty where a way does not apply; and what speaks against it."""
+    """Return a row for each packing fraction, empty where a way does not apply, and the notes."""
     rows, notes, alike = [], [], likeness(runs)
     for eta, same in by_packing(runs):
         row = {"packing": eta, "runs": len(same)}
@@ -58,7 +58,7 @@ def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
 
 
 def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
-    """Z above, its deviation from the reference below."""
+    """Draw Z above, and its deviation from the reference below."""
     figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(8, 8), height_ratios=(2, 1))
     alike, fluid, solid = likeness(runs), np.linspace(0, 0.72, 200), np.linspace(0.715, 0.86, 100)
     laws = (hard_disks.henderson(fluid), hard_disks.simulated(fluid))

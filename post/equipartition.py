@@ -40,7 +40,7 @@ class Approach(NamedTuple):
 
 
 def entry(time: np.ndarray, gap: np.ndarray, within: float = 0.1, lasting: int = 3) -> float:
-    """When a gap (W,) enters `within`, on the line between its windows, to stay for `lasting`."""
+    """Return when a gap (W,) enters `within` for at least `lasting` windows, by interpolation."""
     close = gap <= within
     for k in range(len(time) - lasting + 1):
         if close[k : k + lasting].all():
@@ -50,7 +50,7 @@ def entry(time: np.ndarray, gap: np.ndarray, within: float = 0.1, lasting: int =
 
 
 def approach(runs: list[Run], width: float, within: float) -> Approach:
-    """Means over runs of the windowed energies of the lightest and the heaviest species."""
+    """Return energies of the lightest and heaviest species by window, means over runs."""
     both = []
     for kind in lightest_and_heaviest(runs[0]):
         name = runs[0].names[kind]
@@ -67,7 +67,7 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
 
 
 def late(runs: list[Run], name: str, skip: float | None) -> Estimate:
-    """Mean over runs of an observable in equilibrium."""
+    """Return the mean over runs of an observable in equilibrium."""
     means = []
     for run in runs:
         time, value = run.observable(name)
@@ -76,13 +76,13 @@ def late(runs: list[Run], name: str, skip: float | None) -> Estimate:
 
 
 def start_width(run: Run) -> float:
-    """v0: the largest `speed` in the input."""
+    """Return v0, the largest `speed` in the input."""
     species = run.parameters.get("species", {})
     return max(float(species.get(name, {}).get("speed", 0.0)) for name in run.names)
 
 
 def draw(groups: list, results: list[Approach], until: float, within: float) -> plt.Figure:
-    """A panel per v0."""
+    """Draw a panel for each v0."""
     figure, panels = plt.subplots(
         len(groups), 1, sharex=True, squeeze=False, figsize=(8, 1.2 + 2.1 * len(groups))
     )

@@ -21,7 +21,7 @@ PROPERTIES = "species:S:1:pos:R:2:velo:R:2:radius:R:1:mass:R:1"
 
 
 def rows(run: Run, frame: int) -> list[list[str]]:
-    """Species, x, y, vx, vy, radius, mass, and the elements of each disk, as words."""
+    """Return species, x, y, vx, vy, radius, mass and further quantities of each disk, as text."""
     species = [run.names[s - 1] for s in run.species]
     moving = [*run.position[frame].T, *run.velocity[frame].T, run.radius, run.mass]
     columns = [one.tolist() for one in (*moving, *(own[frame] for own in run.disk_data.values()))]
@@ -29,7 +29,7 @@ def rows(run: Run, frame: int) -> list[list[str]]:
 
 
 def xyz_frame(run: Run, frame: int) -> str:
-    """One frame as extended XYZ; positions from the lower corner as origin of the lattice."""
+    """Return a frame as extended XYZ; the lower corner is the origin of positions."""
     (width, height), (x0, y0) = run.edges, run.lower
     pbc = " ".join("T" if p else "F" for p in (*run.periodic, False))
     properties = ":".join([PROPERTIES, *(f"{name}:R:1" for name in run.disk_data), "id:I:1"])
@@ -45,7 +45,7 @@ def xyz_frame(run: Run, frame: int) -> str:
 
 
 def csv_frame(run: Run, frame: int) -> str:
-    """One frame as comma-separated lines."""
+    """Return a frame as comma-separated lines."""
     time = str(run.time[frame])
     return "".join(
         ",".join((time, str(k), *disk)) + "\n" for k, disk in enumerate(rows(run, frame), start=1)

@@ -49,7 +49,7 @@ PANELS = {"density": "A", "flow": "B", "temperature": "C"}  # of what there is a
 
 
 def draw_profile(runs: list[Run], axis: int, x: np.ndarray, found: dict, law) -> plt.Figure:
-    """Density, flow along the walls, temperatures, and what disks carry, across an axis."""
+    """Draw density, flow along the walls, temperatures, stress and heat across an axis."""
     run, flow = runs[0], f"flow_{'yx'[axis]}"
     figure, panels = plt.subplot_mosaic("AABBCC;DDDEEE", figsize=(12, 7))
     draw_fields(panels["A"], x, found, "density")
@@ -77,7 +77,7 @@ def draw_profile(runs: list[Run], axis: int, x: np.ndarray, found: dict, law) ->
 
 
 def draw_fields(axes: plt.Axes, x: np.ndarray, found: dict, *names: str) -> None:
-    """Points with errors; cells without disks are gaps."""
+    """Draw points with errors, with gaps at cells without disks."""
     there = [name for name in names if name in found]
     for name in there:
         label = LABELS[name] if len(there) > 1 else "measured"
@@ -87,13 +87,13 @@ def draw_fields(axes: plt.Axes, x: np.ndarray, found: dict, *names: str) -> None
 
 
 def with_ends(run: Run, axis: int, x: np.ndarray) -> np.ndarray:
-    """The places x between the first and the last where centres can be."""
+    """Return the positions x between the first and the last that centres can reach."""
     reach = run.radius[0]
     return np.concatenate([[run.lower[axis] + reach], x, [run.upper[axis] - reach]])
 
 
 def walls(run: Run, axis: int) -> list[dict]:
-    """The two sides across an axis that are kept at a temperature: where, kT and flow."""
+    """Return position, kT and flow of the two thermal sides across an axis."""
     each = zip(SIDES, run.sides, np.stack([run.lower, run.upper], axis=1).ravel(), strict=True)
     return [
         {
@@ -108,7 +108,7 @@ def walls(run: Run, axis: int) -> list[dict]:
 
 
 def at_walls(run: Run, axis: int, law: dict) -> list[dict]:
-    """Rows: kT and flow of the walls, and of the gas next to them by the law."""
+    """Return kT and flow of the walls, and of the gas next to them by theory."""
     rows = []
     for wall in walls(run, axis):
         end = 0 if wall["wall"] == ACROSS[axis][0] else -1
@@ -120,7 +120,7 @@ def at_walls(run: Run, axis: int, law: dict) -> list[dict]:
 
 
 def draw_grid(runs: list[Run], cells: tuple[int, int], found: dict) -> plt.Figure:
-    """Maps of density and temperature, with the flow as arrows."""
+    """Draw maps of density and temperature, with the flow as arrows."""
     run = runs[0]
     figure, panels = plt.subplots(1, 2, figsize=(12, 1 + 5 * run.edges[1] / run.edges[0]))
     sides = [np.linspace(run.lower[k], run.upper[k], cells[k] + 1) for k in (0, 1)]
@@ -143,7 +143,7 @@ def draw_grid(runs: list[Run], cells: tuple[int, int], found: dict) -> plt.Figur
 
 
 def cells_of(text: str) -> tuple[int, ...]:
-    """N cells of a profile, or NX,NY of a map."""
+    """Parse N cells of a profile, or NX,NY of a map."""
     cells = tuple(int(word) for word in text.split(","))
     if min(cells) < 1 or not 2 <= np.prod(cells) <= MOST_CELLS:
         raise argparse.ArgumentTypeError(f"there are 2 to {MOST_CELLS} cells")

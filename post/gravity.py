@@ -41,7 +41,7 @@ CROWDED = 0.5  # of the area at the floor: more is too much for the first order
 
 
 class Samples(NamedTuple):
-    """Of one species in F frames: (F, n) squared speeds, their x part, and heights."""
+    """Samples of one species in F frames: (F, n) squared speeds, their x part, and heights."""
 
     mass: float
     radius: float
@@ -51,14 +51,14 @@ class Samples(NamedTuple):
 
 
 def samples(run: Run, kind: Species, frames: list[int]) -> Samples:
-    """Squared speeds, and heights above the lowest place."""
+    """Return squared speeds, and heights above the lowest position."""
     squares = run.velocity[frames][:, kind.disks] ** 2
     height = run.position[frames][:, kind.disks, 1] - (run.lower[1] + kind.radius)
     return Samples(kind.mass, kind.radius, squares.sum(axis=2), squares[..., 0], height)
 
 
 def log_slope(values: np.ndarray, limits: tuple[float, float], bins: int = 30) -> float:
-    """Decay constant of a histogram, by a weighted line through its logarithm."""
+    """Return the decay constant of a histogram, by a weighted line through its logarithm."""
     counts, edges = np.histogram(values, bins, limits)
     good = counts >= 5
     if good.sum() < 3:
@@ -68,12 +68,12 @@ def log_slope(values: np.ndarray, limits: tuple[float, float], bins: int = 30) -
 
 
 def sharers(run: Run) -> float:
-    """How many disks share a fixed energy: infinitely many where a bath gives and takes it."""
+    """Return how many disks share a fixed energy: infinitely many in contact with a heat bath."""
     return run.n_disks if run.nature.keeps_energy else np.inf
 
 
 def sharing(energy: np.ndarray, temperature: float, count: float) -> np.ndarray:
-    """Weight of a state of one disk, where `count` disks share a fixed energy; 1 at energy 0."""
+    """Return the weight of an energy of one disk among `count` that share a fixed energy."""
     if np.isinf(count):
         return np.exp(-energy / temperature)
     return np.maximum(1 - energy / (2 * count * temperature), 0) ** (2 * count - 2)
@@ -82,9 +82,9 @@ def sharing(energy: np.ndarray, temperature: float, count: float) -> np.ndarray:
 def crowded_heights(
     height: np.ndarray, species: list[Samples], pull: float, kt: float, width: float, share: float
 ) -> list[np.ndarray]:
-    """Densities at the heights (H,), with the area that disks take from each other.
+    """Return densities at the heights (H,), with the area that disks exclude for each other.
 
-    `width` is that of the box for centres, `share` as of `sharers`.  A disk does not crowd itself.
+    `width` is that of the box for centres, `share` is from `sharers`.  No disk excludes itself.
     """
     numbers = [s.height.shape[1] for s in species]
     ideal = [sharing(s.mass * pull * height, kt, share) for s in species]
@@ -103,26 +103,26 @@ def crowded_heights(
 
 
 def normalised(x: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Density with the integral 1."""
+    """Scale a density to the integral 1."""
     return weight / np.trapezoid(weight, x)
 
 
 def law_slope(x: np.ndarray, density: np.ndarray, limits: tuple[float, float], count: int) -> float:
-    """What `log_slope` gives for `count` values that follow a density exactly."""
+    """Return the slope that `log_slope` finds for `count` values of an exact density."""
     integral = scipy.integrate.cumulative_trapezoid(density, x, initial=0)
     ranks = (np.arange(count) + 0.5) / count
     return log_slope(np.interp(ranks, integral / integral[-1], x), limits)
 
 
 def crowding(run: Run, species: list[Samples], kt: float) -> float:
-    """The largest share of the area at the floor that disks without size would take from one."""
+    """Return the largest share of the area at the floor that disks exclude for one another."""
     radius, pull = np.array([(s.radius, s.height.shape[1] * s.mass) for s in species]).T
     taken = np.pi * np.add.outer(radius, radius) ** 2 @ pull * abs(run.gravity[1]) / kt
     return float(taken.max() / (run.edges[0] - 2 * radius[0]))
 
 
 def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, list[np.ndarray]]:
-    """All heights that a disk can have, and the densities of `crowded_heights` there, or NaN."""
+    """Return all heights that a disk can have, and the densities of `crowded_heights`, or NaN."""
     free = run.edges - 2 * species[0].radius
     grid = np.linspace(0, free[1], 4001)
     if crowding(run, species, kt) > CROWDED:
@@ -131,7 +131,7 @@ def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, li
 
 
 def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[dict]:
-    """Fitted slopes over those of the exponential laws, and the same for the dashed laws."""
+    """Return fitted slopes over those of the exponential laws and of the dashed laws."""
     temperature = kt[0]
     grid, crowded = heights(run, species, temperature)
     rows = []
@@ -156,7 +156,7 @@ def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[d
 
 
 def draw_histogram(panels, values: np.ndarray, top: float, colour: str, label: str) -> None:
-    """The same histogram, normalised, in a linear and a logarithmic panel; errors by blocks."""
+    """Draw a normalised histogram in a linear and a logarithmic panel; errors by blocks."""
     bins = np.linspace(0, top, 51)
     blocks = np.array_split(values, min(BLOCKS, len(values)))
     parts = [binned(part.ravel(), bins).mean for part in blocks]
@@ -166,7 +166,7 @@ def draw_histogram(panels, values: np.ndarray, top: float, colour: str, label: s
 
 
 def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> plt.Figure:
-    """Squared speeds above, heights below; linear left, logarithmic right."""
+    """Draw squared speeds above and heights below; linear left, logarithmic right."""
     figure, panels = plt.subplots(2, 2, figsize=(11, 8), sharex="row")
     kt, g = result[0]["kT"], float(np.abs(run.gravity[1]))
     squares = np.linspace(0, 18 * kt / min(s.mass for s in species), 1000)

@@ -35,7 +35,7 @@ RATIO_TOP = 2.0  # of the axis of ratios, at most
 
 
 def draw(runs: list[Run], groups: list, results: list) -> plt.Figure:
-    """K against time, double logarithmic, and against collisions, logarithmic; below the ratios."""
+    """Draw K against time and against collisions, and the ratios to the laws below."""
     figure, panels = plt.subplots(
         2, 2, sharex="col", sharey="row", figsize=(10, 7), height_ratios=(2, 1)
     )
@@ -76,7 +76,7 @@ def draw(runs: list[Run], groups: list, results: list) -> plt.Figure:
 
 
 def energies(groups: list, results: list) -> list[dict]:
-    """Those after 5, 10 and 20 collisions per disk, as far as the runs go."""
+    """Return the energies after 5, 10 and 20 collisions per disk, as far as the runs go."""
     rows = []
     for (xi, members), (found, *_) in zip(groups, results, strict=True):
         reached = found["collisions_per_disk"]
@@ -91,14 +91,14 @@ def energies(groups: list, results: list) -> list[dict]:
 
 
 def expected(law: Restitution, found: dict) -> tuple[str, float]:
-    """The cooling rate by the law, or of soft disks its exponent where that of the runs is."""
+    """Return the predicted cooling rate, or the exponent of soft disks in the same period."""
     if law.law == "constant":
         return "rate", haff_rate(law.xi)
     return "exponent", exponent(found["w0_t"], found["haff"])
 
 
 def rates(groups: list, results: list) -> list[dict]:
-    """The cooling rate beside the law, and where the homogeneous state ends."""
+    """Return the cooling rate with its prediction, and the end of the homogeneous state."""
     return [
         {
             "restitution": xi.name,
@@ -112,7 +112,7 @@ def rates(groups: list, results: list) -> list[dict]:
 
 
 def apart(xi: Restitution, found: dict, end: float) -> list[str]:
-    """What a rate a little below the law adds up to, where the homogeneous state has no end."""
+    """Return how far a rate slightly below the law carries K from it by the end of a run."""
     ratio, tau = found["K"].mean[-1] / found["law"][-1], found["collisions_per_disk"][-1]
     if not np.isnan(end) or abs(ratio - 1) < 1 - SLOW:
         return []

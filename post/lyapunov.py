@@ -34,7 +34,7 @@ class Divergence(NamedTuple):
 
 
 def distance(one: Run, other: Run) -> np.ndarray:
-    """(T,) between two runs, in the space of the positions of all disks."""
+    """Return the distance (T,) of two runs in the space of the positions of all disks."""
     frames = min(one.n_frames, other.n_frames)
     if one.n_disks != other.n_disks or not np.array_equal(one.time[:frames], other.time[:frames]):
         raise RunError(f"{other.path}: not the same disks at the same times as in {one.path}")
@@ -58,7 +58,7 @@ def divergence(time: np.ndarray, apart: np.ndarray, largest: float, begin: float
 
 
 def draw(found: Divergence) -> plt.Figure:
-    """Each pair thin; their geometric mean thick, with the line of the exponent."""
+    """Draw each pair thin, and their geometric mean thick with the fitted line."""
     figure, axes = plt.subplots(figsize=(7, 5))
     for track in found.logarithm:
         axes.semilogy(found.time, np.exp(track), color=COLOURS[0], lw=0.6, alpha=0.4)

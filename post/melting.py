@@ -22,7 +22,7 @@ import numpy as np
 
 
 def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
-    """A row per number of disks and packing fraction; and what speaks against it."""
+    """Return a row for each number of disks and packing fraction, and the notes."""
     rows, notes = [], []
     for count, own in grouped(runs, lambda run: run.n_disks):
         for eta, same in by_packing(own):
@@ -34,7 +34,7 @@ def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
 
 
 def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
-    """Points with error bars, and published ones as lines."""
+    """Draw points with error bars, and published values as lines."""
     figure, axes = plt.subplots(figsize=(8, 5.5))
     for (name, points), style in zip(MELTING.items(), (":", "--", "-"), strict=True):
         axes.plot(*np.transpose(points), ls=style, color="0.4", lw=1, label=name)

@@ -35,7 +35,7 @@ SPEEDS = np.linspace(0, 12, 2001)  # in units of sqrt(kT / mu)
 
 
 def missed_share(q: np.ndarray) -> np.ndarray:
-    """P(q), the share of collisions missed at the relative speed g, q = g dt / s."""
+    """Return P(q), the share of collisions missed at the relative speed g, q = g dt / s."""
     q = np.asarray(q, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         short = np.minimum(q, 1)
@@ -46,7 +46,7 @@ def missed_share(q: np.ndarray) -> np.ndarray:
 
 
 def expected_share(run: Run, step: float, temperature: float) -> float:
-    """P averaged over all kinds of pairs of a dilute gas in equilibrium, by their rates."""
+    """Return P averaged over all kinds of pairs of a dilute gas in equilibrium."""
     shares, rates = [], []
     pull = float(np.linalg.norm(run.gravity))
     for a, b in combinations_with_replacement(kinds_of_disks(run), 2):
@@ -60,7 +60,7 @@ def expected_share(run: Run, step: float, temperature: float) -> float:
 
 
 def rate_and_temperature(run: Run, skip: float | None) -> tuple[float, float]:
-    """Pair collisions per disk and time, both disks counted, and kT; in equilibrium."""
+    """Return pair collisions per disk and time, and kT, in equilibrium."""
     time, tau = run.collisions_per_disk
     first = int(np.searchsorted(time, start_of_equilibrium(run, skip)))
     if first >= len(time) - 1:
@@ -70,7 +70,7 @@ def rate_and_temperature(run: Run, skip: float | None) -> tuple[float, float]:
 
 
 def compare(runs: list[Run], skip: float | None) -> list[dict]:
-    """A row per step, shares in percent; the event-driven runs come first, with dt = 0."""
+    """Return a row for each time step, in percent; event-driven runs come first, with dt = 0."""
     groups = grouped(runs, lambda run: run.time_step)
     if groups[0][0] != 0 or len(groups) < 2:
         raise RunError("event-driven runs and runs by time steps are needed")
@@ -91,7 +91,7 @@ def compare(runs: list[Run], skip: float | None) -> list[dict]:
 
 
 def draw(runs: list[Run], rows: list[dict]) -> plt.Figure:
-    """The share that is missed against dt, measured and expected."""
+    """Draw the missed share against dt, measured and expected."""
     figure, axes = plt.subplots(figsize=(6.5, 4.5))
     names = ("dt", "missed_percent", "missed_percent_error")
     dt, share, error = (np.array([row[name] for row in rows[1:]]) for name in names)

@@ -31,13 +31,13 @@ BINS = 60  # of a histogram
 
 
 def pooled(runs: list[Run], frames: list[list[int]], name: str) -> np.ndarray:
-    """All speeds of a species in these frames."""
+    """Return all speeds of a species in these frames."""
     each = zip(runs, frames, strict=True)
     return np.concatenate([run.speed(k)[run.of_species(name)] for run, own in each for k in own])
 
 
 def independent(runs: list[Run], frames: list[list[int]], name: str) -> int:
-    """How many independent speeds those of a species count as: heavy disks forget theirs slowly."""
+    """Return the number of independent speeds; heavy disks decorrelate slowly."""
     mask, found = runs[0].of_species(name), 0.0
     for run, own in zip(runs, frames, strict=True):
         series = np.array([run.kinetic_energy(frame)[mask].mean() for frame in own])
@@ -46,7 +46,7 @@ def independent(runs: list[Run], frames: list[list[int]], name: str) -> int:
 
 
 def table(runs: list[Run], frames: list[list[int]], skip: float | None = None) -> list[dict]:
-    """Per species: mean speed and energy at the start and in equilibrium, and the theory."""
+    """Return mean speed and energy of each species at the start and in equilibrium, and theory."""
     rows = []
     for kind in kinds_of_disks(runs[0]):
         name, mass = kind.name, kind.mass
@@ -66,7 +66,7 @@ def table(runs: list[Run], frames: list[list[int]], skip: float | None = None) -
 
 
 def speed_bins(start: np.ndarray, top: float) -> np.ndarray:
-    """Some 60 bins up to `top`; if disks start at one speed, a bin is centred on it."""
+    """Return about 60 bins up to `top`; a common first speed is the centre of a bin."""
     speed, width = float(np.mean(start)), top / BINS
     if 0 < speed < top and np.ptp(start) < 1e-9 * speed:
         width = speed / max(1, round(speed / width))
@@ -74,7 +74,7 @@ def speed_bins(start: np.ndarray, top: float) -> np.ndarray:
 
 
 def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Figure:
-    """One row per species: start and equilibrium."""
+    """Draw a row for each species: start and equilibrium."""
     names = runs[0].names
     figure, panels = plt.subplots(
         len(names), 2, sharex=True, squeeze=False, figsize=(10, 3.2 * len(names))

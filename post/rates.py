@@ -43,7 +43,7 @@ STRAIGHT |= {"thermal_walls", "unequal_temperatures", "sliding_surfaces"}
 
 
 def check(runs: list[Run]) -> None:
-    """Refuse what is no gas in an empty box, and runs of different systems."""
+    """Refuse runs with obstacles or gravity, and runs of different systems."""
     first = runs[0]
     for run in runs:
         allow(run, "rates are those of a gas in an empty box", *td.FLUID, *STRAIGHT)
@@ -55,14 +55,14 @@ def check(runs: list[Run]) -> None:
 
 
 def scales(runs: list[Run]) -> np.ndarray:
-    """Factors by which the kT of runs that keep theirs is brought to their mean."""
+    """Return the factors that bring the kT of runs of fixed energy to their mean."""
     kept = all(run.nature.keeps_kinetic_energy for run in runs)
     kts = np.array([td.kt_at_start(run) if kept else 1.0 for run in runs])
     return kts.mean() / kts
 
 
 def over_all(runs: list[Run], skip: float | None, notes: list[str]) -> dict[str, SeriesMean]:
-    """What has an error, at one temperature of the runs: hard disks only move faster."""
+    """Return the numbers with errors, all scaled to one temperature."""
     kts = scales(runs)
     found = [td.rates(run, skip) for run in runs]
     means = {}
@@ -75,7 +75,7 @@ def over_all(runs: list[Run], skip: float | None, notes: list[str]) -> dict[str,
 
 
 def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
-    """The mean pressure over the runs, at one kT, by the virial and by four walls."""
+    """Return the mean pressure over the runs in time, by the virial and by four walls."""
     cuts = np.linspace(0, min(run.collisions_per_disk.time[-1] for run in runs), FINE + 1)
 
     def growth(*parts: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -101,7 +101,7 @@ def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
 
 
 def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Lengths of the paths that the disks of all frames are on, and the weight of each."""
+    """Return the lengths of the free paths at all frames, and their weights."""
     allow(run, "free paths are those of disks that fly freely in an empty box", *STRAIGHT)
     log = run.event_log()
     disk = np.concatenate([log.i, log.j[log.j > 0]])
@@ -122,9 +122,9 @@ def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndar
 def mean_and_density(
     runs: list[Run], skip: float | None = None
 ) -> tuple[Estimate, Estimate] | None:
-    """The mean free path, and the density of paths in units of it, in `BINS`; None without a log.
+    """Return the mean free path and the density of paths in units of it; None without a log.
 
-    Their errors are from the scatter of the runs, or of a single run's frames in blocks.
+    Errors are from the scatter of the runs, or of a single run's frames in blocks.
     """
     parts = [free_paths(run, skip) for run in runs if td.has_log(run)]
     if not parts or sum(len(path) for path, _ in parts) == 0:
@@ -145,7 +145,7 @@ def mean_and_density(
 
 
 def draw_pressure(axes: plt.Axes, curves: dict[str, Curve], mean: SeriesMean, start: float) -> None:
-    """The pressure in time with its error; its mean in equilibrium."""
+    """Draw the pressure in time with its error, and its mean in equilibrium."""
     x = curves["virial"].x
     end = x[-1] + x[0]
     for (way, curve), colour in zip(curves.items(), COLOURS, strict=False):
@@ -161,7 +161,7 @@ def draw_pressure(axes: plt.Axes, curves: dict[str, Curve], mean: SeriesMean, st
 
 
 def draw_paths(axes: plt.Axes, paths: tuple[Estimate, Estimate], equal: bool) -> None:
-    """The free paths, and those without memory."""
+    """Draw the free paths, and those of molecular chaos."""
     mean, height = paths
     label = f"measured, $\\ell$ = {' ± '.join(statistics.rounded_to_error(*mean))}"
     bars(axes, height, BINS, color=COLOURS[0], label=label)
@@ -174,7 +174,7 @@ def draw_paths(axes: plt.Axes, paths: tuple[Estimate, Estimate], equal: bool) ->
 
 
 def table(runs: list[Run], start: float, means: dict, path: Estimate | None) -> list[dict]:
-    """A row per quantity: exact ones first, then those with an error."""
+    """Return a row for each quantity: exact ones first, then those with an error."""
     begin = "equilibrium_from" if means else "from_time"
     exact = {"packing": td.packing(runs[0]), begin: start}
     momentum = np.mean([td.drift(run) * run.mass.sum() for run in runs], axis=0)

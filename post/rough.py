@@ -17,7 +17,7 @@ from ricochet.script import command_line, launch, measured, report, spread
 
 
 def draw(runs: list[Run], law: tuple, exact: float | None, found: Curves) -> plt.Figure:
-    """Both temperatures, logarithmic, and their ratio."""
+    """Draw both temperatures, logarithmic, and their ratio."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 5))
     tau, start = found["collisions_per_disk"], (found["T"].mean[0], found["T_rot"].mean[0])
     expected = theory.rough_temperatures(tau, start, *law)

@@ -15,7 +15,7 @@ import numpy as np
 
 
 def table(runs: list[Run]) -> list[dict]:
-    """A row for each number of disks and threads, in ascending order."""
+    """Return a row for each number of disks and threads, in ascending order."""
     groups = grouped(runs, lambda run: (run.n_disks, int(run.provenance.get("threads", 1))))
     walls = {key: [recorded(run, "wall_time") for run in same] for key, same in groups}
     rows = []
@@ -30,7 +30,7 @@ def table(runs: list[Run]) -> list[dict]:
 
 
 def draw(rows: list[dict]) -> plt.Figure:
-    """Gain against threads; dotted what perfect sharing would give."""
+    """Draw the speedup against threads; perfect sharing is dotted."""
     figure, axes = plt.subplots(figsize=(7, 5.5))
     for (disks, own), colour in zip(grouped(rows, lambda row: row["disks"]), COLOURS, strict=False):
         threads, y, low, high = (

@@ -19,7 +19,7 @@ import numpy as np
 
 
 def moving_and_resting(run: Run) -> tuple[int, int]:
-    """Which disk moves at the start, and which does not."""
+    """Return which disk moves at the start, and which does not."""
     moving = np.flatnonzero(run.speed(0))
     if run.n_disks != 2 or len(moving) != 1:
         raise RunError(f"{run.path}: needs two disks, one of them at rest")
@@ -27,7 +27,7 @@ def moving_and_resting(run: Run) -> tuple[int, int]:
 
 
 def scattering(run: Run) -> dict[str, float]:
-    """Impact parameter and deflection of the disk that moves at the start."""
+    """Return impact parameter and deflection of the moving disk."""
     law = "the law is for two smooth disks that meet freely"
     allow(run, law, "walls", "inelastic", "rotating", "mixture")
     i, k = moving_and_resting(run)
@@ -46,7 +46,7 @@ def scattering(run: Run) -> dict[str, float]:
 
 
 def draw(rows: list[dict], ratio: float, restitution: float) -> plt.Figure:
-    """The angle above, its difference from the exact one below; `ratio` of the masses."""
+    """Draw the angle, and its deviation from the exact one for this `ratio` of masses."""
     names = ("b_over_R12", "angle_degrees", "error_degrees")
     s, angle, error = (np.array([row[name] for row in rows]) for name in names)
     figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(6, 6), height_ratios=(3, 1))

@@ -22,7 +22,7 @@ from matplotlib.colors import LogNorm, Normalize, to_rgba_array
 
 
 def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
-    """A colour scale without the few largest values; a logarithmic one without the smallest too."""
+    """Return a colour scale without the few largest values; a logarithmic one starts above 0."""
     if colour == "psi6":
         return Normalize(-180, 180)
     moved = values[values > 0]
@@ -33,7 +33,7 @@ def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
 
 
 def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> plt.Figure:
-    """One panel per frame."""
+    """Draw one panel for each frame."""
     aspect = drawing.aspect_of(run)
     rows, columns = drawing.panel_grid(len(frames), aspect)
     width = min(10.5, (6.0 if len(frames) == 1 else 3.4) * columns) / columns

@@ -54,7 +54,7 @@ UNSTEADY = "No steady kT yet: each frame at its own"
 
 
 def state_of(run: Run) -> str:
-    """That of the late frames, if nothing drifts."""
+    """Return the state of the late frames: equilibrium, steady, or one that changes."""
     if run.n_disks < 3:
         raise Refused(f"{run.path}: needs three disks and more, whose collisions make a law")
     known = set(TRAITS) - {"changed", "collapsed", "sliding_surfaces"}
@@ -65,7 +65,7 @@ def state_of(run: Run) -> str:
 
 
 def temperature(runs: list[Run], picked: list[list[int]]) -> tuple[SeriesMean, list[float], bool]:
-    """The kT over these frames and those between, of the first and the last, whether it drifts."""
+    """Return kT over these frames, that of the first and the last, and whether it drifts."""
     tracks = [
         kt_of_frames(run, slice(frames[0], frames[-1] + 1))
         for run, frames in zip(runs, picked, strict=True)
@@ -80,7 +80,7 @@ def temperature(runs: list[Run], picked: list[list[int]]) -> tuple[SeriesMean, l
 def pooled(
     runs: list[Run], picked: list[list[int]], state: str, kts: tuple
 ) -> tuple[Estimate, dict]:
-    """The late frames of runs with the same number of disks: density of speeds (B,), and tests."""
+    """Return density (B,) and tests of the speeds in late frames of runs of one N."""
     own, each = zip(runs, picked, strict=True), state not in (EQUILIBRIUM, STEADY)
     u = np.concatenate([reduced_speeds(*one, each=each) for one in own])
     n = runs[0].n_disks * sum(map(independent_frames, runs, picked))
@@ -109,7 +109,7 @@ def pooled(
 
 
 def draw_histogram(axes: plt.Axes, heights: list[Estimate], labels: list[str]) -> None:
-    """Step histograms over the Maxwell curve."""
+    """Draw step histograms over the Maxwell curve."""
     style = {"fill": True, "alpha": 0.45} if len(heights) == 1 else {"fill": False}
     for height, label, colour in zip(heights, labels, colours(len(labels)), strict=True):
         bars(axes, height, BINS, color=colour, label=label, lw=1.6, **style)
@@ -121,7 +121,7 @@ def draw_histogram(axes: plt.Axes, heights: list[Estimate], labels: list[str]) -
 
 
 def draw_relaxation(axes: plt.Axes, groups: list) -> None:
-    """a2 against collisions per disk, mean and error over the runs."""
+    """Draw a2 against collisions per disk, mean and error over the runs."""
     equal = True
     for (count, runs), colour in zip(groups, colours(len(groups)), strict=True):
         tracks = [relaxation(run) for run in runs]
@@ -145,7 +145,7 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
 
 
 def cooling(row: dict) -> str:
-    """How far a gas has cooled; one that falls may become hotter."""
+    """Return by how much a gas has cooled; under gravity it may have become hotter."""
     goes = "falls" if row["kT_last"] < row["kT_first"] else "goes"
     if row["frames"] == row["runs"]:
         return f"kT is {row['kT_last']:.4g}"
@@ -153,7 +153,7 @@ def cooling(row: dict) -> str:
 
 
 def label_of(row: dict, state: str) -> str:
-    """The temperature and the tests in words."""
+    """Return temperature and tests as text."""
     size, free, exact = row["speeds"], row["independent"], row["KS_p_exact"]
     words = f"N = {row['N']}: {size} speeds" + (f", {free} independent" if free < size else "")
     steady = state in (STEADY, MOVING)
@@ -164,12 +164,12 @@ def label_of(row: dict, state: str) -> str:
 
 
 def chance(p: float) -> str:
-    """A probability in words, never as 0 or 1."""
+    """Return a probability as text, never as 0 or 1."""
     return "p < 0.0001" if p < 1e-4 else f"p = {min(p, 0.9999):.4f}"
 
 
 def draw(runs: list[Run], groups: list, pools: list, state: str) -> plt.Figure:
-    """Four panels: start, last frame, late frames, relaxation."""
+    """Draw four panels: start, last frame, late frames, relaxation."""
     figure, ((first, last), (late, way)) = plt.subplots(2, 2, figsize=(10, 7))
     largest = groups[-1][1][0]
     for axes, frame, when in ((first, 0, "first frame"), (last, -1, f"t = {largest.time[-1]:.4g}")):

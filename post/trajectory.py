@@ -16,10 +16,10 @@ from matplotlib.patches import Circle
 
 
 def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
-    """(T', 2) positions of each disk in these frames.
+    """Return the positions (T', 2) of each disk in these frames.
 
-    A path that crosses periodic sides goes on beyond them, and comes in from beyond: a row of NaN
-    breaks the line between the two pieces.
+    A path that crosses a periodic side is continued beyond it and re-enters on the other side; a
+    row of NaN separates the two pieces.
     """
     paths = list(np.moveaxis(run.position[frames][:, disks], 1, 0))
     if run.image is None:
@@ -29,7 +29,7 @@ def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
 
 
 def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """The path (T, 2) with each step over a side drawn in every cell that it may touch."""
+    """Return the path (T, 2) with each step over a side repeated in every cell it may touch."""
     rows = [path[:1]]
     gap = np.full((1, 2), np.nan)
     for start, end, jump in zip(path[:-1], path[1:], np.diff(image, axis=0), strict=True):
@@ -42,7 +42,7 @@ def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarra
 
 
 def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) -> None:
-    """Paths, with the disk where it is at the end; the others grey."""
+    """Draw paths, with each disk at its last position; the other disks are grey."""
     draw_box(axes, run, run.time[frames[-1]])
     others = np.full(run.n_disks, "0.85")
     others[disks] = "none"

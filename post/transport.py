@@ -43,7 +43,7 @@ Results = list[tuple[float, dict[str, Found]]]
 
 
 def table(results: Results) -> tuple[list[dict], list[str]]:
-    """A row per packing fraction and coefficient; doubts."""
+    """Return a row for each packing fraction and coefficient, and the notes."""
     rows, unsettled, notes = [], [], []
     for eta, found in results:
         for name in filter(found.get, LABELS):
@@ -61,7 +61,7 @@ def table(results: Results) -> tuple[list[dict], list[str]]:
 
 
 def draw(results: Results, rows: list[dict]) -> plt.Figure:
-    """All coefficients over Enskog's, against the lag and against packing."""
+    """Draw all coefficients over Enskog's, against the lag and against packing."""
     there = set().union(*(found for _, found in results))
     layout, height = [[*filter(there.__contains__, LABELS), "all"]], 4.5
     if "D" in there:

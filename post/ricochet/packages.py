@@ -1,6 +1,6 @@
-"""The packages of others that this one needs: all that are missing, and what to do about it.
+"""Reports which required packages are missing, and how to install them.
 
-The scripts import `ricochet` before others, so that no script needs to look for itself.
+The scripts import `ricochet` before other packages, so that no script has to check for itself.
 """
 
 import sys

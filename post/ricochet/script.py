@@ -1,4 +1,4 @@
-"""What the scripts in post/ share: options, the report at the end, exit codes.
+"""Options, report and exit codes that the scripts in post/ share.
 
 Figures are drawn without a display, in the style of `style.mplstyle`.
 """

@@ -1,7 +1,7 @@
-"""Gases that cool: energies of many runs on common grids, Haff's law, temperatures of rough disks.
+"""Gases that cool: energies of several runs, Haff's law, temperatures of rough disks.
 
-tau = collisions per disk.  `Curves` has by name what several runs say together: grids as arrays,
-what is measured on them as estimates.
+tau is the number of collisions per disk.  `Curves` contains grids as arrays, and measured
+quantities on them as estimates, by name.
 """
 
 from collections.abc import Sequence

@@ -1,28 +1,29 @@
-"""What disks remember of where they were and how fast: means over pairs of moments (t0, t).
+"""Time correlation functions: displacements, velocities, and F_s(k, t), by species.
 
     from ricochet import correlations, read_run
     found = correlations.measured([read_run("runs/glass.h5")], waves=[5.2], skip=0)
     found["small"]["msd"]                # a Curve: lags x, means y, errors
 
-By species, and of "all" disks, against the lag t - t0; r is the way of a disk from t0 to t:
+They are means over pairs of samples at times t0 and t, against the lag t - t0, for each species and
+for "all" disks; r is the displacement of a disk from t0 to t:
 
     msd        <r^2>
     vacf       <v(t0) v(t)>, at the lag 0 the mean square speed
-    diffusion  <v(t0) r> / 2, half the integral of vacf; not where kicks change velocities meanwhile
-    alpha2     <r^4> / (2 <r^2>^2) - 1: 0 where r is normal (non-Gaussian parameter)
+    diffusion  <v(t0) r> / 2, half the integral of vacf; not for disks that are kicked
+    alpha2     <r^4> / (2 <r^2>^2) - 1, the non-Gaussian parameter: 0 where r is Gaussian
     overlap    share of the disks with r < `reach` [0.3 mean diameters]
     F_s(k)     <J0(k r)>, the mean of exp(i k r) over all directions, for each k of `waves`
 
-Ways are relative to the centre of mass along axes where nothing changes its motion.
+Displacements are relative to the centre of mass along axes where its velocity is conserved.
 
-Pairs: in each twelfth of a power of ten that lag counts which most pairs of samples have, of equals
-the first; so frames at equal steps, in decades, in bursts, or a mixture of these each give what
-they can. Of each sixteenth of a lag the first sample that has a partner is its origin: as many as
-make a difference.  That is the multiple-tau correlator of Ramirez et al., J. Chem. Phys. 133,
-154103 (2010), without its means over neighbouring samples, so that each lag is exact.
+In each twelfth of a power of ten the lag is used that most pairs of samples have, so that samples
+at equal steps, in decades, in bursts, or a mixture of these are all exploited.  In each sixteenth
+of a lag the first sample that has a partner is an origin; more origins would hardly reduce the
+error.  This is the multiple-tau correlator of Ramirez et al., J. Chem. Phys. 133, 154103 (2010),
+without its means over neighbouring samples, so that each lag is exact.
 
-Errors are those over the runs; of a single run over sixteenths of its time, for lags up to an
-eighth of it, and none (NaN) for longer ones.
+Errors are over the runs.  For a single run they are over sixteenths of its time, for lags up to an
+eighth of it; longer lags have no error (NaN).
 """
 
 from collections.abc import Iterable, Iterator, Sequence

@@ -1,7 +1,7 @@
-"""A crater: the projectile, the bed, and the size of what the one did to the other.
+"""Craters: the projectile, the bed, and the size of the crater.
 
-The projectile is the species of that name, or else the only disk that moves at the start; the
-others are the bed.
+The projectile is the species of that name, or else the only disk that moves at the start; all other
+disks are the bed.
 """
 
 from typing import Any, NamedTuple

@@ -1,10 +1,10 @@
 """Fields of a run in its steady state, in the cells of a grid, and the profiles between two walls.
 
-What the fields are is in fields.py.  Their errors are those of the jackknife, which leaves out one
-block of time after the other, of all runs; a block lasts until what it began with is forgotten.  It
-also takes off a bias: a temperature relative to a flow that was found from the same n values is too
-small by 1 / n.  Blocks of unequal weight as in Busing, Meijer and van der Leeden, Stat. Comput. 9,
-3 (1999).  C cells, G blocks.
+The docstring of post/fields.py defines the fields.  Their errors are those of the jackknife over
+blocks of time of all runs; a block is so long that its start and its end are independent.  The
+jackknife also removes a bias: a temperature relative to a flow that was estimated from the same n
+values is too small by 1 / n.  Blocks of unequal weight are treated as in Busing, Meijer and van der
+Leeden, Stat. Comput. 9, 3 (1999).  C cells, G blocks.
 """
 
 from collections.abc import Callable

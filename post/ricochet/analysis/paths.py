@@ -1,4 +1,4 @@
-"""The true paths of disks between frames, by the event log: free flights from turn to turn."""
+"""The true paths of disks between frames, from the event log: free flights between collisions."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Speeds of the disks of a gas in units of their thermal speed, and the law that they follow."""
+"""Speeds of the disks of a gas in units of their thermal speed, and their distribution."""
 
 from collections.abc import Sequence
 

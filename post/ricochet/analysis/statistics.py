@@ -1,7 +1,7 @@
-"""Means with errors, fits, and tests of a sample against a law.
+"""Means with errors, fits, and goodness-of-fit tests.
 
-Two kinds of error: `estimate` is for independent members, such as runs that differ by their seed;
-`correlated_mean` is for one series in time, whose samples remember each other.
+There are two kinds of error: `estimate` is for independent values, such as runs that differ by
+their seed; `correlated_mean` is for one series in time, whose samples are correlated.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,6 +1,6 @@
-"""How disks are arranged: pair correlation, structure factor, clusters, order of the bonds.
+"""Structure of a run: pair correlation, structure factor, clusters, bond order.
 
-A handful of lines of scipy each, and no library: those know periodic boxes, but not walls.
+The functions need little code with SciPy; libraries for them support periodic boxes, but no walls.
 """
 
 from collections.abc import Callable, Iterable, Sequence

@@ -1,9 +1,9 @@
 """Pressure, collision rates and temperature of a run in equilibrium, with errors.
 
-Three independent ways to the pressure: the virial of the pair collisions, the collision rate (equal
-disks), the force on the sides.  Z = P / (n kT).  kT is exact where the kinetic energy is kept, else
-the mean of what is steady.  `skip` is what is left out at the start, in collisions per disk; None
-finds it.
+The pressure can be measured in three independent ways: by the virial of the pair collisions, by the
+collision rate (equal disks), and by the force on the sides.  Z = P / (n kT).  kT is exact where the
+kinetic energy is conserved, otherwise a mean over time.  `skip` is the equilibration, in collisions
+per disk, that is left out at the start; None lets it be found.
 """
 
 from collections.abc import Sequence

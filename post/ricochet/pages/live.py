@@ -1,7 +1,7 @@
 """Pages for the browsers of this computer: a server, and the newest film of a run that goes on.
 
-Requests that do not come from a page of this very address are refused before they cost anything,
-lest pages of other hosts read along under a name that points here (DNS rebinding).
+Requests from a page of another address are refused at once, so that pages of other hosts cannot
+read along under a name that points here (DNS rebinding).
 """
 
 import asyncio

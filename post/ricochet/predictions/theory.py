@@ -1,6 +1,6 @@
-"""Laws that figures are compared with: speeds, scattering, relaxation, chambers.
+"""Theory that measurements are compared with: speeds, scattering, relaxation, chambers.
 
-Two dimensions throughout; u = v / sqrt(2 kT / m) is the reduced speed, x = K / kT = u^2.
+Two dimensions throughout; u = v / sqrt(2 kT / m) is the reduced speed.
 """
 
 from collections.abc import Callable

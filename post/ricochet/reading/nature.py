@@ -1,12 +1,12 @@
-"""What kind of run this is: the one place that says it, and in which words a law refuses a run.
+"""The traits of a run, and which theories apply to it.
 
-    run.nature                      # Nature({'inelastic', 'walls', ...}), what sets it apart from
+    run.nature                      # Nature({'inelastic', 'walls', ...}), the differences from
                                     # equal smooth elastic disks in an empty periodic box
-    run.nature.closed               # whether no energy comes or goes but what collisions lose
+    run.nature.closed               # whether only collisions change the energy
     allow(run, "Haff's law", "inelastic", "mixture")   # refuses a run with any other trait
 
-A trait is found from the parameters of a run and from its balance of energy, by a pure function of
-both: a file, a file that is still being written and a simulation in memory have the same nature.
+The traits follow from the parameters of a run and from its balance of energy, by a pure function:
+a file, a file that is still being written and a simulation in memory are treated alike.
 """
 
 from collections.abc import Mapping

@@ -1,11 +1,12 @@
-"""Many runs of one input: made in parallel, safe to stop and to repeat; and gathered in a table.
+"""Many runs of one input, in parallel, and the table of their results.
 
     values = {"contact.restitution": [0.8, 0.9], "run.seed": range(8)}
     table = ricochet.sweep("input/gas.nml", values, "runs/scan")
     table = ricochet.ensemble("runs/scan")       # a row for each member, also of runs/ensemble.sh
 
-A folder of members is what `runs/ensemble.sh` makes: input.nml, manifest.txt with the overrides of
-each, NAME.h5 and NAME.log.  Each goes on with what the other has left.
+Both can be stopped and repeated at any time.  A folder of members is that of `runs/ensemble.sh`:
+input.nml, manifest.txt with the overrides of each member, NAME.h5 and NAME.log.  Each of the two
+continues the members that the other has left.
 """
 
 import contextlib

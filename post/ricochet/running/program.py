@@ -1,6 +1,6 @@
-"""Start the program from Python: an input file or a dictionary in, a `Run` out.
+"""Start the program from Python: from an input file or a dictionary to a `Run`.
 
-Its standard error is a terminal to the program, which tells a terminal how far it is.
+The program reports its progress to a terminal; its standard error is one here.
 """
 
 import atexit

@@ -1,4 +1,4 @@
-"""Starting files: disks from arrays, in the text that `species.file` reads."""
+"""Starting files: arrays of disks, as the text that `species.file` reads."""
 
 import re
 from pathlib import Path
