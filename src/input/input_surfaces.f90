@@ -16,7 +16,7 @@ module input_surfaces
   use texts, only: counted, place_of, written
   implicit none
   private
-  public :: check_least, has_points, take_grip, take_obstacles, take_wall_laws
+  public :: check_least, has_many, take_grip, take_obstacles, take_wall_laws
 
 contains
 
@@ -31,28 +31,31 @@ contains
     complete = .true.
     do k = 1, size(groups)
       call check_name(groups, k, problems)
-      if (groups(k)%given("file")) call take_file(groups(k), problems)
-      if (groups(k)%name == "wall") call take_points(groups(k), problems)
+      call take_file(groups(k), problems)
+      call take_points(groups(k), problems)
       do v = 1, size(groups(k)%values)
         associate (value => groups(k)%values(v))
           if (table(value%row)%status /= "example") cycle           ! has a default, or may be left out
-          if (.not. (groups(k)%given("file") .or. has_points(groups(k)))) call groups(k)%demand(trim(value%name), problems)
+          if (.not. has_many(groups(k))) call groups(k)%demand(trim(value%name), problems)
           complete = complete .and. value%is_set()
         end associate
       end do
     end do
     if (.not. complete) return
     do k = 1, size(groups)
-      n(k) = size(groups(k)%reals_of(trim(merge("to    ", "centre", groups(k)%name == "wall"))))/2
+      n(k) = size(groups(k)%reals_of(trim(merge("centre", "to    ", groups(k)%name == "obstacle"))))/2
     end do
     call box%add_obstacles(groups%instance, n)
     do k = 1, size(groups)
       m = sum(n(:k - 1))
-      if (groups(k)%name == "wall") then
-        call take_walls(groups(k)%reals_of("from"), groups(k)%reals_of("to"))
-      else
-        call take_circles(groups(k)%reals_of("centre"), groups(k)%reals_of("radius"), groups(k)%text_of("side") == "inside")
-      end if
+      associate (group => groups(k))
+        select case (group%name)
+        case ("wall")
+          call take_walls(group%reals_of("from"), group%reals_of("to"))
+        case default                                      ! "obstacle"
+          call take_circles(group%reals_of("centre"), group%reals_of("radius"), group%text_of("side") == "inside")
+        end select
+      end associate
     end do
 
   contains
@@ -80,14 +83,22 @@ contains
     end subroutine take_circles
   end subroutine take_obstacles
 
-  !> Whether a group is a polyline.
-  pure function has_points(group) result(yes)
+  !> Whether a group has obstacles from a file, or is a polyline.
+  pure function has_many(group) result(yes)
     type(group_t), intent(in) :: group
     logical :: yes
 
-    yes = group%name == "wall"
-    if (yes) yes = group%given("points")
-  end function has_points
+    yes = has(group, "file") .or. has(group, "points")
+  end function has_many
+
+  !> Whether a variable is given, if there is one of this name in the group.
+  pure function has(group, name) result(yes)
+    type(group_t), intent(in) :: group
+    character(len=*), intent(in) :: name
+    logical :: yes
+
+    yes = any(group%values%name == name .and. group%values%given)
+  end function has
 
   !> Takes the obstacles of a file into the variables that one obstacle has.
   subroutine take_file(group, problems)
@@ -96,6 +107,7 @@ contains
     real(real64), allocatable :: rows(:, :)               ! (columns,n)
     type(error_t), allocatable :: error
 
+    if (.not. has(group, "file")) return
     if (group%faulty("file")) return
     call read_obstacles(group%text_of("file"), group%name == "wall", rows, error)
     if (allocated(error)) then
@@ -115,7 +127,8 @@ contains
     type(group_t), intent(inout) :: group
     type(problem_list_t), intent(inout) :: problems
 
-    if (.not. has_points(group) .or. group%faulty("points")) return
+    if (.not. has(group, "points")) return
+    if (group%faulty("points")) return
     associate (points => group%reals_of("points"))
       if (modulo(size(points), 2) > 0 .or. size(points) < 4) then
         call group%complain("points", counted(size(points, kind=int64), "value")//"; allowed: x1, y1, x2, y2, ... of two points " &

@@ -9,7 +9,7 @@ module run_description
     parameters_group, provenance, saved_at, species_counts, species_names, wall_time
   use hdf5_handle, only: hdf5_version
   use hdf5_objects, only: hdf5_file_t, scalar
-  use input_surfaces, only: has_points
+  use input_surfaces, only: has_many
   use input_groups, only: group_t, value_t, range_of
   use variables, only: is_repeated, obstacle_groups, table
   use settings, only: run_input_t
@@ -265,7 +265,7 @@ contains
     real(real64), allocatable :: values(:)
     integer :: g, k, n(size(groups))                  ! n: obstacles of each group
 
-    if (.not. any([(groups(g)%given("file") .or. has_points(groups(g)), g=1, size(groups))])) return
+    if (.not. any([(has_many(groups(g)), g=1, size(groups))])) return
     path = parameters_group//trim(groups(1)%name)//"_rows/"
     do k = 1, size(groups(1)%values)
       associate (row => table(groups(1)%values(k)%row))

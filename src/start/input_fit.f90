@@ -7,6 +7,7 @@ module input_fit
   use errors, only: exit_files
   use input_groups, only: group_t, range_of
   use input_problems, only: most_problems, problem_list_t
+  use input_surfaces, only: has_many
   use memory, only: check_memory
   use obstacle_file, only: origin_of_row
   use partners, only: n_sides, side_name
@@ -92,9 +93,9 @@ contains
 
     colon = index(misfit, ": ")
     number = count(box%obstacle(:m)%surface == box%obstacle(m)%surface)          ! in its group
-    if (group%given("file")) then
+    if (has_many(group) .and. .not. any(group%values%name == "points" .and. group%values%given)) then
       call group%complain("file", origin_of_row(group%text_of("file"), number)//": "//misfit, problems)
-    else if (size(group%reals_of(misfit(:colon - 1))) > 2) then
+    else if (has_many(group)) then
       call group%complain("points", "point "//written(number + merge(1, 0, misfit(:colon - 1) == "to"))//" "//misfit(colon + 2:), &
         problems)
     else

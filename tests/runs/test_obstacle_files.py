@@ -160,3 +160,53 @@ def test_too_many_groups_are_refused_in_one_line(program, tmp_path):
     assert done.returncode == USAGE
     assert done.stderr.count("more than 5000 groups") == 1
     assert "(file)" in done.stderr
+
+
+def crowded(seed: int) -> str:
+    """A few disks among many obstacles; some with gravity, sides that move, losses, a big disk."""
+    rng = np.random.default_rng(seed)
+    edges, many = rng.permutation([4.0, 7.0]), int(rng.integers(30, 200))
+    scale = np.sqrt(np.prod(edges) / many)
+    periodic = rng.random(2) < 0.5
+    falls = np.where(periodic | (rng.random(2) < 0.5), 0, rng.uniform(-1, 1, 2))
+    kinds = ", ".join("'periodic'" if one else "'wall'" for one in periodic)
+    text = [
+        f"&box upper = {edges[0]}, {edges[1]} boundary = {kinds} gravity = {falls[0]}, {falls[1]} /"
+    ]
+    for x, y in rng.uniform(0, edges, (many, 2)):
+        if rng.random() < 0.7:
+            text += [f"&obstacle centre = {x}, {y} radius = {rng.uniform(0.05, 0.3) * scale} /"]
+        else:
+            end = np.clip((x, y) + rng.uniform(-1.5, 1.5, 2) * scale, 0, edges)
+            text += [f"&wall from = {x}, {y} to = {end[0]}, {end[1]} /"]
+    if not periodic[0] and rng.random() < 0.5:
+        text += ["&side name = 'left' motion = 'sine' amplitude = 0.1 period = 1.3 /"]
+    size = rng.uniform(0.02, 0.1) * scale
+    gas = "velocities = 'maxwell' temperature = 1"
+    text += [f"&species name = 'gas' count = {rng.choice([1, 3, 25])} radius = {size} {gas} /"]
+    if rng.random() < 0.4:
+        text += [f"&species name = 'big' count = 1 radius = {2.5 * size} {gas} /"]
+    if rng.random() < 0.3:
+        text += ["&contact restitution = 0.9 contact_time = 1e-6 /"]
+    return "\n".join(
+        [*text, "&stop events = 1200 time = 100 /", "&output frames_every_events = 20 /"]
+    )
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_every_way_to_search_finds_the_same_among_many_obstacles(program, tmp_path, seed):
+    path, found = write_input(tmp_path, crowded(seed)), []
+    for name, *options in (
+        ("cells",),
+        ("pairs", "run.search=pairs"),
+        ("heap", "run.queue=heap", "run.threads=2"),
+    ):
+        sets = [word for option in options for word in ("--set", option)]
+        done = ran(program, path, "-o", tmp_path / f"{name}.h5", *sets)
+        assert done.returncode == FINISHED, done.stderr
+        with h5py.File(tmp_path / f"{name}.h5") as file:
+            found += [
+                [file[f"particles/disks/{what}/value"][()] for what in ("position", "velocity")]
+            ]
+    for other in found[1:]:
+        assert all(map(np.array_equal, found[0], other))

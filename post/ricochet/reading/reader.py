@@ -713,9 +713,9 @@ def obstacles_of(parameters: Mapping[str, Any]) -> tuple[Obstacle, ...]:
     return tuple(Obstacle(c, float(r), bool(i)) for c, r, i in zip(*parts, strict=True))
 
 
-def walls_of(parameters: Mapping[str, Any]) -> np.ndarray:
+def walls_of(parameters: Mapping[str, Any], group: str = "wall") -> np.ndarray:
     """Return the straight walls (W, 2, 2), in the order of their codes in the event log."""
-    rows = parameters.get("wall_rows", parameters.get("wall"))
+    rows = parameters.get(f"{group}_rows", parameters.get(group))
     return np.stack([rows["from"], rows["to"]], axis=1) if rows else np.empty((0, 2, 2))
 
 
