@@ -51,8 +51,25 @@ COLUMNS = {
 class Simulation:
     """A simulation in memory, at its start.
 
-    `system` is the path of an input file, its text, or its groups as for `ricochet.run`;
-    `overrides` as there.  `threads` are those of the input, or one.
+    Parameters
+    ----------
+    system : str, Path or mapping
+        an input file, its text, or its groups, as for `ricochet.run`
+    overrides : mapping of str to object, optional
+        values of variables, as for `ricochet.run`
+    threads : int, optional
+        number of threads [that of the input, or one]
+
+    Raises
+    ------
+    ProgramError
+        if the input has a mistake, with the lines of the program
+
+    Examples
+    --------
+    >>> with ricochet.Simulation(small, {"run.seed": 2}) as box:
+    ...     box.advance(collisions=10).position.shape
+    (20, 2)
     """
 
     __slots__ = ("__weakref__", "_handle", "_lock", "_settled", "_start_energy")
@@ -67,7 +84,7 @@ class Simulation:
         overrides: Mapping[str, Any] | None = None,
         threads: int | None = None,
     ):
-        """Problems with the input raise `ProgramError`, with the program's own lines."""
+        """Start from an input; the class describes the arguments."""
         text, groups = read_input(system), isinstance(system, Mapping)
         try:
             self._begin(text, settings_of({} if overrides is None else overrides), threads)
@@ -77,13 +94,13 @@ class Simulation:
 
     @classmethod
     def _of(cls, text: str, settings: list[str]) -> Self:
-        """Of an input's text, with overrides GROUP.VARIABLE=VALUE."""
+        """Return a simulation of the text of an input with settings GROUP.VARIABLE=VALUE."""
         self = cls.__new__(cls)
         self._begin(text, settings)
         return self
 
     def _begin(self, text: str, settings: list[str], threads: int | None = None) -> None:
-        """With overrides GROUP.VARIABLE=VALUE."""
+        """Start from the text of an input with settings GROUP.VARIABLE=VALUE."""
         words = c_text(text), c_text("\n".join(settings))
         engine = library(files=b".h5" in b"".join(words))
         self._take(opened(engine.ricochet_open, *words, whole_threads(threads)))
@@ -96,19 +113,45 @@ class Simulation:
 
     @classmethod
     def load(cls, path: str | Path, threads: int | None = None) -> Self:
-        """The simulation of the last checkpoint of a run, finished or not."""
+        """Return the simulation of the last checkpoint of a run, finished or not.
+
+        Parameters
+        ----------
+        path : str or Path
+            the output file, or its `.part`
+        threads : int, optional
+            number of threads [that of the input, or one]
+
+        Returns
+        -------
+        Simulation
+            the simulation, at the time of the checkpoint
+        """
         self = cls.__new__(cls)
         load = library(files=True).ricochet_load
         self._take(opened(load, c_text(Path(path)), whole_threads(threads)))
         return self
 
     def save(self, path: str | Path, force: bool = False, input: str | Path | None = None) -> Path:
-        """Write `path`.part, from which `ricochet INPUT -o path --resume` goes on; its path.
+        """Write a file from which `ricochet INPUT -o path --resume` continues.
 
-        It has the samples of the start (after a change: of now), and the state of now.  After a
-        change INPUT is another than that of the start: the file `input`, which this writes, too.
-        That is a new file, or one
-        that `save` has written and nobody has edited since.
+        It contains the samples of the start and the present state.  After a change INPUT differs
+        from the input of the start: it is the text that is written to `input`.
+
+        Parameters
+        ----------
+        path : str or Path
+            the output file of the run to be continued
+        force : bool
+            whether an existing file may be replaced
+        input : str or Path, optional
+            where to write the present input: a new file, or one that `save` has written and that
+            nobody has edited since
+
+        Returns
+        -------
+        Path
+            `path` with `.part` at its end
         """
         path = Path(path)
         if input is not None:
@@ -120,7 +163,7 @@ class Simulation:
         return path.with_name(f"{path.name}.part")
 
     def close(self) -> None:
-        """Give its memory back; nothing can be asked afterwards."""
+        """Free the memory; the simulation cannot be used afterwards."""
         handle = getattr(self, "_handle", None)
         if handle:
             with self._lock:
@@ -174,19 +217,19 @@ class Simulation:
         return self
 
     def _endless(self) -> bool:
-        """Whether the input has no rule that stops it, wall clock aside."""
+        """Whether no rule of the input stops the run, apart from wall-clock time."""
         return self.parameters.get("stop", {}).keys() <= {"wall_clock"}
 
     def _go_on(self, limits: tuple[float, int, int], patience: float) -> bool:
-        """Towards these limits for some seconds; whether they are still ahead."""
+        """Advance towards these limits for some seconds; return whether they are still ahead."""
         with self._open() as handle:
             return called(library().ricochet_advance, handle, *limits, patience)
 
     def _settle(self) -> float:
-        """Complete what happens about now; returns a time that leads another run to the same state.
+        """Complete all events up to now; return a time at which another run has the same state.
 
-        Where a slice has ended, `time` may be rounded, and the engine about to count from another
-        origin: that is over at the next double.
+        At the end of a slice `time` may be rounded, and the engine may be about to change its
+        origin of time; both are over at the next double.
         """
         if self.time != self._settled:
             self._settled = math.nextafter(self.time, math.inf) if self.time > 0 else 0.0
@@ -224,7 +267,7 @@ class Simulation:
 
     @property
     def changes(self) -> list[tuple[float, str, str]]:
-        """What has changed while it ran: time, name, value."""
+        """Changes during the simulation: time, name and value of each."""
         found = []
         for line in self._text("changes").splitlines():
             time, _, rest = line.partition(" ")
@@ -252,13 +295,13 @@ class Simulation:
         return found
 
     def _values(self) -> dict[str, Any]:
-        """The values of all variables that have one, by GROUP.NAME.VARIABLE."""
+        """Return the values of all variables that have one, by GROUP.NAME.VARIABLE."""
         lines = (line.split(" = ", 1) for line in self._text("parameters").splitlines())
         return {name: json.loads(text) if ", ... " not in text else text for name, text in lines}
 
     @property
     def nature(self) -> Nature:
-        """What kind of run this is so far: see `ricochet.nature`."""
+        """The traits of the simulation so far: see `ricochet.nature`."""
         energy = self.observable("all/kinetic_energy") * self.n_disks
         lost = self.observable("dissipated_energy")
         return nature_of(
@@ -272,7 +315,7 @@ class Simulation:
 
     @property
     def time(self) -> float:
-        """Since the start of the run."""
+        """Time since the start of the run."""
         with self._open() as handle:
             return library().ricochet_time(handle)
 
@@ -289,16 +332,16 @@ class Simulation:
 
     @property
     def collisions(self) -> int:
-        """Of pairs of disks, since the start."""
+        """Number of collisions of two disks since the start."""
         return self._counts()[1]
 
     @property
     def events(self) -> int:
-        """Collisions of pairs, and with walls and obstacles, since the start."""
+        """Number of collisions of any kind since the start."""
         return self._counts()[2]
 
     def _column(self, name: str) -> np.ndarray:
-        """An array of `COLUMNS`, (N,) or (N, 2): a copy, disks in the order of the input."""
+        """Return a copy of an array of `COLUMNS`, disks in the order of the input."""
         values = np.empty((self.n_disks, 2))
         with self._open() as handle:
             width = library().ricochet_column(handle, name.encode(), values.ctypes.data)
@@ -376,20 +419,20 @@ class Simulation:
 
     @property
     def observables(self) -> list[str]:
-        """The names of what can be observed, as in the output file."""
+        """The names of the observables, as in the output file."""
         return list(self._observed())
 
     def observable(self, name: str) -> Any:
-        """The value of an observable now: a number, or an array of its components."""
+        """Return the present value of an observable: a number, or an array of its components."""
         found = self._observed()
         if name not in found:
             raise RunError(f"there is no observable {name}{did_you_mean(name, found)}")
         return found[name].item() if len(found[name]) == 1 else found[name]
 
     def next_events(self, most: int) -> list[tuple[float, int, int]]:
-        """The next collisions in order: time, i, j as in the event log.
+        """Return the next collisions in order, as time, i and j of the event log.
 
-        There are fewer if none come for long.  Time steps know of none, and raise.
+        There may be fewer than `most`.  A simulation by time steps cannot predict them: RunError.
         """
         records = np.empty((max(int(most), 0), 6))
         with self._open() as handle:
@@ -419,7 +462,7 @@ def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict[str, A
 
 
 def after_fork() -> None:
-    """Close, in the child, what a thread was stepping that the child does not have."""
+    """Close, in a child process, the simulations that another thread was advancing."""
     for simulation in ALIVE:
         if not simulation._lock.acquire(blocking=False):
             simulation._handle = None
@@ -430,10 +473,10 @@ os.register_at_fork(after_in_child=after_fork)
 
 
 class Held:
-    """A simulation that nobody else steps or closes meanwhile."""
+    """Lock of a simulation, so that no other thread advances or closes it meanwhile."""
 
     def __init__(self, simulation: Simulation):
-        """To be held in a `with`, which gives its handle."""
+        """Take the simulation; `with` acquires the lock and returns the handle."""
         self.simulation = simulation
 
     def __enter__(self) -> int:
@@ -491,7 +534,7 @@ def write_input(path: Path, text: str) -> None:
 
 
 def read_input(system: str | Path | Mapping[str, Any]) -> str:
-    """The text of an input, of whatever kind."""
+    """Return the text of an input of any kind."""
     if (text := unseen(system)) is not None:
         return text
     try:
@@ -501,7 +544,7 @@ def read_input(system: str | Path | Mapping[str, Any]) -> str:
 
 
 def c_text(text: str | Path) -> bytes:
-    """A text or a path for the library, for which a zero byte is the end."""
+    """Return a text or a path for the library; a zero byte in it is refused."""
     words = os.fsencode(text) if isinstance(text, Path) else text.encode(errors="surrogateescape")
     if b"\0" in words:
         raise ValueError(f"{text!r} has a zero byte")
@@ -509,7 +552,7 @@ def c_text(text: str | Path) -> bytes:
 
 
 def opened(make: Callable[..., int], *arguments: object) -> int:
-    """A new handle, by a function of the library."""
+    """Return a new handle from a function of the library; raise its error."""
     message, code = ctypes.create_string_buffer(ROOM), ctypes.c_int()
     handle = make(*arguments, message, ROOM, ctypes.byref(code))
     if not handle:
@@ -518,7 +561,7 @@ def opened(make: Callable[..., int], *arguments: object) -> int:
 
 
 def called(function: Callable[..., int], *arguments: object) -> bool:
-    """Call a function that answers with a code; whether it wants to be called again."""
+    """Call a function of the library; raise its error; return whether to call it again."""
     message = ctypes.create_string_buffer(ROOM)
     code = function(*arguments, message, ROOM)
     if code > 1:
@@ -528,7 +571,7 @@ def called(function: Callable[..., int], *arguments: object) -> bool:
 
 @functools.cache
 def library(files: bool = False) -> ctypes.CDLL:
-    """The engine; with the functions for files it needs the HDF5 of the system."""
+    """Load the engine; the version with functions for files needs the HDF5 of the system."""
     name = "libricochet_files.so" if files else "libricochet.so"
     wish = os.environ.get("RICOCHET_LIBRARY")  # a folder
     places = [Path(wish)] if wish else [HERE / "lib", HERE.parents[1] / "build"]
