@@ -274,12 +274,12 @@ equal 0.5 2432 --set box.boundary=periodic,periodic
 equal 0.1 3607 --set box.boundary=periodic,periodic
 equal 0.5 2509 --set box.gravity=0,-1
 equal 0.1 3717 --set box.gravity=0,-1
-lognormal 0.7 2950
-lognormal 0.5 4580
-lognormal 0.3 6920
-lognormal 0.1 5200
-uniform 0.7 2780
-uniform 0.5 4110
+lognormal 0.7 2888
+lognormal 0.5 4503
+lognormal 0.3 6720
+lognormal 0.1 5154
+uniform 0.7 2735
+uniform 0.5 3996
 LIMITS
   while read -r name limit; do
     obstacles "$name"

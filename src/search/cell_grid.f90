@@ -7,7 +7,7 @@ module cell_grid
   use box_sides, only: next_side
   use cell_contents, only: cell_contents_t, gather
   use cell_faces, only: all_cells, cell_faces_t, patch_t
-  use cell_scans, only: scan_around_seam, scan_cells, scan_chains_around, scan_list, scan_one
+  use cell_scans, only: scan_around_seam, scan_cells, scan_chains_around, scan_disks, scan_list
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
   use images, only: images_t
@@ -197,11 +197,9 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
 
-    associate (cell => sim%tag(i)%cell)
-      if (.not. self%patch%holds(cell)) return
-      call self%lists%lay(i, sim%disk(i)%radius, sim%position(i), self%faces, cell)
-      call self%lists%enter(i, self%cells, self%patch, cell)
-    end associate
+    if (.not. self%patch%holds(sim%tag(i)%cell)) return
+    call self%lists%lay(i, sim%disk(i)%radius, sim%position(i), self%faces, sim%tag(i)%cell)
+    call self%lists%enter(i, self%cells, self%patch, sim%tag(i)%cell)
   end subroutine list
 
   !> Marks a cell if a disk there may meet an obstacle, a big disk, or others beyond a periodic side; or may be big.
@@ -339,8 +337,9 @@ contains
     end if
     if (self%cells%cell(self%cells%number(sim%tag(i)%cell))%needs_care() .or. &
       self%cells%cell(self%cells%number(sim%tag(j)%cell))%needs_care()) then
-      if (self%lists%used .and. .not. allocated(self%reach%first)) then
-        if (is_plainly_listed(self, sim%tag(i)%cell, i) .and. is_plainly_listed(self, sim%tag(j)%cell, j)) then
+      if (self%lists%used) then
+        if (is_plainly_listed(self, sim%tag(i)%cell, i) .and. is_plainly_listed(self, sim%tag(j)%cell, j) .and. &
+          .not. (self%reach%has_any(sim%tag(i)%cell) .or. self%reach%has_any(sim%tag(j)%cell))) then
           call self%predict_listed(sim, i, j)
           return
         end if
@@ -468,8 +467,7 @@ contains
     class(cell_grid_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
     type(tag_t), intent(in) :: tag(:)
-    integer(int32), intent(in) :: stage
-    integer(int32), intent(in) :: disks(:)
+    integer(int32), intent(in) :: stage, disks(:)
 
     if (self%lists%used) then
       call self%lists%read_ahead(disk, tag, stage, disks)
@@ -556,7 +554,7 @@ contains
       do while (e > 0)
         associate (entry => self%reach%entry(e))
           if (entry%code > 0) then
-            call scan_one(sim, entry%code, self%images%image(real(entry%image, real64)), near)
+            call scan_disks(sim, [entry%code], self%images%image(real(entry%image, real64)), near)
           else
             number = entry%image
             shift = self%images%shift(number)
@@ -571,7 +569,7 @@ contains
     !> the cells along its rim.
     subroutine find_event_of_big()
       real(real64) :: t_margin
-      integer(int32) :: number, m, image
+      integer(int32) :: number, m, image, n, c(9)
 
       number = self%reach%number_of(i)
       call next_side(sim%box, sim%disk(i), near%time, near%partner)
@@ -582,16 +580,20 @@ contains
       if (t_margin < near%time) near%partner = looks_again
       near%time = min(near%time, t_margin)
       do image = 1, self%images%count()
-        do m = 1, size(self%reach%big, kind=int32)
-          call scan_one(sim, self%reach%big(m)%disk, self%images%image(self%images%around(image)), near)
+        call scan_disks(sim, self%reach%big%disk, self%images%image(self%images%around(image)), near)
+      end do
+      associate (rim => self%reach%big(number)%rim)
+        n = 0
+        do m = 1, size(rim, kind=int32)            ! cells that are seen through one image together
+          n = n + 1
+          c(n) = rim(m)%cell(1) + self%cells%stride*rim(m)%cell(2)
+          if (m < size(rim) .and. n < size(c)) then
+            if (all(rim(m + 1)%image == rim(m)%image)) cycle
+          end if
+          call scan_cells(self%cells, sim, c(:n), near, self%images%image(real(-rim(m)%image, real64)))
+          n = 0
         end do
-      end do
-      do m = 1, size(self%reach%big(number)%rim, kind=int32)
-        associate (place => self%reach%big(number)%rim(m))
-          call scan_cells(self%cells, sim, [place%cell(1) + self%cells%stride*place%cell(2)], near, &
-            self%images%image(real(-place%image, real64)))
-        end associate
-      end do
+      end associate
     end subroutine find_event_of_big
   end subroutine predict_with_care
 

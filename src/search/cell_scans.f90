@@ -10,21 +10,24 @@ module cell_scans
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: scan_around_seam, scan_cells, scan_chains_around, scan_list, scan_one
+  public :: scan_around_seam, scan_cells, scan_chains_around, scan_disks, scan_list
 
 contains
 
-  !> The contact with one disk, seen through an image.
-  pure subroutine scan_one(sim, j, image, near)
+  !> Contacts with some disks, seen through an image.
+  pure subroutine scan_disks(sim, disks, image, near)
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: j
-    type(image_t), intent(in) :: image             !! through which it is seen
+    integer(int32), intent(in) :: disks(:)
+    type(image_t), intent(in) :: image             !! through which they are seen
     type(prospect_t), intent(inout) :: near
+    integer(int32) :: first
 
-    near%n = 1
-    near%list(1) = j - 1
-    call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image)
-  end subroutine scan_one
+    do first = 1, size(disks, kind=int32), list_capacity
+      near%n = min(size(disks, kind=int32) - first + 1, list_capacity)
+      near%list(:near%n) = disks(first:first + near%n - 1) - 1
+      call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image)
+    end do
+  end subroutine scan_disks
 
   !> Contacts with the disks in the list of a disk.
   subroutine scan_list(lists, sim, images, falling, near)
@@ -47,7 +50,7 @@ contains
     call test_list()
     do k = 1, lists%n_entries(near%disk)
       call lists%neighbour(near%disk, k, j, image)
-      if (any(abs(image) > 0)) call scan_one(sim, j + 1, images%image(image), near)
+      if (any(abs(image) > 0)) call scan_disks(sim, [j + 1], images%image(image), near)
     end do
   contains
 
