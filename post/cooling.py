@@ -17,7 +17,7 @@ from ricochet.figures.drawing import band, caption, colours, dilute_limit, plt
 from ricochet.predictions.theory import EQUIPARTITION
 from ricochet.script import by_restitution, command_line, launch, measured, report, spread
 
-DASHES = ("--", ":", "-.", (0, (5, 1)), (0, (1, 3)), (0, (8, 3)))  # of the species
+DASHES = ("--", ":", "-.", (0, (5, 1)), (0, (1, 3)), (0, (8, 3)))  # line styles of the species
 
 
 def in_time(found: Curves, name: str) -> Estimate:
@@ -61,7 +61,7 @@ def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
     for name, style in styles:
         right.plot([], [], color="0.3", ls=style, label=name)
     left.set(yscale="log", xlabel="time (reduced units)")
-    low, high = left.get_ylim()  # of an elastic gas of one kind they would enclose rounding alone
+    low, high = left.get_ylim()  # for an elastic gas the limits would enclose rounding only
     left.set_ylim(min(low, 0.9), max(high, 1.1))
     left.set_ylabel("$\\langle K \\rangle\\,/\\,\\langle K \\rangle_{all,\\,t=0}$")
     right.set(xlabel="collisions per disk")

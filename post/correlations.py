@@ -61,7 +61,7 @@ from ricochet.script import by_packing, command_line, launch, measured, over_run
 
 import numpy as np
 
-PLAIN = {"walls"}  # what equal smooth elastic disks may be
+PLAIN = {"walls"}  # traits of plain disks: equal, smooth, elastic
 #: What has no equilibrium, but a structure.
 RESTLESS = (
     "inelastic",
@@ -80,7 +80,7 @@ class Found(NamedTuple):
 
     members: dict[str, list[SeriesMean]]
     curves: dict[str, Curve]
-    lag: float | None  # of the diffusion coefficients, in mean free times; None without
+    lag: float | None  # lag of the diffusion coefficients [mean free times], or None
 
 
 def check(run: Run, first: Run) -> None:
@@ -237,7 +237,7 @@ AXES = {
     "S": {"xlabel": "$k\\,\\sigma$", "ylabel": "structure factor $S(k)$"},
     "g6": {"xlabel": "$r\\,/\\,\\sigma$", "ylabel": "$g_6(r)$", "xscale": "log", "yscale": "log"},
 }
-LINES = ("-", "--", ":", "-.")  # of all disks, and of species
+LINES = ("-", "--", ":", "-.")  # line styles of all disks, and of species
 
 
 def parts(shown: dict[str, Curve], panel: str) -> dict[str, Curve]:

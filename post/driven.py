@@ -45,9 +45,9 @@ from ricochet.script import command_line, launch, measured, over_runs, report
 import numpy as np
 
 MOST_PICTURES = 3
-POINTS, FINE = 60, 1000  # of a curve; of one that fluctuates as it should
-HEIGHT = 4.5  # of a picture in inches
-GAP = 0.1  # of a cluster, in mean diameters
+POINTS, FINE = 60, 1000  # points of a curve, and of one with real fluctuations
+HEIGHT = 4.5  # height of a picture [inch]
+GAP = 0.1  # largest gap in a cluster [mean diameters]
 SMALLEST = 2.2  # points across that a disk is drawn with at least
 Curves = dict[str, tuple[np.ndarray, np.ndarray]]  # time and value by species, '' for all of them
 

@@ -21,7 +21,7 @@ from ricochet.script import command_line, launch, report
 import numpy as np
 
 EPSILON = np.finfo(float).eps  # the smallest change of a number near 1
-WINDOWS = 60  # of time
+WINDOWS = 60  # windows of time
 
 
 def method(run: Run) -> str:

@@ -22,7 +22,7 @@ from ricochet.script import by_packing, columns, command_line, launch, measured,
 import numpy as np
 from matplotlib.ticker import LogLocator
 
-UNLIKE = 0.02  # of <r>^2 / <r^2>, between runs of one figure
+UNLIKE = 0.02  # largest difference of <r>^2 / <r^2> in a figure
 WAYS = {"virial": "virial", "rate": "collision rate", "walls": "force on the walls"}
 
 
@@ -83,7 +83,7 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
     below.axhline(0, color="black", lw=1, zorder=0)
     largest = 3 * np.nanmax(np.abs(100 * (found["Z_virial"] / expected - 1)), initial=0.1)
     below.set(xlabel="packing fraction $\\eta$", ylabel="deviation (%)", ylim=(-largest, largest))
-    most = np.nanmax([found[f"Z_{name}"] for name in WAYS])  # of the data: curves go far beyond
+    most = np.nanmax([found[f"Z_{name}"] for name in WAYS])  # top of the data; curves go far beyond
     above.set(ylabel="$Z = P\\,/\\,(n\\,kT)$", xlim=(0, 0.05 + max(eta)), title=caption(runs))
     if most > 3:
         above.semilogy()

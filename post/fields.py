@@ -32,7 +32,7 @@ import numpy as np
 from matplotlib.patches import Circle
 
 MOST_CELLS = 100_000
-LEAST_FLOW = 0.2  # of the thermal speed: the noise of a gas at rest is not drawn larger than it is
+LEAST_FLOW = 0.2  # smallest scale of arrows, in thermal speeds: noise is not enlarged
 LABELS = {
     "density": "number density n",
     "flow_x": "flow $u_x$",
@@ -45,7 +45,7 @@ LABELS = {
     "heat_x": "heat carried along x",
     "heat_y": "heat carried along y",
 }
-PANELS = {"density": "A", "flow": "B", "temperature": "C"}  # of what there is a law
+PANELS = {"density": "A", "flow": "B", "temperature": "C"}  # panels that have a prediction
 
 
 def draw_profile(runs: list[Run], axis: int, x: np.ndarray, found: dict, law) -> plt.Figure:

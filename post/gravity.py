@@ -34,10 +34,10 @@ from ricochet.script import command_line, launch, measured, report
 import numpy as np
 import scipy
 
-SPEED_RANGE = (0.0, 5.0)  # of m v^2 / 2 kT
-HEIGHT_RANGE = (1.0, 5.0)  # of m g h / kT
-BLOCKS = 10  # of time, for errors
-CROWDED = 0.5  # of the area at the floor: more is too much for the first order
+SPEED_RANGE = (0.0, 5.0)  # range of m v^2 / 2 kT
+HEIGHT_RANGE = (1.0, 5.0)  # range of m g h / kT
+BLOCKS = 10  # blocks of time, for errors
+CROWDED = 0.5  # share of the area at the floor up to which the first order is used
 
 
 class Samples(NamedTuple):

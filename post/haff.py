@@ -31,7 +31,7 @@ from ricochet.script import by_restitution, command_line, launch, measured, repo
 
 import numpy as np
 
-RATIO_TOP = 2.0  # of the axis of ratios, at most
+RATIO_TOP = 2.0  # largest top of the axis of ratios
 
 
 def draw(runs: list[Run], groups: list, results: list) -> plt.Figure:

@@ -28,7 +28,7 @@ class Divergence(NamedTuple):
     time: np.ndarray  # (T,)
     logarithm: np.ndarray  # (P, T)
     slope: np.ndarray  # (P,) [1/time]
-    exponent: Estimate  # of Lyapunov, the mean of the slopes
+    exponent: Estimate  # Lyapunov exponent, the mean of the slopes
     begin: float
     end: float
 

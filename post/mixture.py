@@ -27,7 +27,7 @@ from ricochet.script import command_line, late_frames, launch, measured, report
 
 import numpy as np
 
-BINS = 60  # of a histogram
+BINS = 60  # bins of a histogram
 
 
 def pooled(runs: list[Run], frames: list[list[int]], name: str) -> np.ndarray:

@@ -38,19 +38,19 @@ from ricochet.script import chosen_disks, chosen_frames, command_line, launch, r
 import numpy as np
 from matplotlib.colors import to_hex
 
-PAGE = Path(__file__).with_name("page")  # what the page is made of
+PAGE = Path(__file__).with_name("page")  # the parts of the page
 INPUTS = Path(__file__).resolve().parents[1] / "input"
 SCRIPTS = ("film", "camera", "stage", "panels", "controls", "stream", "live")
-SWING = ("amplitude", "period", "phase")  # of a side
+SWING = ("amplitude", "period", "phase")  # variables of an oscillating side
 STROKE = ("velocity", "start_time", "end_time")
 LAWS = ("motion", *SWING, *STROKE, "temperature", "surface_velocity")
 ROOM = 29e6  # bytes of base64 for the disks
 LIVE_ROOM = 6e6  # the same of a film that is renewed while its run goes on
 TURN = (16 + 8) * 4 / 3  # bytes of a turn of a disk between two frames, and of half an event
 MOST_FRAMES = 20000
-MOST_RADII = 256  # that are told apart
+MOST_RADII = 256  # different radii in a film
 FEW_DISKS = 20  # up to here every digit is in the page, and the events to come
-MOST_SAMPLES = 2000  # of a plot
+MOST_SAMPLES = 2000  # samples of a plot
 ENERGIES = ("kinetic", "potential", "rotational")
 MOST_AT_ONCE = 200000  # disks of the frames that are read together
 
@@ -147,7 +147,7 @@ def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[st
     exact, facts = run.n_disks <= FEW_DISKS, {"known": False, "events": False}
     try:
         log = run.event_log()
-    except RunError:  # that it is not there, or damaged, does not stop a film
+    except RunError:  # a film needs no event log
         facts["collisions"] = run.collisions_per_disk_at(run.time)[frames].tolist()
         return facts | {"note": "output.event_log tells the paths between"}, {}
     ends, pairs = seen(run, log, frames), np.append(0, np.cumsum(log.j > 0))
@@ -247,7 +247,7 @@ def scene(run: Run) -> tuple[dict, dict]:
         "species": species(run),
         "radii": radii.tolist(),
         "surfaces": [
-            *(f"the {side} side" for side in SIDES),  # what j < 0 in the log is called
+            *(f"the {side} side" for side in SIDES),  # names of the partners j <= 0 in the log
             *(f"obstacle {k + 1}" for k in range(len(run.obstacles))),
             *(f"wall {k + 1}" for k in range(len(run.walls))),
         ],

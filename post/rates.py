@@ -28,7 +28,7 @@ from ricochet.script import command_line, launch, points, report
 import numpy as np
 
 BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
-BLOCKS = 8  # of the frames of a single run
+BLOCKS = 8  # blocks of the frames of a single run
 #: With which disks fly straight and at one speed, in all parts of the box alike.
 STRAIGHT = {
     "walls",

@@ -30,14 +30,14 @@ __all__ = [
 Curves = dict[str, np.ndarray | Estimate]
 
 WINDOW = 2.0  # collisions per disk over which a cooling rate is taken
-SLOW = 0.9  # of Haff's law, below which a gas is no longer homogeneous
+SLOW = 0.9  # ratio to Haff's rate below which a gas is no longer homogeneous
 SMOOTH = (
     "inelastic",
     "soft_contacts",
     "mixture",
     "rotating",
-)  # what a gas may be that cools by Haff's law
-SETTLED = 0.005  # the ratio has forgotten its start when by the law it is so close to its limit
+)  # traits of gases that cool by Haff's law
+SETTLED = 0.005  # relative distance from the limit at which the ratio has settled
 
 
 def on_grid(x: Sequence[Any], y: Sequence[Any], points: int) -> tuple[np.ndarray, np.ndarray]:

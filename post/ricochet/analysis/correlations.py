@@ -50,12 +50,12 @@ __all__ = [
 ]
 
 PER_DECADE = 12
-ORIGINS = 16  # in a lag
-BLOCKS = 16  # of the time, for errors
+ORIGINS = 16  # origins in a lag
+BLOCKS = 16  # blocks of time, for errors
 REACH = 0.3  # mean diameters
-CLOSE = 1e-9  # of a lag: times that differ by less are one
-MOST_PAIRS = 2 * 10**6  # whose lags are looked at
-CHUNK = 10**6  # disks in the frames that are read together
+CLOSE = 1e-9  # relative difference of lags that are equal
+MOST_PAIRS = 2 * 10**6  # largest number of pairs whose lags are compared
+CHUNK = 10**6  # largest number of disks in frames that are read together
 FLOWING = {"sheared", "sliding_surfaces", "changed"}
 FIXED = ("msd", "fourth", "vacf", "diffusion", "overlap")
 
@@ -230,7 +230,7 @@ class Correlator:
         square, fourth = np.moveaxis(self.sums[:, :, species, :2], 2, 0)
         number = np.maximum(self.pairs.sum(axis=1, keepdims=True), 1)
         m2, m4 = (part.sum(axis=1, keepdims=True) / number for part in (square, fourth))
-        m2 = np.where(m2 > 0, m2, np.nan)  # to first order in what blocks have beside the mean:
+        m2 = np.where(m2 > 0, m2, np.nan)  # to first order in the deviations of blocks:
         return fourth / (2 * m2**2) - m4 / m2**3 * square + (m4 / m2**2 - 1) * self.pairs
 
     def means(self, name: str, species: int = 0) -> np.ndarray:

@@ -32,7 +32,7 @@ class Crater(NamedTuple):
 
     hit: int
     displaced: int
-    width: float  # of the first places of the displaced disks
+    width: float  # extent of the first positions of the displaced disks
     depth: float
     hole_width: float
     hole_depth: float
@@ -42,7 +42,7 @@ class Crater(NamedTuple):
     side_collisions: int
 
 
-#: What a run may be in which nothing but a projectile moves a bed.
+#: Traits of runs in which only the projectile moves the bed.
 QUIET: tuple[str, ...]
 QUIET = (
     "inelastic",
@@ -55,7 +55,7 @@ QUIET = (
     "walls",
 )
 QUIET += ("time_stepped",)
-FEW_HITS = 0.01  # of walls, per disk: up to here the box does not count
+FEW_HITS = 0.01  # collisions with walls per disk, up to which the box has no influence
 
 
 def energy_fraction(run: Run) -> float:

@@ -30,9 +30,9 @@ __all__ = [
     "prediction",
 ]
 
-MOST_BLOCKS = 16  # of a run
-FEWEST_BLOCKS = 3  # of all runs, for an error
-FEWEST_DISKS = 3  # that all blocks but one have seen in a cell, for what is relative to their flow
+MOST_BLOCKS = 16  # largest number of blocks of a run
+FEWEST_BLOCKS = 3  # smallest number of blocks of all runs, for an error
+FEWEST_DISKS = 3  # smallest number in a cell without any one block, for kT, stress and heat
 LONG = 1.5  # memories in a block
 POINTS = 1 << 16  # in a box with obstacles, to find where centres can be
 ACROSS = SIDES[:2], SIDES[2:]  # the two sides across each axis
@@ -66,7 +66,7 @@ class Members(NamedTuple):
     """Pseudo-values of the jackknife (G, ...), as if each block had been measured alone."""
 
     values: np.ndarray
-    share: np.ndarray  # of the sample that lies in the block
+    share: np.ndarray  # share of the sample that lies in the block
 
     def mean(self) -> np.ndarray:
         """Return the mean; NaN where fewer than two blocks have data."""

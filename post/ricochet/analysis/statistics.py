@@ -39,7 +39,7 @@ __all__ = [
 ]
 
 MOST_WINDOWS = 10**6
-FEWEST_RUNS = 4  # for an error of their error, and so to weigh by
+FEWEST_RUNS = 4  # smallest number of runs whose errors serve as weights
 
 
 class Estimate(NamedTuple):
@@ -60,7 +60,7 @@ class Curve(NamedTuple):
 class LawTest(NamedTuple):
     """Result of comparing a sample with a distribution."""
 
-    n: int  # values that count as independent
+    n: int  # number of independent values
     ks: float  # Kolmogorov-Smirnov distance, the largest between the two distribution functions
     ks_p: float  # probability of a larger distance by chance
     chi2: float  # per degree of freedom, bins of equal probability
@@ -73,7 +73,7 @@ class PowerLaw(NamedTuple):
     factor: float
     exponent: float
     exponent_error: float
-    chi2: float = float("nan")  # per degree of freedom, of the points about it
+    chi2: float = float("nan")  # chi^2 per degree of freedom
     free: int = 0  # degrees of freedom
 
     def misses(self, runs: int) -> bool:
@@ -129,7 +129,7 @@ def goodness_of_fit(
     )
 
 
-ONE_SIGMA = float(scipy.special.ndtr(1))  # scipy.stats takes a second to be read
+ONE_SIGMA = float(scipy.special.ndtr(1))  # importing scipy.stats takes a second
 
 
 def student(samples: ArrayLike) -> Any:
@@ -211,8 +211,8 @@ def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estim
 
 # --- series in time ---
 
-FINE, COARSE = 64, 16  # cells of a series: in their means fast noise fades, and slow modes show
-FEWEST = 8  # samples from which an error can be had
+FINE, COARSE = 64, 16  # parts of a series; their means resolve slow modes
+FEWEST = 8  # smallest number of independent samples for an error
 
 
 class SeriesMean(NamedTuple):
@@ -220,7 +220,7 @@ class SeriesMean(NamedTuple):
 
     mean: float
     error: float  # half the 68 % interval; NaN if worth fewer than `FEWEST` samples
-    samples: float  # independent samples that the series is worth
+    samples: float  # number of independent samples
     drift: float  # second half less first half, over the error of that difference
 
     def scaled(self, factor: float, offset: float = 0.0) -> "SeriesMean":
@@ -310,10 +310,10 @@ def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> Series
     coarse = cells(rest, COARSE)
     least = min(
         1.0, statistical_inefficiency(cells(rest, FINE))
-    )  # few cells may seem to make up for each other
+    )  # few parts may look anticorrelated
     free = len(coarse) / statistical_inefficiency(coarse, least)
     error = float(np.std(coarse, ddof=1) / np.sqrt(free))
-    if not error > 1e-12 * np.max(np.abs(amount)) / np.mean(per):  # constant but for rounding
+    if not error > 1e-12 * np.max(np.abs(amount)) / np.mean(per):  # constant up to rounding
         return SeriesMean(mean, 0.0, float(len(rest)), 0.0)
     early, late = (half.mean() for half in np.array_split(rest, 2))
     samples = min(float(len(rest)), float(np.var(rest)) / error**2)
@@ -382,7 +382,7 @@ def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
     return SeriesMean(mean.mean(), float(own), float(size), float(drift.sum() / np.sqrt(runs)))
 
 
-UNLIKELY = 0.005  # probability below which chance is no explanation
+UNLIKELY = 0.005  # probability below which a deviation counts as significant
 FEW = 10  # independent samples
 
 

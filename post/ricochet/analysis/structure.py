@@ -24,8 +24,8 @@ __all__ = [
     "structure_factor",
 ]
 
-MOST_PAIRS = 2 * 10**5  # whose distances are looked at in a frame, for `bond_correlation`
-MOST_TERMS = 3e8  # of the sums over disks and wave vectors in a frame
+MOST_PAIRS = 2 * 10**5  # largest number of pairs in a frame, for `bond_correlation`
+MOST_TERMS = 3e8  # largest number of terms of S(k) in a frame
 
 
 def periods(run: Run) -> np.ndarray:

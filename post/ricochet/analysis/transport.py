@@ -37,18 +37,18 @@ __all__ = [
     "enskog_of",
 ]
 
-PER_FREE_TIME = 4  # samples of the moments that are enough
+PER_FREE_TIME = 4  # sufficient samples of the moments
 SUMS = ("helfand_stress", "virial_tensor", "helfand_heat", "heat_virial")
-#: Mean free times that heat lives, longest of all in a gas of equal disks when dilute; and after
-#: which it is forgotten: from half of this on less than 0.2 % of the conductivity is missing.
+#: In mean free times: the decay time of the heat flux, longest in a dilute gas of equal disks; and
+#: the lag of the slope, which from half of it on lacks less than 0.2 % of the conductivity.
 HEAT, MEMORY = 2.06, 20.0
-CLOSE = 1e-6  # of a step
-UNLIKE = 0.05  # of Enskog's viscosity, between runs that are taken together
+CLOSE = 1e-6  # relative difference of steps that are equal
+UNLIKE = 0.05  # largest relative difference of Enskog's viscosity between runs of one group
 TAKES = (
     "transport takes elastic smooth disks in a periodic box, whose fluctuations say how they flow; "
     "of others driven.py --show viscosity (box.shear_rate) and correlations.py, D(t)"
 )
-MOMENTS = ("viscosity", "bulk_viscosity", "conductivity")  # that grow from moments
+MOMENTS = ("viscosity", "bulk_viscosity", "conductivity")  # from Helfand moments
 
 
 def in_step(times: np.ndarray) -> bool:

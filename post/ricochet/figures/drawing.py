@@ -185,7 +185,7 @@ def draw_circles(axes: Axes, run: Run, grey: dict[str, Any]) -> None:
     """Draw circular obstacles, with the periodic images that reach into the box."""
     if any(obstacle.inside for obstacle in run.obstacles):
         axes.add_patch(Rectangle((run.lower[0], run.lower[1]), *run.edges, zorder=0, **grey))
-    width = min(1.0, 20 / np.sqrt(max(len(run.obstacles), 1)))  # of lines: many circles are small
+    width = min(1.0, 20 / np.sqrt(max(len(run.obstacles), 1)))  # line width: many circles are small
     for inside, fill, level in ((True, "white", 0.1), (False, "0.75", 0.5)):  # a map is at 0.2
         circles = [
             Circle(obstacle.centre + shift, obstacle.radius)
@@ -208,7 +208,7 @@ def name_walls(axes: Axes, run: Run) -> None:
     shown: list[Any] = [*zip(run.sides, ends_of, strict=True)]
     walls = rows_of(run.parameters.get("wall", {}))
     groups = groups_of_rows(run.parameters, "wall")
-    firsts = np.unique(groups, return_index=True)[1]  # of each polyline, or file, one wall
+    firsts = np.unique(groups, return_index=True)[1]  # one wall of each polyline or file
     shown += [(walls[groups[k]], (*run.walls[k], 1)) for k in firsts]
     for own, (start, end, side) in shown:
         speed = own.get("surface_velocity", 0.0)

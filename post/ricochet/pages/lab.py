@@ -23,7 +23,7 @@ RUNS = 24  # at a time, of all pages
 GRACE = 3.0  # seconds, after which a worker that has been asked to end is forced to
 ENDED = b"No answer: the laboratory has ended."  # why a socket closes: 123 bytes at most
 DIED = b"It has ended: it needs more memory than it may have here (fewer disks do), or was killed."
-NAME = re.compile(r"[\w.-]{1,200}")  # of a variable or a group
+NAME = re.compile(r"[\w.-]{1,200}")  # name of a variable or a group
 
 
 # --- inputs, as the program understands them ---

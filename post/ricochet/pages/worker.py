@@ -40,15 +40,15 @@ from ..reading.reader import Run, Series, obstacles_of, walls_of
 from ..running.program import ProgramError
 from ..running.simulation import NEVER, Simulation
 
-DISKS = 20000  # of a run
+DISKS = 20000  # largest number of disks
 MEMORY = 2 << 30  # bytes of a process
 INTERVAL = 1 / 60  # s between two frames
 SLICE = 0.012  # s that the engine may take before it looks up
 AHEAD = 2  # frames that the page has not drawn yet
 SPEAK = 0.1  # s between two messages with numbers
 FEW = 20  # disks whose events to come are told
-COMING = 6  # of them
-WAY = 0.2  # of the box, that is left to a side that disks push
+COMING = 6  # number of next events that are shown
+WAY = 0.2  # share of the box beyond a piston that is shown
 FEWEST = 40  # samples of a mean with an error
 MOST = 4000  # samples that are kept
 LOOKS, SOME = 160, 1000  # samples for a value of a scan; disks of a run whose collisions are enough
@@ -56,7 +56,7 @@ LONGEST = 4.0  # s that they may take
 COUNTED = ("collisions", "dissipated_energy")  # since the start
 TURNS = "angular_velocity"
 ENDINGS = {"input": ".nml", "script": ".py", "output": ".h5.part"}
-UNREAD = bytearray()  # of a line that has not come to its end
+UNREAD = bytearray()  # the start of an incomplete line
 DEATH = 1  # prctl's PR_SET_PDEATHSIG
 
 
@@ -68,13 +68,13 @@ class Bench:
         self.pictured = pictured
         self.simulation: Simulation | None = None
         self.playing, self.ended, self.reason = False, False, ""
-        self.pace = 0.0  # of time, per second
+        self.pace = 0.0  # simulated time per second
         self.due = self.spoken = time.perf_counter()
         self.unseen = 0  # frames on the way to the page
         self.actions: list[tuple] = []  # since the start: time, what, value as told, and exactly
         self.samples: deque[tuple[float, ...]] = deque(maxlen=MOST)
         self.happened: tuple | None = None
-        self.goal: tuple[float, int, int] | None = None  # of a step that is on its way
+        self.goal: tuple[float, int, int] | None = None  # the end of a step that is in progress
 
     # --- what it is told ---
 
@@ -480,7 +480,7 @@ def tell(message: dict) -> None:
     """Write one answer as JSON."""
     try:
         text = json.dumps(message, allow_nan=False)
-    except ValueError:  # what is not known, or has no bounds, is null
+    except ValueError:  # NaN and infinity become null
         text = json.dumps(json.loads(json.dumps(message), parse_constant=lambda _: None))
     send(b"t", text.encode())
 
@@ -529,7 +529,7 @@ def measured(text: str, lines: list[str], name: str) -> tuple[float, float | Non
     apart = np.diff(late[0])
     if not apart.any():
         raise ValueError("nothing to measure: no collisions, or all of them at one moment")
-    if name == "virial_pressure":  # that is a mean since the start
+    if name == "virial_pressure":  # a mean since the start
         one = pressure_between(late, count)
     else:
         gain = np.diff(late[-1]) if name in COUNTED else late[-1][1:] * apart

@@ -16,7 +16,7 @@ import numpy as np
 
 from .files import RunError
 
-ROUNDING = 1e-6  # of the energy; more than that is lost in collisions or not at all
+ROUNDING = 1e-6  # share of the energy: smaller losses are rounding
 #: What a run may be, and the words in which that is a reason.
 TRAITS = {
     "changed": "was changed while it ran",
@@ -42,7 +42,7 @@ TRAITS = {
     "walls": "has walls",
     "mixture": "has disks of different mass or radius",
 }
-#: By which energy comes and goes, other than by being lost in collisions.
+#: Traits that change the energy in other ways than by dissipation in collisions.
 SOURCES = {
     "changed",
     "sheared",
@@ -53,15 +53,15 @@ SOURCES = {
     "sliding_surfaces",
 }
 SOURCES |= {"thermostatted", "thermal_walls"}
-#: With which velocities change between collisions, too.
+#: Traits with velocity changes between collisions.
 KICKED = {"noise_driven", "active", "thermostatted"}
-#: With which velocities do not settle to Maxwell's law.
+#: Traits of runs whose velocities do not relax to Maxwell's distribution.
 UNSETTLED = {*SOURCES, "unequal_temperatures", "inelastic", "soft_contacts", "round_container"} - {
     "thermostatted",
     "thermal_walls",
     "piston",
 }
-#: With which they do.
+#: Traits of runs whose velocities do relax to it.
 SETTLED = TRAITS.keys() - UNSETTLED
 
 
@@ -130,7 +130,7 @@ def nature_of(
         baths.add(float(drive["temperature"]))
     beta = float(contact.get("tangential_restitution", -1.0))
     pairs = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
-    # What may take energy counts before it has taken any, but for walls, which may not be met.
+    # A dissipative contact law counts before the first collision; that of walls only once it acts.
     slips = beta > -1 and (beta < 1 or contact.get("friction") is not None)
     inelastic = len(mass) > 1 and (pairs.min() < 1 or slips)
     found = {

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     import pandas
 
 BROKE_OFF = ": its run broke off "
-LOOK = 0.2  # s, between two looks whether members are still wanted
+LOOK = 0.2  # interval of checks whether members are still wanted [s]
 GOES_ON = re.compile(r"(stopped.*|killed by signal.*|.*--resume goes on.*|)")
 
 
@@ -223,7 +223,7 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
         if finished:
             return 0
         if before := last_words(folder, name):
-            print(file=log, flush=True)  # that was of an attempt before
+            print(file=log, flush=True)  # ends the last line of an earlier attempt
         words = [word for pair in pairs_of(overrides) for word in ("--set", "=".join(pair))]
         output = ["-o", folder / f"{name}.h5", "--quiet", *words]
         command = [find_program(), folder / "input.nml", *output]

@@ -29,11 +29,11 @@ from ..reading.files import RunError, did_you_mean
 from ..reading.nature import Nature, nature_of
 from .program import ProgramError, named, settings_of, unseen, whole_threads
 
-ROOM = 100_000  # bytes for a message
-PATIENCE = 0.05  # s, between two looks whether Python wants something
+ROOM = 100_000  # size of a message [bytes]
+PATIENCE = 0.05  # interval of checks for signals [s]
 NEVER = 2**63 - 1
-ROUNDING = 1e-14  # of a time
-FASTEST = 1e100  # that an input can name
+ROUNDING = 1e-14  # relative rounding of a time
+FASTEST = 1e100  # largest number that an input accepts
 ALIVE: "weakref.WeakSet[Simulation]" = weakref.WeakSet()
 #: The arrays of a simulation, and their numbers.
 COLUMNS = {
