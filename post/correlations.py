@@ -1,34 +1,36 @@
-"""How a fluid forgets, spreads and orders: VACF, diffusion, F_s, a2; g(r), S(k), psi6 and g6(r).
+"""Time correlations, diffusion and structure of a fluid: VACF, D, F_s, a2; g(r), S(k), psi6, g6(r).
 
     python post/correlations.py runs/state/memory_*.h5 -o correlations.png --csv correlations.csv
 
-Disks in an empty box, without gravity.  Runs are combined by packing fraction; lines are means over
-the runs, bands are errors. Frames may be equally far apart in time or in decades (--equilibration 0
-if the run begins in equilibrium).  Times are in units of the mean free time 1/w, lengths of the
+The disks are in a box without obstacles and gravity.  Runs are combined by packing fraction; lines
+are means over the runs, bands are errors.  Frames may be equally spaced in time or in decades
+(--equilibration 0 if the run begins in equilibrium).  The units are the mean free time 1/w and the
 mean diameter.  Frames before equilibrium, which is found or begins after --equilibration, count for
-a2 alone.  Of gases that cool, and those that flow, only a2 and the structure are found, the latter
-in the frames after --equilibration, or else where nothing drifts, or 15 collisions per disk after
-the start of a gas that cools.  Of a mixture, broken lines are of its species.
+a2 only.  For gases that cool or flow only a2 and the structure are found, the latter in the frames
+after --equilibration, or else where nothing drifts, or 15 collisions per disk after the start of a
+gas that cools.  Broken lines are the species of a mixture.
 
-Ways of disks, by lag, are from the package's `correlations`, which says how pairs of frames are
-chosen: VACF, <v(0) v(t)>, in theory at first exp(-w t), late 1/t (mode coupling); the mean square
-displacement; F_s(k, t) = <exp(i k r)> at --wavenumber; alpha2 = <r^4> / (2 <r^2>^2) - 1, the
-non-Gaussian parameter; in the table, the share of disks within 0.3 diameters (overlap).
+The time correlations are those of the package's `correlations`, whose docstring explains how pairs
+of frames are chosen: the velocity autocorrelation <v(0) v(t)>, in theory exp(-w t) at first and
+1/t late (mode coupling); the mean square displacement; F_s(k, t) = <exp(i k r)> at --wavenumber;
+the non-Gaussian parameter alpha2 = <r^4> / (2 <r^2>^2) - 1.  The table also has the share of disks
+within 0.3 diameters of their first position (overlap).
 
-Diffusion: D(t) is a quarter of the slope of the mean square displacement, here between neighbouring
-lags; and half the integral of <v(0) v(s)> from 0 to t, which is half of <v(0) (x(t) - x(0))> and so
-exact however far apart the frames are, unless kicks change velocities on the way: kicked disks have
-the first alone.  For equal smooth disks that keep their energy it stands beside D_E of Enskog.  In
-two dimensions the tail makes D(t) grow without end, as the logarithm of t: a D belongs to a time,
-and to a box, whose images are felt when sound has crossed it.  The table has both D, which must
-agree, between half of `D_time` and `D_time`; that is the time of crossing if an eighth of the run
-is longer.  Periodic boxes and frames equally far apart only.
+D(t) is a quarter of the slope of the mean square displacement between neighbouring lags.  It is
+also half the integral of <v(0) v(s)> from 0 to t, which equals half of <v(0) (x(t) - x(0))> and so
+is exact for any spacing of frames, except for kicked disks, which have the first D only.  D_E of
+Enskog is shown for equal smooth disks of fixed energy.  In two dimensions the long-time tail makes
+D(t) grow as the logarithm of t without limit: a value of D belongs to a time, and to a box, whose
+size matters once sound has crossed it.  The table has both D, which must agree, between half of
+`D_time` and `D_time`; that is the time of crossing, or an eighth of the run if that is shorter.
+They need a periodic box and equally spaced frames.
 
-a2 = <v^4> / (2 <v^2>^2) - 1, each species at its own temperature, is 0 in equilibrium and -1/2 for
-equal speeds.  S(k) = <|sum of exp(i k x)|^2> / N.  psi6 of a disk: mean of exp(6 i theta) over its
-Delaunay neighbours; local is its modulus, global the modulus of the mean over all disks: 1 in a
-perfect triangular crystal.  g6(r) = <psi6*(0) psi6(r)>: it falls exponentially in a fluid, slowly
-as a power of r in a hexatic phase, and not at all in a crystal.
+a2 = <v^4> / (2 <v^2>^2) - 1, the second Sonine coefficient with each species at its own
+temperature, is 0 in equilibrium and -1/2 for equal speeds.  S(k) = <|sum of exp(i k x)|^2> / N.
+psi6 of a disk is the mean of exp(6 i theta) over its Delaunay neighbours; `local` is its modulus,
+`global` the modulus of the mean over all disks, which is 1 in a perfect triangular crystal.
+g6(r) = <psi6*(0) psi6(r)> decays exponentially in a fluid, as a power of r in a hexatic phase, and
+not at all in a crystal.
 """
 
 from itertools import combinations_with_replacement, cycle

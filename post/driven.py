@@ -1,33 +1,32 @@
-"""What driven disks do in time, beside pictures of them.
+"""Quantities of driven disks in time, with pictures of the disks.
 
     python post/driven.py runs/heated/*.h5 -o heated.png --csv heated.csv
     python post/driven.py runs/demon/*.h5 --show share -o demon.png
     python post/driven.py runs/constant_pressure/*.h5 --show width -o width.png
 
---show temperature: kT of all N disks, m <(v - u)^2> / 2 times N / (N - 1).  Dashed, for equal disks
-that noise heats in a periodic box: where heating and collisions balance (van Noije and Ernst 1998);
-for equal elastic disks in a box with one side that moves steadily: the adiabat from the equation of
-state, with the layers at the walls (`hard_disks.adiabat`), that slow strokes follow; take several
-runs, for one has no error of its own once the side stands.
---show width: of the box, one side of which is a piston (motion = 'piston').  Dashed, for equal
-elastic disks: its mean, and a standard deviation more and less, by the equation of state, at
-constant enthalpy (docs/theory.md).  Printed besides: the deviation; and the largest changes of the
-enthalpy, over its own, and of the side's momentum less what force and disks gave it, over what
-disks gave.
---show share: of the disks in the left half of the box.  Dashed, for a dilute gas on a sawtooth
-floor, between halves with a hole above the floor: the shares that last (after Eggers 1999).
---show height: of the disks of each species, on average.
---show viscosity: -P_xy over the shear rate of a sheared box (box.shear_rate), from one observable
-to the next, by what disks carry and what collisions hand on; also of disks that lose energy.
---show cluster: share of the disks in the largest cluster, in which gaps are below a tenth of the
-mean diameter.
+--show temperature: kT of all N disks, m <(v - u)^2> / 2 times N / (N - 1).  The dashed line is for
+equal disks with white-noise driving in a periodic box, where driving and dissipation balance (van
+Noije and Ernst 1998); or for equal elastic disks in a box with one side that moves at a constant
+velocity: the adiabat of the equation of state with the layers at the walls (`hard_disks.adiabat`),
+which slow strokes follow.  That needs several runs, because a single one has no error once the side
+is at rest.
+--show width: of the box with a piston (motion = 'piston').  The dashed lines are for equal elastic
+disks: mean, and mean plus and minus a standard deviation, by the equation of state at constant
+enthalpy (docs/theory.md).  Also printed are the deviation, and the largest relative changes of the
+enthalpy and of the momentum of disks and piston, which are conserved.
+--show share: of the disks in the left half of the box.  The dashed line is for a dilute gas over a
+sawtooth floor, in halves with a hole above the floor: the lasting shares (after Eggers 1999).
+--show height: mean height of the disks of each species.
+--show viscosity: -P_xy over the shear rate of a sheared box (box.shear_rate), between observables,
+from the momentum in flight and in collisions; also of disks that lose energy.
+--show cluster: share of the disks in the largest cluster, with gaps below a tenth of the mean
+diameter.
 
-A curve for each run, of means over a sixtieth of the time (of a width over a thousandth); a colour
-for each input and species.
-Printed: the mean over the second half of the time, its error, and its ratio to the theory; of
-`share` in the half of the box that is the fuller one at another time.  Pictures: the end of the
-first run of each input, or of a single input its start and its end; the smallest disks are drawn
-larger.
+There is a curve for each run, of means over a sixtieth of the time (of a width over a thousandth),
+and a colour for each input and species.  Printed are the mean over the second half of the time, its
+error, and its ratio to the theory; a `share` is that of the half that is fuller at another time.
+Pictures show the end of the first run of each input, or the start and the end of a single input;
+the smallest disks are enlarged.
 """
 
 from collections.abc import Callable

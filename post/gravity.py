@@ -3,16 +3,16 @@
     python post/gravity.py runs/gravity/long.h5 -o gravity.png --csv gravity.csv
 
 kT is the mean of the kinetic energy in equilibrium, which is found or begins after --equilibration.
-Laws, drawn solid: P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT) for the height
-h of the centre above its lowest place.  They hold for many disks without size.  Dashed: N disks
-share a fixed energy, so that exp(-e / kT) becomes (1 - e / (2 N kT))^(2 N - 2), unless walls or
-kicks give it; and a disk of species i is kept out of the area pi s_ij^2 about each other disk,
-which multiplies its density by exp(-sum_j pi s_ij^2 n_j(h)) to first order: a few per cent, near
-the floor.  Where that sum is above 0.5 for disks without size, no law of the heights is drawn.
+The solid laws are P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT) for the height
+h of the centre above its lowest position.  They hold for many disks without size.  The dashed laws
+include two effects.  N disks that share a fixed energy have (1 - e / (2 N kT))^(2 N - 2) instead of
+exp(-e / kT).  Disks exclude the area pi s_ij^2 for each other, which multiplies the density of
+species i by exp(-sum_j pi s_ij^2 n_j(h)) to first order, a few per cent near the floor.  No law of
+the heights is drawn where that sum is above 0.5 for disks without size.
 
 Slopes are those of weighted lines through the logarithm of the histograms, from 0 to 5 kT in the
 kinetic energy and from 1 to 5 kT in m g h, above the layer that the size of the disks flattens;
-their errors come from ten blocks of time.
+their errors are from ten blocks of time.
 """
 
 from typing import NamedTuple

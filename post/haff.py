@@ -1,23 +1,25 @@
-"""Cooling of a gas: Haff's law, and where the gas leaves it.
+"""Cooling of a gas: Haff's law, and where the gas deviates from it.
 
     python post/haff.py runs/haff/*.h5 -o haff.png --csv haff.csv
 
-Runs are combined by restitution xi.  Left: K against time in units of the first mean free time,
-K0 / (1 + (1 - xi^2) w0 t / 4)^2 (Haff 1983).  Right: K against collisions per disk, an exponential
-(van Noije and Ernst 1998).  Below: K over the law.  Both hold while the gas stays homogeneous;
-later, streams carry the energy and it falls more slowly.  Periodic boxes at rest as a whole.  w0 is
-by the equation of state; of unequal disks, for which there is none, by their first collisions, and
-both laws take all sizes to be at one temperature: not so for very different masses.
+Runs are combined by restitution xi.  The left panel has K against time in units of the first mean
+free time, with K0 / (1 + (1 - xi^2) w0 t / 4)^2 (Haff 1983); the right one K against collisions per
+disk, with an exponential (van Noije and Ernst 1998).  The ratios of K to both laws are below.  Both
+laws hold while the gas stays homogeneous; later, flows carry energy and it decreases more slowly.
+Boxes are periodic, and the total momentum is 0.  w0 follows from the equation of state; for unequal
+disks it is measured by their first collisions, and both laws assume one temperature for all sizes,
+which is wrong for very different masses.
 
-The cooling rate is -d ln K / d tau, tau collisions per disk.  The homogeneous state ends where its
-mean over two collisions per disk and over the runs falls below 90 % of the law for good; from there
-on the curves are pale, and of several runs it is printed with its error.  `rate` is the slope of a
-line through ln K from two collisions per disk on, when speeds have their shape, until half of that
-end, or to the end of a run without one; its error is from the scatter of the runs.  Soft disks
-(contact.restitution_law) have a law of their own, for Maxwell's velocities (docs/theory.md), and
-instead of the rate the `exponent` of K ~ t^-p in the last decade of time, which goes to 5/3.  What
-a rate a little below the law adds up to in a run without that end is said, if K ends more than 10 %
-from the law.
+The cooling rate is -d ln K / d tau, tau the number of collisions per disk.  The homogeneous state
+ends where the rate, averaged over two collisions per disk and over the runs, stays below 90 % of
+the law.  Curves are pale from there on, and for several runs this tau is printed with its error.
+`rate` is the slope of a line through ln K from tau = 2 on until half of that end, or until the end
+of a run without one; its error is from the scatter of the runs.
+
+Soft disks (contact.restitution_law) follow another law, for Maxwell's velocities (docs/theory.md).
+Instead of the rate the table has the `exponent` of K ~ t^-p in the last decade of time, which tends
+to 5/3.  A note says by how much a slightly smaller rate changes K if K ends more than 10 % from the
+law in a run without an end of the homogeneous state.
 """
 
 from ricochet import Run

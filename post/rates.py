@@ -2,20 +2,24 @@
 
     python post/rates.py runs/bulk.h5 -o rates.png --csv rates.csv
 
-Runs are combined; all must be of one system, without gravity.  Means are taken in equilibrium: from
-where nothing drifts any more, or after --equilibration.  Errors take the memory of each quantity
-into account, `samples` is how many independent ones it is worth, and what speaks against an error
-is a warning.  Runs that keep their kinetic energy have an exact kT, and are scaled to the mean of
-it; others, with walls or kicks of one temperature or disks that turn, have a kT with an error.
-Pressure: by the virial of the pair collisions, and by the impulses on each side (a little larger:
-centres keep a radius away from sides).  With an event log also w_ij, the collisions of a disk of
-species i with disks of species j per time, and the free paths: in a frame each disk is on one, as
-long as its speed times the time between its collisions before and after.  Frames meet long paths
-more often; therefore each counts 1 over its time; errors are from the scatter of runs, or of one
-run's frames in blocks.  The line is for equal disks that meet without memory (Boltzmann, Enskog).
-Kicked disks have no free paths.  Of runs without equilibrium, that lose energy or have walls of
-different temperature, only the free paths are found: in the frames after --equilibration, or else
-where nothing drifts, or 15 collisions per disk after the start of a gas that cools.
+Runs are combined; all must be of one system, without gravity.  Means are taken in equilibrium,
+which is found or begins after --equilibration.  Errors include the autocorrelation of each
+quantity, `samples` is the number of independent samples that it is worth, and warnings give reasons
+to doubt an error.  Runs of a fixed kinetic energy have an exact kT, and are scaled to its mean.
+Other runs, with thermal walls or a thermostat of one temperature or rotating disks, have a kT with
+an error.
+
+The pressure is measured by the virial of the pair collisions, and by the impulses on each side; the
+latter is a little larger, because centres stay a radius away from sides.  With an event log the
+table also has w_ij, the collisions of a disk of species i with disks of species j per time, and
+there are the free paths: in a frame each disk is on one, as long as its speed times the time
+between its collisions before and after.  Long paths occur in more frames; therefore each counts 1
+over its duration.  Errors are from the scatter of runs, or of a single run's frames in blocks.  The
+line is for equal disks under molecular chaos (Boltzmann, Enskog).  Kicked disks have no free paths.
+
+Of runs that lose energy, or have walls of different temperature, only the free paths are found: in
+the frames after --equilibration, or else where nothing drifts, or 15 collisions per disk after the
+start of a gas that cools.
 """
 
 from ricochet import Run, RunError, statistics, thermodynamics as td

@@ -1,27 +1,27 @@
-"""Viscosities, heat conductivity and diffusion coefficient of a gas of disks, against Enskog's.
+"""Viscosities, thermal conductivity and diffusion coefficient of a gas, against Enskog's theory.
 
     python post/transport.py runs/driven/transport_*/*.h5 -o transport.png --csv transport.csv
 
-Elastic disks in a periodic box.  Runs are combined by packing fraction; they take the Helfand
-moments of momentum and energy (output.helfand), as observables some four times in a mean free time
-(output.observables_every_time), and for D, if it is wanted, frames equally far apart in time.
-Mixtures, of species or of many sizes, have the viscosities only: their energy goes with the species
-that diffuse, too, and their D are by species, in correlations.py.
+The disks are elastic, in a periodic box.  Runs are combined by packing fraction.  They need the
+Helfand moments of momentum and energy (output.helfand), about four samples of the observables in a
+mean free time (output.observables_every_time), and, for D, equally spaced frames.  Of mixtures only
+the viscosities are found: diffusing species transport energy, too, and each species has a D of its
+own, in correlations.py.
 
-Small panels: half of the slope of the mean square of a moment between neighbouring lags, over
-Enskog's coefficient; bands are errors over the runs.  For D half the integral of
-<v(0) v(s)> from 0 to t.  Right, and in the table: the means between half a lag and that lag, with
-errors from the series of their values.  The lag is 20 mean free times, longer where heavy disks
-remember longer, or an eighth of the run; that of D is the time in which sound crosses the box, as
-in correlations.py.
+The small panels show half the slope of the mean square of a moment between neighbouring lags, over
+Enskog's coefficient; bands are errors over the runs.  For D it is half the integral of
+<v(0) v(s)> from 0 to t.  On the right, and in the table, are the means between half a lag and that
+lag, with errors from the series of their values.  The lag is 20 mean free times, more where heavy
+disks decorrelate slowly, and at most an eighth of the run.  For D it is the time in which sound
+crosses the box, as in correlations.py.
 
-Enskog's coefficients (Gass 1971; of mixtures after Lopez de Haro, Cohen and Kincaid 1983) are those
-with the pair correlation at contact by Henderson, of mixtures after Jenkins and Mancini 1987.  The
-table has them in units of the mean mass, the mean diameter and kT.  The theory takes the velocities
-of disks that meet for independent.  Unless the gas is dense that is good to some per cent for
-viscosity and conductivity, not for D.  In two dimensions none of them has a limit for late times in
-large boxes.  N disks that share a fixed energy have a conductivity that is lower by about 6 / N of
-it, a bulk viscosity by 5 / N, a viscosity by 2 / N (docs/theory.md).
+Enskog's coefficients (Gass 1971; for mixtures after Lopez de Haro, Cohen and Kincaid 1983) use the
+pair correlation at contact of Henderson, for mixtures of Jenkins and Mancini 1987.  In the table
+their units are the mean mass, the mean diameter and kT.  The theory assumes that the velocities of
+colliding disks are independent.  Unless the gas is dense this is accurate to some per cent for
+viscosity and conductivity, not for D.  In two dimensions no coefficient has a limit for late times
+in large boxes.  N disks that share a fixed energy have a conductivity that is lower by about 6 / N
+of it, a bulk viscosity by 5 / N, a viscosity by 2 / N (docs/theory.md).
 """
 
 from ricochet.analysis.statistics import combine_runs
