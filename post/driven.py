@@ -200,7 +200,7 @@ def viscosity(run: Run) -> Curves:
     if "sheared" not in run.nature:
         raise Refused(f"{run.path}: is not sheared; a viscosity takes box.shear_rate")
     time, first = np.unique(run.observable("kinetic_tensor").time, return_index=True)
-    flown, handed = (run.observable(f"{k}_tensor").value[first, 1] for k in ("stress", "virial"))
+    flown, handed = (run.observable(f"{k}_tensor").value[first, 1] for k in ("kinetic", "virial"))
     stress = (flown[1:] + flown[:-1]) / 2 + np.diff(handed) / np.diff(time)
     return {"": (time[1:], -stress / (run.shear_rate * np.prod(run.edges)))}
 

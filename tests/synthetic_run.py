@@ -117,6 +117,7 @@ def write_parameters(file, parameters, names, species, obstacles, walls):
     if obstacles:
         centre, radius, inside = zip(*obstacles, strict=True)
         where = root.create_group("obstacle")
+        where["name"] = [text(f"obstacle {k + 1}") for k in range(len(obstacles))]
         where["centre"], where["radius"] = np.array(centre), np.array(radius)
         where["inside"] = np.array(inside, dtype=np.int32)
     if walls:
