@@ -1,14 +1,16 @@
-"""Energies in time, and how well the total is kept.
+"""Energies in time, and how well the total is conserved.
 
     python post/energy.py runs/gravity/events.h5 runs/gravity/steps_*.h5 -o energy.png
 
-Above: mean kinetic and potential energy per disk of each species in the first run.  Below: the
-largest relative change so far, in each run, of what is to be kept: the total energy, and where
-energy comes and goes total + dissipated - heat - work - drive.  The axis of time is logarithmic,
-for most happens at first; linear where something drives the disks.  Prints, for each run and
-relative to the total energy at the start, or the largest if that is 0: the drift, that is the
-change over the whole run along a fitted line; the spread, the standard deviation from that line;
-and the largest change.
+The upper panel shows the mean kinetic and potential energy per disk of each species in the first
+run.  The lower panel shows, for each run, the largest relative change so far of the conserved
+quantity.  That is the total energy, or, where energy is exchanged, total + dissipated - heat - work
+- drive.  The time axis is logarithmic, because most happens at first; it is linear for driven
+disks.
+
+The table has three numbers for each run, relative to the total energy at the start, or to the
+largest one if that is 0: the drift, which is the change over the whole run along a fitted line; the
+spread, which is the standard deviation from that line; and the largest change.
 """
 
 from collections.abc import Callable

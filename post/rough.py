@@ -2,12 +2,13 @@
 
     python post/rough.py runs/rough.h5 -o rough.png --csv rough.csv
 
-Left: T = m <v^2> / 2 and T_rot = I <omega^2> against collisions per disk; dashed the law for
-Maxwell's velocities (Luding et al. 1998).  Right: T_rot / T with its steady value by that law, and
-by direct simulation of the Boltzmann equation where that is known: it is up to 6 % less.  They hold
-while a dilute gas of equal disks without Coulomb friction stays homogeneous.  The flow that a gas
-develops as it cools counts in T: it lowers the ratio, at packing 0.02 by 3.8 to 4.6 %, at 0.0025 by
-0.3 to 0.5 %, more the faster the gas cools.  Runs of one input, in a periodic box.
+The left panel shows T = m <v^2> / 2 and T_rot = I <omega^2> against collisions per disk; the dashed
+curves are the theory for Maxwell's velocities (Luding et al. 1998).  The right panel shows T_rot /
+T with its steady value in that theory, and in direct simulations of the Boltzmann equation where it
+is known; the latter is up to 6 % lower.  Both apply while a dilute gas of equal disks without
+Coulomb friction stays homogeneous.  The flow that develops as a gas cools contributes to T and
+lowers the ratio: at packing 0.02 by 3.8 to 4.6 %, at 0.0025 by 0.3 to 0.5 %, more for faster
+cooling.  The runs are of one input, in a periodic box.
 """
 
 from ricochet import Run, RunError, theory

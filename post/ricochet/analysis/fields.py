@@ -143,8 +143,8 @@ def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
 def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[Block], float]:
     """Return the blocks of the steady state of all runs, and the largest `kinship` to be expected.
 
-    That is the one of means over parts of a series with the autocorrelation exp(-t); NaN if there
-    are too few blocks for an error.
+    The latter is the kinship of means over parts of a series with the autocorrelation exp(-t).  It
+    is NaN if there are too few blocks for an error.
     """
     refuse_others(runs)
     steady = [steady_frames(run, skip) for run in runs]

@@ -171,11 +171,11 @@ ROUGH_RATIOS = {(0.9, 0.0): 0.4439, (0.9, 0.8): 1.0055, (0.85, 0.3): 0.708}
 
 
 def rough_rates(xi: float, beta: float, inertia: float) -> tuple[float, float, float]:
-    """A, B, C of the temperatures of rough disks with Maxwell's velocities.
+    """Return the rates A, B, C of the temperatures of rough disks with Maxwell's velocities.
 
-    dT/ds = -2 (A T - B R), dR/ds = 4 (B T - C R) per collision of a disk, T = m <v^2> / 2 and
-    R = I <omega^2>; Luding, Huthmann, McNamara and Zippelius, Phys. Rev. E 57, 3416 (1998).
-    `inertia` is over m r^2.
+    dT/ds = -2 (A T - B R) and dR/ds = 4 (B T - C R) per collision of a disk, with T = m <v^2> / 2
+    and R = I <omega^2>; Luding, Huthmann, McNamara and Zippelius, Phys. Rev. E 57, 3416 (1998).
+    `inertia` is the moment of inertia I divided by m r^2.
     """
     eta = inertia * (1 + beta) / (2 * inertia + 2)
     a = (1 - xi**2) / 4 + eta * (1 - eta) / 2

@@ -130,7 +130,7 @@ def nature_of(
         baths.add(float(drive["temperature"]))
     beta = float(contact.get("tangential_restitution", -1.0))
     pairs = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
-    # A dissipative contact law counts before the first collision; that of walls only once it acts.
+    # A dissipative law of disks is a trait from the start; one of walls only after it has acted.
     slips = beta > -1 and (beta < 1 or contact.get("friction") is not None)
     inelastic = len(mass) > 1 and (pairs.min() < 1 or slips)
     found = {
