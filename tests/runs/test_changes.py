@@ -30,11 +30,18 @@ SEEDS = [f"{os.environ.get('SEED', '1')} change {k}" for k in range(COUNT)]
 MOST_DISKS = 300
 MOST_EVENTS, MOST_STEPS, MOST_KICKS = 600, 300, 30  #: between two changes
 DEEPEST = 1e-12  #: overlap, of the larger of diameter and box
-LAW = ("restitution", "rule", "tangential_restitution", "friction", "temperature", "speed")
+LAW = (
+    "restitution",
+    "rule",
+    "tangential_restitution",
+    "friction",
+    "temperature",
+    "surface_velocity",
+)
 MOTION = ("motion", "velocity", "amplitude", "period", "phase", "start_time", "end_time")
 MOTION += ("mass", "force")
-DRIVE = ("kind", "interval", "strength", "keep_momentum", "temperature", "fraction", "speed")
-DRIVE += ("rotational_diffusion", "species")
+DRIVE = ("kind", "interval", "strength", "keep_momentum", "temperature", "fraction")
+DRIVE += ("self_propulsion_speed", "rotational_diffusion", "species")
 CONTACT = ("restitution", "pair_restitution", "wall_restitution", "restitution_law")
 CONTACT += ("reference_speed", "wall_rule", "tangential_restitution", "friction", "inertia")
 CONTACT += ("wall_tangential_restitution", "wall_friction")
