@@ -16,6 +16,7 @@ module event_driven
   use evolution, only: evolution_t, limits_t
   use neighbour_search, only: event_t
   use partners, only: is_wall
+  use piston_strips, only: change_strips, near_piston
   use side_motion, only: piston
   use simulation_state, only: simulation_t
   use signals, only: stop_requested
@@ -36,6 +37,7 @@ module event_driven
     logical :: thorough = .false.                  !! a collision is more than a change of two velocities
     logical :: is_part = .false.                   !! of a simulation: only collisions of disks that belong here count
     class(tracks_t), allocatable :: tracks         !! of its disks, in a part
+    integer(int64) :: last_count = 0               !! the number of events at which `run_events` returns
   contains
     procedure :: start
     procedure :: advance
@@ -116,7 +118,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(event_log_t), intent(inout), optional :: log
     type(event_t) :: event
-    integer(int64) :: turns, pause_at, events
+    integer(int64) :: turns, events
+    real(real64) :: t_limit
 
     turns = limits%turns
     self%turns_left = turns
@@ -125,15 +128,22 @@ contains
     do while (turns > 0)
       if (limits%reached(sim%tally) .or. is_full(log)) return
       if (stop_requested()) return
-      pause_at = next_pause()
+      self%last_count = next_pause()
+      t_limit = min(limits%time, self%search%faces%due)
       if (sim%n_disks() >= disks_in_cache) call read_ahead()
       events = sim%tally%events
-      call self%run_events(sim, limits%time, pause_at, turns, event, log)
+      call self%run_events(sim, t_limit, turns, event, log)
       self%turns_left = turns
       self%last_event = [event%disk, event%partner]
       if (turns == 0 .and. .not. sim%now < limits%time) turns = 1    ! a sample of this moment waits for all its events
       if (self%search%everyone .and. sim%tally%events > events) call self%predict_all(sim)
-      if (event%time <= limits%time) cycle
+      if (event%time <= t_limit) cycle
+      if (t_limit < limits%time .and. event%time > t_limit) then
+        turns = turns + 1                          ! nothing has happened
+        self%turns_left = turns
+        call follow_piston(self, sim)
+        cycle
+      end if
       if (is_stale()) then                         ! what is to come must not depend on who was predicted when
         call predict(self, sim, event%disk)
         cycle
@@ -174,17 +184,16 @@ contains
         call self%search%read_ahead(sim%disk, sim%tag, stage, disks(:n))
         if (self%is_part .and. stage == 2) call self%tracks%read_ahead(sim%disk, disks(:n))
       end do
-      pause_at = min(pause_at, sim%tally%events + events_ahead)
+      self%last_count = min(self%last_count, sim%tally%events + events_ahead)
     end subroutine read_ahead
   end subroutine advance
 
-  !> The loop: event after event, up to the number `pause_at` of collisions, to the limit of time, or as long as
+  !> The loop: event after event, up to the number `last_count` of events, to the limit of time, or as long as
   !> there are turns. Hot path only; rare work is left to the caller.
-  subroutine run_events(self, sim, t_limit, pause_at, turns, event, log)
+  subroutine run_events(self, sim, t_limit, turns, event, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: t_limit            !! since the epoch [time]
-    integer(int64), intent(in) :: pause_at
     integer(int64), intent(inout) :: turns         !! that are left
     type(event_t), intent(out) :: event            !! the last one; beyond the limit of time: not executed
     type(event_log_t), intent(inout), optional :: log
@@ -200,7 +209,7 @@ contains
       call self%queue%drop_first(sim%tag)
       sim%now = max(sim%now, t)
       call execute(self, sim, i, code, t, log)
-      if (sim%tally%events >= pause_at) exit
+      if (sim%tally%events >= self%last_count) exit
     end do
     event = event_t(t, i, code)
   end subroutine run_events
@@ -248,18 +257,37 @@ contains
     call predict(self, sim, i)
   end subroutine execute
 
-  !> Predicts the disks anew that expected to hit a piston, which now flies otherwise, and those that hit it sooner.
+  !> Predicts the disks anew that expected to hit a piston, which now flies otherwise, and those that hit it sooner. The loop
+  !> ends, as the piston may leave its strip sooner.
   subroutine follow_side(self, sim, side)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: side             !! its code
-    integer(int32) :: i
+    integer(int32) :: k
 
-    do i = 1, sim%n_disks()
-      if (sim%disk(i)%partner == side .or. side_time(sim%box, sim%disk(i), side) < sim%disk(i)%event_time) &
-        call predict(self, sim, i)
-    end do
+    call self%search%faces%watch_pistons(sim%box, sim%now)
+    self%last_count = 0
+    associate (near => near_piston(self%search, 1 - side))
+      do k = 1, size(near, kind=int32)
+        associate (disk => sim%disk(near(k)))
+          if (disk%partner == side .or. side_time(sim%box, disk, side) < disk%event_time) call predict(self, sim, near(k))
+        end associate
+      end do
+    end associate
   end subroutine follow_side
+
+  !> Predicts the disks that a piston may strike in the strip that it enters, or might have struck in the one that it leaves.
+  subroutine follow_piston(self, sim)
+    class(event_driven_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), allocatable :: disks(:)
+    integer(int32) :: k
+
+    call change_strips(self%search, sim, disks)
+    do k = 1, size(disks, kind=int32)
+      call predict(self, sim, disks(k))
+    end do
+  end subroutine follow_piston
 
   !> Predicts disk i and files its event.
   subroutine predict(self, sim, i)

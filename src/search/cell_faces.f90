@@ -53,11 +53,16 @@ module cell_faces
     real(real64) :: overlap(2) = 0.0_real64        !! of neighbouring cells [length]
     logical :: falling = .false.                   !! disks fly on parabolas, or sides move: more than one face is in question
     logical :: periodic(2) = .false.               !! by axis
+    ! Pistons can strike disks anywhere, but for some time only in a strip of columns or rows.
+    real(real64) :: due = never                    !! when the first piston leaves its strip, since the epoch [time]
+    real(real64) :: centre(n_sides) = 0.0_real64   !! of the strip of each, inwards of the box's side [length]
     real(real64) :: beyond(2, 2) = 0.0_real64      !! how far disks may be beyond the sides: lower ones, upper ones [length]
     type(line_t), allocatable :: column(:, :)      !! (0:1,columns) their left and right faces
     type(line_t), allocatable :: row(:, :)         !! (0:1,rows)
   contains
     procedure :: set
+    procedure :: find_strips
+    procedure :: watch_pistons
     procedure :: rectangle
     procedure :: choose_cell
     procedure :: next
@@ -179,10 +184,11 @@ contains
   end function equals
 
   !> Finds the faces of the cells of a patch.
-  subroutine set(self, box, patch)
+  subroutine set(self, box, patch, now)
     class(cell_faces_t), intent(out) :: self
     type(box_t), intent(in) :: box
     type(patch_t), intent(in) :: patch
+    real(real64), intent(in) :: now
 
     self%width = patch%width
     self%overlap = max(self%width - patch%reach, 0.0_real64)
@@ -194,6 +200,7 @@ contains
     call cut(2, self%row)
     call find_struck(1, self%column)
     call find_struck(2, self%row)
+    call self%find_strips(box, patch%small, now)
   contains
 
     !> The faces of columns (axis 1) or rows.
@@ -230,6 +237,59 @@ contains
       end associate
     end subroutine find_struck
   end subroutine set
+
+  !> Finds the columns and rows in which a piston may strike disks until it has moved by the width of a cell. Beyond the cells
+  !> it strikes in the outermost one, whose disks may follow it.
+  pure subroutine find_strips(self, box, small, now)
+    class(cell_faces_t), intent(inout) :: self
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: small              !! largest radius [length]
+    real(real64), intent(in) :: now
+    integer :: k
+
+    do k = 1, n_sides
+      if (box%surface(k)%motion%kind /= piston) cycle
+      self%centre(k) = max(box%side_position(k, now), 0.0_real64)
+      if (k <= 2) call mark(self%column, 1)
+      if (k > 2) call mark(self%row, 2)
+    end do
+    call self%watch_pistons(box, now)
+  contains
+
+    !> Marks the lines of an axis.
+    pure subroutine mark(line, axis)
+      type(line_t), intent(inout) :: line(0:, :)
+      integer, intent(in) :: axis
+      real(real64) :: x, room
+      integer :: high
+
+      high = 1 - modulo(k, 2)
+      x = merge(box%upper(axis) - self%centre(k), box%lower(axis) + self%centre(k), high == 1)
+      room = (self%width(axis) + small)*(1 + spare)
+      line(high, :)%struck = (line(0, :)%place <= x + room .and. line(1, :)%place >= x - room) .or. line(high, :)%code == 1 - k
+    end subroutine mark
+  end subroutine find_strips
+
+  !> Finds when the first piston leaves its strip, if no disk strikes one before.
+  pure subroutine watch_pistons(self, box, now)
+    class(cell_faces_t), intent(inout) :: self
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: now
+    real(real64) :: ahead, v
+    integer :: k
+
+    self%due = never
+    do k = 1, n_sides
+      associate (motion => box%surface(k)%motion, width => self%width((k + 1)/2))
+        if (motion%kind /= piston) cycle
+        ahead = box%side_position(k, now) - self%centre(k)
+        v = box%side_velocity(k, now)
+        self%due = min(self%due, now + time_to_line(max(width - ahead, 0.0_real64), v, motion%pull))
+        if (self%centre(k) > width) &
+          self%due = min(self%due, now + time_to_line(max(width + ahead, 0.0_real64), -v, -motion%pull))
+      end associate
+    end do
+  end subroutine watch_pistons
 
   !> The rectangle in which the centres of disks in a cell are. The outer ones go on as far as sides move: for ever, if
   !> disks push them.

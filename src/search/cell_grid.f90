@@ -34,7 +34,7 @@ module cell_grid
     type(cell_faces_t), public :: faces                    !! of the cells, and the sides among them
     logical, public :: roomy = .false.             !! cells overlap: a disk that collides chooses its cell again
     type(cell_contents_t), public :: cells                 !! numbered row by row, with a ring of empty ones around
-    type(reach_lists_t) :: reach                   !! obstacles, and disks much larger than those that the cells are made for
+    type(reach_lists_t), public :: reach           !! obstacles, and disks much larger than those the cells are made for
     type(images_t) :: images                       !! of the box, in this epoch
     integer(int32) :: n_listed = 0                 !! disks in cells, since they were filled
     type(neighbour_lists_t), public :: lists       !! of the small disks, where cells hold many of them
@@ -68,7 +68,7 @@ contains
 
     if (.not. self%is_part) self%patch = whole_box(sim, self%undivided)
     self%images = sim%images()
-    call self%faces%set(sim%box, self%patch)
+    call self%faces%set(sim%box, self%patch, sim%now)
     kept = sim%box%has_obstacles() .and. self%reach%serves(self%patch, self%faces) .and. .not. self%lists%used
     if (kept) call clear_cells(self, sim, kept)
     associate (patch => self%patch)

@@ -1,0 +1,88 @@
+!> Which disks a piston may strike before long. It may strike any disk sooner or later, but until it has moved by the width of
+!> a cell only those in a strip of columns or rows (`cell_faces: find_strips`): no other disk has to be tested against it.
+module piston_strips
+  use kinds, only: int16, int32
+  use cell_grid, only: cell_grid_t
+  use partners, only: n_sides
+  use side_motion, only: piston
+  use simulation_state, only: simulation_t
+  implicit none
+  private
+  public :: change_strips, near_piston
+
+contains
+
+  !> The disks that a piston may strike before it leaves its strip.
+  function near_piston(self, k) result(disks)
+    class(cell_grid_t), intent(in) :: self
+    integer, intent(in) :: k                       !! number of the side
+    integer(int32), allocatable :: disks(:)
+    integer(int32) :: n, across, along, i, c, m
+    integer :: axis, high
+
+    axis = (k + 1)/2
+    high = 1 - modulo(k, 2)
+    allocate (disks(64))
+    n = 0
+    do across = 1, self%patch%n(axis)
+      if (axis == 1) then
+        if (.not. self%faces%column(high, across)%struck) cycle
+      else
+        if (.not. self%faces%row(high, across)%struck) cycle
+      end if
+      do along = 1, self%patch%n(3 - axis)
+        c = self%cells%number(int(merge([across, along], [along, across], axis == 1), int16))
+        do m = 1, self%cells%cell(c)%in_slots()
+          call add(self%cells%cell(c)%slot(m) + 1)
+        end do
+        i = self%cells%chain(c)                    ! which is in a slot as well
+        if (i > 0) i = self%cells%next(i)
+        do while (i > 0)
+          call add(i)
+          i = self%cells%next(i)
+        end do
+      end do
+    end do
+    do m = 1, size(self%reach%big, kind=int32)
+      call add(self%reach%big(m)%disk)
+    end do
+    disks = disks(:n)
+  contains
+
+    !> Adds disk i.
+    subroutine add(i)
+      integer(int32), intent(in) :: i
+
+      if (n == size(disks)) disks = [disks, disks]
+      n = n + 1
+      disks(n) = i
+    end subroutine add
+  end function near_piston
+
+  !> A piston leaves its strip: finds the next one, and the disks in both, which are to be predicted.
+  subroutine change_strips(self, sim, disks)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), allocatable, intent(out) :: disks(:)
+    integer(int32) :: i
+    integer :: k
+
+    allocate (disks(0))
+    do k = 1, n_sides
+      if (sim%box%surface(k)%motion%kind == piston) disks = [disks, near_piston(self, k)]
+    end do
+    call self%faces%find_strips(sim%box, self%patch%small, self%faces%due)
+    do k = 1, n_sides
+      if (sim%box%surface(k)%motion%kind == piston) disks = [disks, near_piston(self, k)]
+    end do
+    if (.not. self%lists%used) return
+    do i = 1, size(disks, kind=int32)
+      associate (region => self%lists%neighbourhood(disks(i)), cell => sim%tag(disks(i))%cell)
+        if (sim%disk(disks(i))%radius > self%patch%small) cycle
+        region%column%struck = self%faces%column(:, cell(1))%struck
+        region%row%struck = self%faces%row(:, cell(2))%struck
+      end associate
+    end do
+  end subroutine change_strips
+
+end module piston_strips
