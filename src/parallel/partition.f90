@@ -4,7 +4,7 @@
 module partition
   use kinds, only: int16, int32, int64, real64
   use cell_faces, only: patch_t
-  use cell_grid, only: whole_box
+  use cell_layout, only: whole_box
   use domain_borders, only: compare_copies, refresh
   use domain_cuts, only: domain_cuts_t
   use domains, only: domain_t, load, move_on, next_time, write_back

@@ -6,7 +6,8 @@ module cell_grid
   use box_geometry, only: box_t, meet_image, next_obstacle
   use box_sides, only: next_side
   use cell_contents, only: cell_contents_t, gather
-  use cell_faces, only: all_cells, cell_faces_t, patch_t
+  use cell_faces, only: cell_faces_t, patch_t
+  use cell_layout, only: whole_box
   use cell_scans, only: scan_around_seam, scan_cells, scan_chains_around, scan_disks, scan_list
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
@@ -14,15 +15,12 @@ module cell_grid
   use neighbour_lists, only: neighbour_lists_t
   use neighbour_search, only: earliest_contact, latest_clock, no_gravity, prospect_t
   use partners, only: axis_of, is_wall, looks_again, nothing, obstacle_code, sense_of, side_crossed
-  use reach_lists, only: largest_small_radius, place_t, reach_lists_t
-  use shapes, only: spare
+  use reach_lists, only: place_t, reach_lists_t
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: cell_grid_t, whole_box
+  public :: cell_grid_t
 
-  !> Tuning. Fewer disks per cell mean fewer candidates, but more crossings of faces.
-  real(real64), parameter :: disks_per_cell = 0.6_real64    !! wanted when dilute
   real(real64), parameter :: spacious = 1.2_real64          !! width of cells, in diameters, from which choosing pays
 
   type :: cell_grid_t
@@ -130,8 +128,7 @@ contains
           sim%tag(i)%cell = 1                      ! one that is marked in any case
         else if (sim%tag(i)%id > 0) then
           cell = int(patch%cell_at(sim%position(i)), int16)
-          sim%tag(i)%cell = cell
-          call self%cells%insert(self%cells%number(cell), i)
+          call put(self, sim%tag(i), i, cell)
           self%n_listed = self%n_listed + 1
         end if
       end do
@@ -153,22 +150,6 @@ contains
     end do
   end subroutine list_all
 
-  !> The cells that suit all disks of a simulation, and its obstacles: each counts as much as a disk, as a disk has to be
-  !> tested against those that reach into its cell.
-  pure function whole_box(sim, undivided) result(patch)
-    type(simulation_t), intent(in) :: sim
-    logical, intent(in) :: undivided
-    type(patch_t) :: patch
-    real(real64) :: small, reach, width
-
-    small = merge(maxval(sim%disk%radius), largest_small_radius(sim%disk), undivided .or. sim%box%is_sheared())
-    reach = 2*small*(1 + spare)
-    width = max(sqrt(disks_per_cell*product(sim%box%edges())/(sim%n_disks() + sim%box%n_obstacles())), reach)
-    if (undivided) width = never
-    patch = all_cells(sim%box, int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32), reach)
-    patch%small = small
-  end function whole_box
-
   !> Puts disk i into a cell.
   subroutine insert(self, sim, i, cell)
     class(cell_grid_t), intent(inout) :: self
@@ -176,8 +157,7 @@ contains
     integer(int32), intent(in) :: i
     integer(int16), intent(in) :: cell(2)
 
-    sim%tag(i)%cell = cell
-    call self%cells%insert(self%cells%number(cell), i)
+    call put(self, sim%tag(i), i, cell)
     if (self%lists%used) call self%list(sim, i)
   end subroutine insert
 
@@ -188,8 +168,28 @@ contains
     integer(int32), intent(in) :: i
 
     if (self%lists%used) call self%lists%leave(i, self%cells, self%patch, tag%cell)
-    call self%cells%remove(self%cells%number(tag%cell), i)
+    call take(self, tag, i)
   end subroutine take_out
+
+  !> Puts disk i into a cell; lists of neighbours stay as they are.
+  subroutine put(self, tag, i, cell)
+    class(cell_grid_t), intent(inout) :: self
+    type(tag_t), intent(inout) :: tag
+    integer(int32), intent(in) :: i
+    integer(int16), intent(in) :: cell(2)
+
+    tag%cell = cell
+    call self%cells%insert(self%cells%number(cell), i)
+  end subroutine put
+
+  !> Takes disk i out of its cell; lists of neighbours stay as they are.
+  subroutine take(self, tag, i)
+    class(cell_grid_t), intent(inout) :: self
+    type(tag_t), intent(in) :: tag
+    integer(int32), intent(in) :: i
+
+    call self%cells%remove(self%cells%number(tag%cell), i)
+  end subroutine take
 
   !> Lists the neighbours of disk i around where it is now; none if it has left the patch.
   subroutine list(self, sim, i)
@@ -305,9 +305,8 @@ contains
     integer(int32), intent(in) :: i
     integer(int16), intent(in) :: cell(2)
 
-    call self%cells%remove(self%cells%number(tag%cell), i)
-    tag%cell = cell
-    call self%cells%insert(self%cells%number(cell), i)
+    call take(self, tag, i)
+    call put(self, tag, i, cell)
   end subroutine move
 
   !> The earliest of: side or cell face, obstacle, disk in the cells around.
