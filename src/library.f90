@@ -313,10 +313,9 @@ contains
     character(len=*), intent(in) :: path              !! of the input
     type(error_t), allocatable, intent(out) :: error
     type(problem_list_t) :: problems
-    type(text_t) :: none(0)
 
     call check_speeds(sim, problems)
-    call problems%report(path, none, error)
+    call problems%report(path, error)
   end subroutine check_motion
 
   !> Continues with a changed state.

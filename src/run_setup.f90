@@ -76,7 +76,7 @@ contains
       call complete_settings(input%settings, input%groups, problems, complete)
       if (complete) call check_fit(input%settings, input%groups, problems)
     end if
-    call problems%report(input%path, input%overrides, error)
+    call problems%report(input%path, error, input%overrides)
   end subroutine resolve_input
 
   !> The state at the start of a run, the disks in an order that suits the memory.

@@ -62,11 +62,11 @@ contains
   end function rank
 
   !> Makes all problems one error, a line for each: `path:line: group.variable: what is wrong, what is allowed`.
-  subroutine report(self, path, overrides, error)
+  subroutine report(self, path, error, overrides)
     class(problem_list_t), intent(in) :: self
     character(len=*), intent(in) :: path
-    type(text_t), intent(in) :: overrides(:)
     type(error_t), allocatable, intent(out) :: error
+    type(text_t), intent(in), optional :: overrides(:)    !! that problems may be about
     character(len=:), allocatable :: text, place
     integer :: k
 
@@ -76,7 +76,7 @@ contains
       associate (problem => self%items(k))
         place = path
         if (problem%line > 0) place = path//":"//written(problem%line)
-        if (problem%line < 0) place = "--set "//overrides(-problem%line)%text
+        if (problem%line < 0 .and. present(overrides)) place = "--set "//overrides(-problem%line)%text
         text = text//new_line("a")//legible(place//": "//problem%text)
       end associate
     end do

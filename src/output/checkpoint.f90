@@ -112,6 +112,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: there
 
+    text = ""
+    overrides = ""
     call check_program(file, error)
     if (allocated(error)) return
     call file%fetch_text(parameters_group//"input", text)

@@ -267,6 +267,7 @@ contains
 
     if (.not. any([(has_many(groups(g)), g=1, size(groups))])) return
     path = parameters_group//trim(groups(1)%name)//"_rows/"
+    allocate (values(0))
     do k = 1, size(groups(1)%values)
       associate (row => table(groups(1)%values(k)%row))
         if (row%status /= "example") cycle            ! not what places an obstacle

@@ -40,7 +40,7 @@ contains
       if (problems%count == 0) call check_speeds(sim, problems)
       if (problems%count == 0) call sim%start_sums()
     end associate
-    call problems%report(input%path, input%overrides, error)
+    call problems%report(input%path, error, input%overrides)
   end subroutine create_simulation
 
   !> Refuses a simulation in which a product of lengths, speeds and masses, of those that decide when and how disks collide,
