@@ -241,7 +241,7 @@ checked:
 SYSTEMS ?= 200
 CHANGED ?= 300
 SEED ?= $(shell date +%Y%m%d)
-check:  ## validates physics, provokes faults, SYSTEMS=200 random runs, CHANGED=300
+check:  ## validates physics, provokes faults, runs random systems
 	@.ci/set-up demo test check
 	@$(MAKE) $(jobs) all
 	@LIMIT=1200 $(MAKE) $(jobs) suites=tests/long unit-tests

@@ -172,7 +172,7 @@ def test_the_table_says_what_may_change_on_resuming(ricochet):
     timed = [f"output.{v}" for v in table["output"] if re.match("(frames|observables)_", v)]
     run = [f"run.{v}" for v in ("title", "search", "queue", "threads")]
     stop = [f"stop.{v}" for v in table["stop"]]
-    assert found == {*run, *stop, *timed, "output.checkpoint_every"}
+    assert found == {*run, *stop, *timed, "output.decades_from", "output.checkpoint_every"}
     words = "may change on --resume"
     assert words in ricochet("--explain", "stop.time").stdout
     assert words not in ricochet("--explain", "box.lower").stdout

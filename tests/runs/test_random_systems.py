@@ -43,7 +43,8 @@ NOT_THE_END = ("warning:", "note:", "stopped; the run is finished")
 NO_ROOM = re.compile(r"species\.(radius|placement|file|position): ")
 #: What does not belong to the results: what says how they were computed.
 ASIDE = re.compile(
-    r"^/parameters(/run@(search|queue)|/overrides|/output@checkpoint_every|/stop@wall_clock)$"
+    r"^(/parameters(/run@(search|queue)|/overrides|/output@checkpoint_every|/stop@wall_clock)"
+    r"|/checkpoint/input_checksum)$"
 )
 
 

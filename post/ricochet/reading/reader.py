@@ -248,7 +248,7 @@ class Run:
         Sides may move.  The position of a piston is interpolated between the observables.
         """
         inwards = np.stack([displaced(side, np.asarray(time)) for side in self.sides], axis=-1)
-        inwards = inwards + self.offsets
+        inwards = inwards + self._offsets
         for k, place in self.piston_positions.items():
             end = (self.lower, self.upper)[k % 2][k // 2]
             at = np.interp(time, place.time, np.ravel(place.value))
@@ -256,7 +256,7 @@ class Run:
         return self.lower + inwards[..., ::2], self.upper - inwards[..., 1::2]
 
     @property
-    def offsets(self) -> np.ndarray:
+    def _offsets(self) -> np.ndarray:
         """(4,) how far inwards of the box's sides the sides are at the start of their motion."""
         ends = [end[axis] for axis in (0, 1) for end in (self.lower, self.upper)]
         starts = [side.get("position", end) for side, end in zip(self.sides, ends, strict=True)]
@@ -272,7 +272,7 @@ class Run:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """(2,) corners of the smallest rectangle that contains the box at all times."""
         swings = np.array([outmost(side) for side in self.sides])
-        swings = np.maximum(0.0, swings - self.offsets)
+        swings = np.maximum(0.0, swings - self._offsets)
         for k, place in self.piston_positions.items():
             beyond = (self.lower[k // 2] - place.value, place.value - self.upper[k // 2])[k % 2]
             swings[k] = max(0.0, np.max(beyond))
