@@ -259,8 +259,15 @@ events() {
   "${run_by[@]}" "$program" "$work/$1.nml" -o "$work/bench.h5" --force --quiet --set "stop.events=$2"
 }
 
+# piston DISKS: writes $work/piston_DISKS.nml, a gas at a packing of 0.2 that a piston of a tenth of its mass balances.
+piston() {
+  gas "$1" 0.2
+  { echo "&side name = 'right' motion = 'piston' mass = $(($1/10)) force = $((3*$1/2)) /" && cat "$work/gas_$1_0.2.nml"; } \
+    >"$work/piston_$1.nml"
+}
+
 check() {
-  local radii packing name limit options count verdict=0
+  local radii packing name disks limit options count verdict=0
   while read -r radii packing limit options; do
     # shellcheck disable=SC2086 # several options, or none
     count=$((($(instructions "$radii" "$packing" 100000 $options) - $(instructions "$radii" "$packing" 1 $options))/100000))
@@ -291,6 +298,15 @@ scatterers_35 4000
 lorentz 6200
 board_1 3300
 board_36 11800
+LIMITS
+  while read -r disks limit; do
+    piston "$disks"
+    count=$((($(counted run "piston_$disks" 40000) - $(counted run "piston_$disks" 1))/40000))
+    printf 'a gas and a piston, %s disks: %s instructions per collision, at most %s\n' "$disks" "$count" "$limit"
+    [ "$count" -gt 0 ] && [ "$count" -le "$limit" ] || verdict=1
+  done <<'LIMITS'
+2000 4375
+40000 4925
 LIMITS
   return $verdict
 }
