@@ -51,6 +51,7 @@ module cell_faces
   type :: cell_faces_t
     real(real64) :: width(2) = 0.0_real64          !! from cell to cell [length]
     real(real64) :: overlap(2) = 0.0_real64        !! of neighbouring cells [length]
+    logical :: moving = .false.                    !! sides move
     logical :: falling = .false.                   !! disks fly on parabolas, or sides move: more than one face is in question
     logical :: periodic(2) = .false.               !! by axis
     ! Pistons can strike disks anywhere, but for some time only in a strip of columns or rows.
@@ -192,7 +193,8 @@ contains
 
     self%width = patch%width
     self%overlap = max(self%width - patch%reach, 0.0_real64)
-    self%falling = box%falling() .or. any(box%surface(:n_sides)%motion%travels())
+    self%moving = any(box%surface(:n_sides)%motion%travels())
+    self%falling = box%falling() .or. self%moving
     self%periodic = box%periodic
     self%beyond = box%reach()
     where (transpose(reshape(box%surface(:n_sides)%motion%kind == piston, [2, 2]))) self%beyond = never
@@ -351,7 +353,7 @@ contains
     type(prospect_t), intent(inout) :: near        !! gets time and partner
 
     if (falling) then
-      call self%next_falling(box, disk, cell, now, near%time, near%partner)
+      call self%next_falling(box, self%column(:, cell(1)), self%row(:, cell(2)), disk, now, near)
     else
       call next_straight(self%column, self%row, disk, cell, near%time, near%partner)
     end if
@@ -365,14 +367,9 @@ contains
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
     type(prospect_t), intent(inout) :: near        !! gets time and partner
-    real(real64) :: t_y
-    integer(int32) :: code_y
 
     if (self%falling) then
-      call next_along(box, column, 1, disk, now, near%time, near%partner)
-      call next_along(box, row, 2, disk, now, t_y, code_y)
-      near%partner = chosen(near%partner, code_y, t_y < near%time)
-      near%time = merge(t_y, near%time, t_y < near%time)
+      call self%next_falling(box, column, row, disk, now, near)
     else
       call next_straight(column, row, disk, [1_int16, 1_int16], near%time, near%partner)
     end if
@@ -412,21 +409,25 @@ contains
   end function line_time
 
   !> On a parabola.
-  pure subroutine next_falling(self, box, disk, cell, now, t, code)
+  pure subroutine next_falling(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
+    type(line_t), intent(in) :: column(0:1), row(0:1)
     type(disk_t), intent(in) :: disk
-    integer(int16), intent(in) :: cell(2)
     real(real64), intent(in) :: now
-    real(real64), intent(out) :: t
-    integer(int32), intent(out) :: code
+    type(prospect_t), intent(inout) :: near        !! gets time and partner
     real(real64) :: t_x, t_y
     integer(int32) :: code_x, code_y
 
-    call next_along(box, self%column(:, cell(1)), 1, disk, now, t_x, code_x)
-    call next_along(box, self%row(:, cell(2)), 2, disk, now, t_y, code_y)
-    code = chosen(code_x, code_y, t_y < t_x)
-    t = merge(t_y, t_x, t_y < t_x)
+    if (self%moving) then
+      call next_beside(box, column, 1, disk, now, t_x, code_x)
+      call next_beside(box, row, 2, disk, now, t_y, code_y)
+    else
+      call next_along(box, column, 1, disk, now, t_x, code_x)
+      call next_along(box, row, 2, disk, now, t_y, code_y)
+    end if
+    near%partner = chosen(code_x, code_y, t_y < t_x)
+    near%time = merge(t_y, t_x, t_y < t_x)
   end subroutine next_falling
 
   !> The same along one axis.
@@ -443,10 +444,6 @@ contains
 
     g = box%gravity(axis)
     up = merge(1, 0, disk%v(axis) > 0)
-    if (any(line%struck)) then
-      call next_moving(line, axis, box, disk, now, t, code)
-      return
-    end if
     if (.not. abs(g) > 0) then
       t = line_time(line(up), disk, axis)
     else if (any(is_wall(line%code))) then
@@ -471,6 +468,23 @@ contains
     end if
     code = line(up)%code
   end subroutine next_along
+
+  !> The same where sides move, which may come into the cell.
+  pure subroutine next_beside(box, line, axis, disk, now, t, code)
+    type(box_t), intent(in) :: box
+    type(line_t), intent(in) :: line(0:1)          !! of the disk's cell
+    integer(int32), intent(in) :: axis
+    type(disk_t), intent(in) :: disk
+    real(real64), intent(in) :: now
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code
+
+    if (any(line%struck)) then
+      call next_moving(line, axis, box, disk, now, t, code)
+    else
+      call next_along(box, line, axis, disk, now, t, code)
+    end if
+  end subroutine next_beside
 
   !> The same where a side that moves may come into the cell, whether it is a side of it or not.
   pure subroutine next_moving(line, axis, box, disk, now, t, code)
