@@ -28,7 +28,7 @@ module side_motion
   type :: side_motion_t
     integer :: kind = still                          !! in `motions`
     real(real64) :: offset = 0.0_real64              !! how far inwards of the box's side it starts to move [length]
-    real(real64) :: amplitude = 0.0_real64           !! of constant velocity: offset and path; of a piston: the width of the box [length]
+    real(real64) :: amplitude = 0.0_real64           !! constant velocity: offset and path; piston: width of the box [length]
     real(real64) :: period = 1.0_real64              !! [time]
     real(real64) :: phase = 0.0_real64               !! at the time 0, in periods
     real(real64) :: strike = 0.0_real64              !! velocity inwards, of a sawtooth or a constant one [length/time]

@@ -43,9 +43,11 @@ NOT_THE_END = ("warning:", "note:", "stopped; the run is finished")
 NO_ROOM = re.compile(r"species\.(radius|placement|file|position): ")
 #: What does not belong to the results: what says how they were computed.
 ASIDE = re.compile(
-    r"^(/parameters(/run@(search|queue)|/overrides|/output@checkpoint_every|/stop@wall_clock)"
-    r"|/checkpoint/input_checksum)$"
+    r"^/parameters(/run@(search|queue)|/overrides|/output@checkpoint_every|/stop@wall_clock)$"
 )
+
+
+MOVING_SIDE = re.compile(r"/observables/sides/\w+/(position|velocity)/value")
 
 
 class End(NamedTuple):
@@ -255,11 +257,17 @@ def is_accepted(program: Path, folder: Path, system: System) -> bool:
 
 
 def last_samples(found: dict) -> dict:
-    """All that the last samples say, but not how many came before."""
+    """All that the last samples say, but not how many came before.
+
+    A run in which nothing will ever happen ends at its last sample, whenever that is. Sides that
+    move depend on this time, and on nothing else.
+    """
     return {
         name: value[-1:]
         for name, value in found.items()
-        if name.startswith(("/particles", "/observables")) and name.endswith("/value")
+        if name.startswith(("/particles", "/observables"))
+        and name.endswith("/value")
+        and not (bytes(found["/provenance@note"]) and MOVING_SIDE.match(name))
     }
 
 
@@ -285,7 +293,8 @@ def faults(program: Path, folder: Path, seed: str) -> str:
         own, other = found, contents(case.result(name))
         # Of a collapse the number of collisions: times have other units.
         notes = {bytes(file["/provenance@note"]).split(b", the first")[0] for file in (own, other)}
-        if len(notes) > 1:
+        nearly = way == case.in_other_units and case.nearly_stands_still()
+        if len(notes) > 1 and not nearly:
             said.append(f"notes otherwise: {name} {notes}")
         if way in (case.with_other_samples, case.in_memory):
             own, other = last_samples(own), last_samples(other)
@@ -294,7 +303,7 @@ def faults(program: Path, folder: Path, seed: str) -> str:
             own = {path: own[path] * scale for path, scale in scales.items() if path in own}
             other = {path: other[path] for path in own}
         different = [name for name in unlike(own, other) if not ASIDE.match(name)]
-        if different and not (way == case.in_other_units and case.nearly_stands_still()):
+        if different and not nearly:
             said.append(f"differs: {name}, {len(different)} {different[:6]}")
     return "\n".join([*said, case.system.text]) if said else ""
 
@@ -308,16 +317,20 @@ def test_all_ways_end_alike_and_the_laws_hold(program, tmp_path, seed):
 
 #: Variables that say how a run is done, or need another run.
 NOT_DRAWN = {"run.title", "run.search", "run.queue", "run.threads", "stop.wall_clock"}
-NOT_DRAWN |= {"species.scale_positions"}
+NOT_DRAWN |= {"species.scale_positions", "stop.at_rest", "obstacle.file"}
+NOT_DRAWN |= {"wall.file", "wall.points"}
 #: Features that are refused together, or of which a system has only one.
 APART = [
     ("box.shear_rate", r"obstacle|wall|side|box\.gravity|run\.d|stop\.energy"),
-    (r"stop\.energy", r"drive|box\.shear|(side|wall|obstacle)\.(temp|speed)|side\.[abefmpv]"),
+    (
+        r"stop\.energy",
+        r"drive|box\.shear|(side|wall|obstacle)\.(temp|surf)|side\.[aefmpv]|side\.start",
+    ),
     (r"obstacle|wall\.", r"species\.(file|position|grid|placement = (lattice|dense))"),
     (r"species\.(file|position)", r"species|contact\.pair|many"),
     (r"species\.(grid|placement = |packing)", r"species\.(grid|placement = |packing)|many"),
     ("output.helfand", r"box\.(gravity|shear)"),
-    (r"side\.(mass|force|motion = free)", r"run\.d"),
+    (r"side\.(mass|force|motion = piston)", r"run\.d"),
     ("drive", "drive"),
     (r"obstacle\.(name|side)|wall (x|y)", "periodic"),
     ("output.frames_every", "output.frames_every"),
@@ -338,7 +351,7 @@ def test_the_systems_draw_every_variable(program, tmp_path):
 def test_many_systems_draw_every_pair_of_features_that_goes_together(program, tmp_path):
     """And the program accepts them."""
     pairs, features = set(), set()
-    for seed in range(4000):
+    for seed in range(6000):
         system = random_system(random.Random(seed))
         drawn = sorted(system.features())
         features.update(drawn)

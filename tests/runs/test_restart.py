@@ -285,7 +285,7 @@ def test_a_new_cadence_counts_from_where_the_run_goes_on(ricochet, tmp_path):
     assert {900, 1000, 1100, 1200, 1300} < set(events[sampled > 1.3])
     assert ricochet("gas.nml", "-o", "whole.h5", "--set", "stop.time=3.1").returncode == FINISHED
     here, there = contents(tmp_path / "gas.h5"), contents(tmp_path / "whole.h5")
-    for name in ("position", "velocity", "collisions"):
+    for name in ("position", "velocity", "event_count"):
         path = f"/particles/disks/{name}/value"
         assert here[path][-1].tobytes() == there[path][-1].tobytes()
 

@@ -279,7 +279,7 @@ class Draw:
                 spread += self.maybe(0.5, "mass_scaling = 'area'")
                 radius /= 2  # the largest may be thrice as large
             size = f"radius = {radius!r} mass = {mass!r}"
-            if k == 0 and "grid" not in placement and self.chance(0.1):
+            if k == 0 and "grid" not in placement and self.chance(0.2):
                 share = count * math.pi * radius**2 / (wide * high)
                 size = f"packing_fraction = {share!r} mass = {mass!r}"
             elif k > 0 and self.chance(0.3):
