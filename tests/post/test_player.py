@@ -328,7 +328,7 @@ def test_paths_energies_and_colours_follow_the_log(simulated, playing, box, exac
     text = BOXES[box] + (FEW if exact else many(FEW))
     run = simulated(text, *LOGGED)
     truth = simulated(text, "output.frames_every_time=0.03", name="many")
-    frames = list(range(1, truth.frames - 1, 2))
+    frames = list(range(1, truth.n_frames - 1, 2))
     browser = playing(run.path)
     found = browser.run(
         """return arguments[0].map(t => { show(t); return [
