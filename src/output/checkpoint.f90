@@ -324,12 +324,10 @@ contains
     character(len=:), allocatable :: failure      ! of the first trial
     integer(int64) :: words
     integer :: number, trial
-    logical :: alike
 
     number = checkpoint_number(file)
     call sim%make_room(sum(sim%species%count))
     blank = sim
-    failure = ""
     do trial = 1, 2
       sim = blank
       record%name = slots(merge(2, 1, number == 2 .eqv. trial == 1))
@@ -337,15 +335,12 @@ contains
       call exchange_all(file, record, sim, progress)
       words = file%length(record%name)
       if (words > 0 .and. words /= record%words) then
-        call complain_of_disks(file%path, error)
+        call fail(error, exit_files, file%path//": has other disks than the input describes now: a starting file " &
+          //"(species.file) is not what it was; --resume needs it as it was, --force instead starts over")
         return
       end if
       call record%begin(reading)
-      call exchange_all(file, record, sim, progress, alike)
-      if (words > 0 .and. .not. (alike .or. allocated(file%failure))) then
-        call complain_of_disks(file%path, error)
-        return
-      end if
+      call exchange_all(file, record, sim, progress)
       if (any(sim%tag%species < 1 .or. sim%tag%species > size(sim%species) .or. sim%tag%id < 1 .or. sim%tag%id > size(sim%tag))) &
         call file%check(-1, "be read: "//record%name//" has disks that are none")
       if (.not. allocated(file%failure)) return
@@ -354,15 +349,6 @@ contains
     call move_alloc(failure, file%failure)
     call file%report(error)
   end subroutine read_slot
-
-  !> Reports that a checkpoint describes other disks than the input.
-  subroutine complain_of_disks(path, error)
-    character(len=*), intent(in) :: path
-    type(error_t), allocatable, intent(out) :: error
-
-    call fail(error, exit_files, path//": has other disks than the input describes now: a starting file " &
-      //"(species.file) is not what it was; --resume needs it as it was, --force instead starts over")
-  end subroutine complain_of_disks
 
   !> Refuses the checkpoint of another program.
   subroutine check_program(file, error)
@@ -398,19 +384,14 @@ contains
   end subroutine check_origin
 
   !> Writes or reads a checkpoint. When read, a simulation must know its box and species.
-  subroutine exchange_all(file, record, sim, progress, alike)
+  subroutine exchange_all(file, record, sim, progress)
     type(hdf5_file_t), intent(inout) :: file      !! not used while the record is counted
     type(record_t), intent(inout) :: record
     type(simulation_t), intent(inout), target :: sim
     type(progress_t), intent(inout) :: progress
-    logical, intent(out), optional :: alike       !! disks have the same numbers as the simulation wants
-    integer(int64) :: settled, features, stored
+    integer(int64) :: settled
     integer :: k
 
-    features = sum(merge([1, 2, 4], 0, [sim%with%rotation, sim%with%orientation, sim%with%own_sizes]))
-    stored = features
-    call record%exchange(file, stored)
-    if (present(alike)) alike = stored == features
     call record%exchange(file, sim%box%epoch)
     call record%exchange(file, sim%now)
     settled = merge(1, 0, sim%settled)
@@ -488,6 +469,10 @@ contains
         call exchange_short(tag%met)
         if (sim%with%own_sizes) call record%exchange(file, disk%radius)      ! else sizes follow from the input
       end associate
+      settled = merge(1, 0, sim%settled)
+      do k = 1, merge(1, 0, sim%with%rotation) + merge(2, 0, sim%with%orientation)
+        call record%exchange(file, settled)     ! words of no meaning: the length tells which numbers the disks have
+      end do
       if (allocated(sim%extra)) call record%pass(file, c_loc(sim%extra(1)), size(sim%extra)*storage_size(sim%extra)/64)
       if (.not. sim%with%own_sizes) return
       mass = sim%masses()                       ! they may turn out to be those of the species
