@@ -166,7 +166,7 @@ contains
       if (all(self%parts%domain%engine%idle)) call retire(moment)
     end subroutine visit
 
-    !> How many windows a failure may throw away: fewer the more there have been of late.
+    !> The number of windows that a failure may discard. It decreases with the number of recent failures.
     pure function windows_of_visit() result(n)
       integer :: n
 

@@ -1,5 +1,5 @@
-!> What a run does beside flights and collisions that change two velocities. Whoever must know asks here: which arrays the
-!> disks have, what is observed, how much a collision takes, and what the input is refused.
+!> Features of a run beyond free flight and collisions that change two velocities. They decide which arrays the disks have,
+!> which observables exist, which version of a collision is executed, and which inputs are refused.
 module features
   implicit none
   private

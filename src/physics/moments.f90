@@ -15,7 +15,7 @@ module moments
     logical :: is_count = .false.
   end type frame_column_t
 
-  !> What every disk has, and may have.
+  !> The columns of a frame: those that every disk has, then those that only some runs have.
   type(frame_column_t), parameter :: columns(*) = [frame_column_t("position", 2), frame_column_t("velocity", 2), &
     frame_column_t("event_count", is_count=.true.), frame_column_t("image", 2, is_count=.true.), &
     frame_column_t("angular_velocity"), frame_column_t("orientation")]

@@ -221,7 +221,7 @@ class Simulation:
         return self.parameters.get("stop", {}).keys() <= {"wall_clock"}
 
     def _go_on(self, limits: tuple[float, int, int], patience: float) -> bool:
-        """Advance towards these limits for some seconds; return whether they are still ahead."""
+        """Advance towards these limits for a few seconds; return whether they are still ahead."""
         with self._open() as handle:
             return called(library().ricochet_advance, handle, *limits, patience)
 
