@@ -12,13 +12,13 @@ from pathlib import Path
 
 from ricochet import Run, RunError
 from ricochet.figures.drawing import (
-    LABELS,
     aspect_of,
     caption,
     chosen_colour,
     colour_map,
     disk_collection,
     draw_box,
+    label_of,
     plt,
     radius_marks,
     scale_top,
@@ -58,7 +58,7 @@ def animate(
 ) -> animation.FuncAnimation:
     """Write a film of these frames, `fps` of them per second.
 
-    `colour` is "species" or a word of `LABELS`.
+    `colour` is "species" or a word of `COLOURINGS`.
     """
     colour = chosen_colour(run, colour)
     aspect = aspect_of(run)
@@ -85,7 +85,7 @@ def animate(
     if colour == "species":
         species_legend(figure, run)
     else:
-        figure.colorbar(disks, label=LABELS[colour], shrink=0.8, extend="max")
+        figure.colorbar(disks, label=label_of(run, colour), shrink=0.8, extend="max")
     warn(figure, [run.termination_note] if run.termination_note else [])
     figure.canvas.draw()
     figure.set_layout_engine("none")  # the layout stays; solving it for each frame is slow

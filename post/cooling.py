@@ -60,7 +60,7 @@ def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
         left.plot([], [], color=colour, label=f"ξ = {xi:g}")
     for name, style in styles:
         right.plot([], [], color="0.3", ls=style, label=name)
-    left.set(yscale="log", xlabel="time (reduced units)")
+    left.set(yscale="log", xlabel=runs[0].units.label("time"))
     low, high = left.get_ylim()  # for an elastic gas the limits would enclose rounding only
     left.set_ylim(min(low, 0.9), max(high, 1.1))
     left.set_ylabel("$\\langle K \\rangle\\,/\\,\\langle K \\rangle_{all,\\,t=0}$")

@@ -15,7 +15,7 @@ more energy left than `stop.energy_fraction`.
 
 from ricochet import Run, crater, drawing
 from ricochet.analysis.crater import Crater, bed, displaced, projectile
-from ricochet.figures.drawing import COLOURS, LABELS, WALL, caption, disk_collection, draw_box, plt
+from ricochet.figures.drawing import COLOURS, WALL, caption, disk_collection, draw_box, plt
 from ricochet.script import command_line, launch, report
 
 import numpy as np
@@ -58,7 +58,7 @@ def draw_energy(axes: plt.Axes, run: Run) -> None:
     fraction = run.parameter("stop", "energy_fraction")
     if fraction and 0 < float(fraction) < 1:
         axes.axhline(float(fraction), **{**WALL, "color": "0.6", "linewidth": 0.8}, ls="--")
-    axes.set(xlabel="time (reduced units)", ylabel="$E/E_0$", ylim=(None, 1.3))
+    axes.set(xlabel=run.units.label("time"), ylabel="$E/E_0$", ylim=(None, 1.3))
     twin = axes.twinx()
     twin.plot(*run.observable("collisions"), color=COLOURS[1], ls="-.", label="collisions")
     twin.set(ylabel="pair collisions", ylim=(0, None))
@@ -79,7 +79,7 @@ def draw(run: Run, size: Crater) -> plt.Figure:
     draw_outline(after, crater.hole(run), "hole: less than half as dense")
     below = {"location": "bottom", "pad": 0.02}
     scale = plt.cm.ScalarMappable(plt.Normalize(*limits), "viridis")
-    label = f"{LABELS['displacement']} at the end"
+    label = f"{drawing.label_of(run, 'displacement')} at the end"
     style = {"shrink": 0.6, "aspect": 40, "extend": "max", "label": label, **below}
     figure.colorbar(scale, ax=[before, after], **style)
     count = np.log10(1.0 + run.event_count[-1])

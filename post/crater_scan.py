@@ -39,11 +39,12 @@ from ricochet.script import command_line, grouped, launch, measured, report
 
 import numpy as np
 
+#: Words and dimension of the label of each parameter.
 AXES = {
-    "mass": "mass of the projectile / mass of a bed disk, $M$",
-    "speed": "speed of the projectile $v$ (reduced units)",
-    "radius": "radius of the projectile / radius of a bed disk, $R$",
-    "restitution": "restitution ξ",
+    "mass": ("mass of the projectile / mass of a bed disk, $M$", "number"),
+    "speed": ("speed of the projectile $v$", "speed"),
+    "radius": ("radius of the projectile / radius of a bed disk, $R$", "number"),
+    "restitution": ("restitution ξ", "number"),
 }
 SYMBOLS = {"mass": "M", "speed": "v", "radius": "R", "restitution": "(1-ξ^2)"}  # fitted against
 SIZES = {"hit": "disks hit", "displaced": "displaced by more than r"}
@@ -189,7 +190,7 @@ def draw(runs: list[Run], scans: Scans) -> plt.Figure:
     rows, columns = panel_grid(len(scans), 1)
     figure = plt.figure(figsize=(5.5 * max(columns, 1.3), 5.5 * rows))
     grid = figure.add_gridspec(2 * rows, columns, height_ratios=(1.3, 1) * rows)
-    fraction = energy_fraction(runs[0])
+    fraction, units = energy_fraction(runs[0]), runs[0].units
     for panel, (axis, scan) in enumerate(scans.items()):
         row, column = 2 * (panel // columns), panel % columns
         numbers = figure.add_subplot(grid[row, column])
@@ -204,7 +205,7 @@ def draw(runs: list[Run], scans: Scans) -> plt.Figure:
         title = listed({name: v for name, v in others(axis, scan[0]).items() if (name, v) in same})
         numbers.set(ylabel="number of disks", title=title)
         numbers.tick_params(labelbottom=False)
-        lengths.set(xlabel=AXES[axis], ylabel="length (box = 1)")
+        lengths.set(xlabel=units.label(*AXES[axis]), ylabel=units.label("length"))
         for axes, room in ((numbers, 1.5), (lengths, 1.9)):
             axes.set_ylim(0, room * axes.get_ylim()[1])
             axes.legend(loc="upper left", fontsize=8, ncols=1 + (len(scan) > 2))

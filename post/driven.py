@@ -205,14 +205,20 @@ def viscosity(run: Run) -> Curves:
     return {"": (time[1:], -stress / (run.shear_rate * np.prod(run.edges)))}
 
 
-#: What is shown: its label, its curves, what should last of it, and what of a mean is compared.
+#: What is shown: words and dimension of its label, its curves, the law of what should last, and
+#: what of a mean is compared with it.
 QUANTITIES = {
-    "width": ("width of the box (reduced units)", width, width_law, np.asarray),
-    "temperature": ("kT (reduced units)", temperature, temperature_law, np.asarray),
-    "share": ("share of the disks in the left half", share, demon_law, fuller),
-    "height": ("mean height (reduced units)", height, lambda run: None, np.asarray),
-    "viscosity": ("$-P_{xy}$ / shear rate", viscosity, lambda run: None, np.asarray),
-    "cluster": ("share of the disks in the largest cluster", cluster, lambda run: None, np.asarray),
+    "width": (("width of the box", "length"), width, width_law, np.asarray),
+    "temperature": (("kT", "energy"), temperature, temperature_law, np.asarray),
+    "share": (("share of the disks in the left half", "number"), share, demon_law, fuller),
+    "height": (("mean height", "length"), height, lambda run: None, np.asarray),
+    "viscosity": (("$-P_{xy}$ / shear rate", "viscosity"), viscosity, lambda run: None, np.asarray),
+    "cluster": (
+        ("share of the disks in the largest cluster", "number"),
+        cluster,
+        lambda run: None,
+        np.asarray,
+    ),
 }
 
 
@@ -256,12 +262,12 @@ def draw_curves(
     if any(laws.values()):
         axes.plot([], [], color="black", ls="--", label="theory")
     bottom, top = 0.9 * axes.dataLim.y0 if fine else 0, 1.06 * axes.dataLim.y1
-    axes.set(xlabel="time (reduced units)", xlim=(0, None), ylim=(bottom, top))
+    axes.set(xlim=(0, None), ylim=(bottom, top))
     axes.legend()
 
 
 def draw(
-    groups: dict[str, list[Run]], tracks: dict, laws: dict, label: str, fine: bool
+    groups: dict[str, list[Run]], tracks: dict, laws: dict, label: tuple[str, str], fine: bool
 ) -> plt.Figure:
     """Draw the curves and the pictures."""
     runs = [run for own in groups.values() for run in own]
@@ -276,7 +282,7 @@ def draw(
         width_ratios=[1.5 * HEIGHT, *[width] * len(pictures)],
     )
     draw_curves(axes, tracks, laws, fine)
-    axes.set_ylabel(label)
+    axes.set(xlabel=runs[0].units.label("time"), ylabel=runs[0].units.label(*label))
     for panel, (run, frame, name) in zip(panels, pictures, strict=True):
         drawing.draw_box(panel, run, run.time[frame])
         shades = drawing.species_colours(run)

@@ -78,7 +78,8 @@ def draw_species(axes: plt.Axes, run: Run) -> None:
         spaced = np.linspace if run.nature.driven else np.geomspace
         means = means_of_windows(time, value, spaced)
         axes.plot(*means, color=colour, ls=style, label=f"{kind}, {name}", **lone(time))
-    axes.set(ylabel="energy per disk (reduced units)", title=f"{method(run)}: {caption([run])}")
+    axes.set_ylabel(run.units.label("energy per disk", "energy"))
+    axes.set_title(f"{method(run)}: {caption([run])}")
     axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
     axes.legend(ncols=2, loc="upper right", title="means; faint: samples")
 
@@ -95,7 +96,7 @@ def draw(runs: list[Run]) -> plt.Figure:
     if not any(run.nature.driven for run in runs):
         bottom.set_xscale("log")
     bottom.set(
-        xlabel="time (reduced units)",
+        xlabel=runs[0].units.label("time"),
         ylabel="largest change so far, over E(0)",
         xlim=(min(run.observable("total_energy").time[1] for run in runs), None),
         ylim=(EPSILON / 4, 10 * bottom.get_ylim()[1]),

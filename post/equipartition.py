@@ -96,10 +96,11 @@ def draw(groups: list, results: list[Approach], until: float, within: float) -> 
             label = f"means differ by less than {100 * within:g} % for three windows from t = "
             label += " ± ".join(rounded_to_error(*found.thermalisation))
             axes.axvline(found.thermalisation.mean, color="0.5", ls="--", lw=1, label=label)
-        axes.set(ylabel="⟨K⟩ per disk", title=f"$v_0$ = {v0:g},  {caption(runs)}", xlim=(0, until))
+        axes.set(title=f"$v_0$ = {v0:g},  {caption(runs)}", xlim=(0, until))
+        axes.set_ylabel(first.units.label("⟨K⟩", "energy"))
         axes.set_ylim(0, None)
         axes.legend(ncols=3, loc="lower right")
-    panels[-1, 0].set_xlabel("time (reduced units)")
+    panels[-1, 0].set_xlabel(first.units.label("time"))
     return figure
 
 

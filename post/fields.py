@@ -26,6 +26,7 @@ from ricochet.analysis.fields import ACROSS, fields, has_theory, places, predict
 from ricochet.analysis.statistics import Estimate
 from ricochet.figures.drawing import band, draw_box, plt, titled
 from ricochet.reading.reader import SIDES
+from ricochet.reading.units import Units
 from ricochet.script import command_line, launch, measured, report, spread
 
 import numpy as np
@@ -33,17 +34,18 @@ from matplotlib.patches import Circle
 
 MOST_CELLS = 100_000
 LEAST_FLOW = 0.2  # smallest scale of arrows, in thermal speeds: noise is not enlarged
+#: Words and dimension of the label of each field.
 LABELS = {
-    "density": "number density n",
-    "flow_x": "flow $u_x$",
-    "flow_y": "flow $u_y$",
-    "temperature": "kT",
-    "rotational_temperature": "$kT_{rot}$",
-    "stress_xx": "stress carried, xx",
-    "stress_xy": "stress carried, xy",
-    "stress_yy": "stress carried, yy",
-    "heat_x": "heat carried along x",
-    "heat_y": "heat carried along y",
+    "density": ("number density n", "number density"),
+    "flow_x": ("flow $u_x$", "speed"),
+    "flow_y": ("flow $u_y$", "speed"),
+    "temperature": ("kT", "energy"),
+    "rotational_temperature": ("$kT_{rot}$", "energy"),
+    "stress_xx": ("stress carried, xx", "stress"),
+    "stress_xy": ("stress carried, xy", "stress"),
+    "stress_yy": ("stress carried, yy", "stress"),
+    "heat_x": ("heat carried along x", "heat flux"),
+    "heat_y": ("heat carried along y", "heat flux"),
 }
 PANELS = {"density": "A", "flow": "B", "temperature": "C"}  # panels that have a prediction
 
@@ -52,11 +54,11 @@ def draw_profile(runs: list[Run], axis: int, x: np.ndarray, found: dict, law) ->
     """Draw density, flow along the walls, temperatures, stress and heat across an axis."""
     run, flow = runs[0], f"flow_{'yx'[axis]}"
     figure, panels = plt.subplot_mosaic("AABBCC;DDDEEE", figsize=(12, 7))
-    draw_fields(panels["A"], x, found, "density")
-    draw_fields(panels["B"], x, found, flow)
-    draw_fields(panels["C"], x, found, "temperature", "rotational_temperature")
-    draw_fields(panels["D"], x, found, "stress_xx", "stress_yy", "stress_xy")
-    draw_fields(panels["E"], x, found, f"heat_{'xy'[axis]}")
+    draw_fields(panels["A"], run.units, x, found, "density")
+    draw_fields(panels["B"], run.units, x, found, flow)
+    draw_fields(panels["C"], run.units, x, found, "temperature", "rotational_temperature")
+    draw_fields(panels["D"], run.units, x, found, "stress_xx", "stress_yy", "stress_xy")
+    draw_fields(panels["E"], run.units, x, found, f"heat_{'xy'[axis]}")
     for name, panel in PANELS.items() if law is not None else ():
         style = {"color": "black", "ls": "--", "lw": 1, "label": "Enskog, from the fluxes"}
         band(panels[panel], with_ends(run, axis, x), *law[name], **style)
@@ -69,21 +71,22 @@ def draw_profile(runs: list[Run], axis: int, x: np.ndarray, found: dict, law) ->
     least = LEAST_FLOW * float(np.sqrt(np.nanmax(found["temperature"].mean)))
     panels["B"].set_ylim(min(low, -least), max(high, least))
     for axes in panels.values():
-        axes.set(xlabel=f"{'xy'[axis]} (reduced units)", xlim=(run.lower[axis], run.upper[axis]))
+        axes.set_xlabel(run.units.label("xy"[axis], "length"))
+        axes.set_xlim(run.lower[axis], run.upper[axis])
         if len(axes.get_legend_handles_labels()[0]) > 1:
             axes.legend()
     figure.suptitle(titled(runs))
     return figure
 
 
-def draw_fields(axes: plt.Axes, x: np.ndarray, found: dict, *names: str) -> None:
+def draw_fields(axes: plt.Axes, units: Units, x: np.ndarray, found: dict, *names: str) -> None:
     """Draw points with errors, with gaps at cells without disks."""
     there = [name for name in names if name in found]
     for name in there:
-        label = LABELS[name] if len(there) > 1 else "measured"
+        label = LABELS[name][0] if len(there) > 1 else "measured"
         axes.errorbar(x, *found[name], fmt="o", ms=3, label=label)
-    what = " and ".join(dict.fromkeys(LABELS[name].partition(",")[0] for name in there))
-    axes.set_ylabel(f"{what} (reduced units)")
+    words = " and ".join(dict.fromkeys(LABELS[name][0].partition(",")[0] for name in there))
+    axes.set_ylabel(units.label(words, LABELS[there[0]][1]))
 
 
 def with_ends(run: Run, axis: int, x: np.ndarray) -> np.ndarray:
@@ -134,7 +137,7 @@ def draw_grid(runs: list[Run], cells: tuple[int, int], found: dict) -> plt.Figur
         image = axes.pcolormesh(*sides, found[name].mean.reshape(cells[::-1]), zorder=0.2)
         for one in (obstacle for obstacle in run.obstacles if obstacle.inside):
             image.set_clip_path(Circle(one.centre, one.radius, transform=axes.transData))
-        figure.colorbar(image, ax=axes, label=LABELS[name], shrink=0.8)
+        figure.colorbar(image, ax=axes, label=run.units.label(*LABELS[name]), shrink=0.8)
         arrows = axes.quiver(*places(run, cells).T, *(part.ravel() for part in flow), **scale)
         key = {"labelpos": "W", "color": "black", "coordinates": "axes"}
         axes.quiverkey(arrows, 0.3, 1.04, top, f"flow {top:.2g}", **key)

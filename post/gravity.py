@@ -201,14 +201,17 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
         "slope fitted for $mv^2/2$ = {:g} to {:g} kT, over $m/2kT$".format(*SPEED_RANGE),
         "slope fitted for $mgh$ = {:g} to {:g} kT, over $mg/kT$".format(*HEIGHT_RANGE),
     )
-    names = "$v^2$", "height h of the centre above its lowest place"
+    names = (
+        run.units.label("$v^2$", "squared speed"),
+        run.units.label("height h of the centre above its lowest position", "length"),
+    )
     for row, title, name, known in zip(panels, titles, names, (1, lawful[0]), strict=True):
         row[0].set(ylabel="probability density", xlim=(0, None))
         row[0].legend(loc="upper right", title=title)
         top = row[0].get_ylim()[1]
         row[1].set(yscale="log", ylim=(1e-4 * top, 1.5 * top))
         for axes in row:
-            axes.set_xlabel(f"{name} (reduced units)")
+            axes.set_xlabel(name)
         if np.isfinite(known):
             row[1].plot([], [], color="0.4", lw=1.4, label="exponential law (in colour)")
             row[1].plot(

@@ -17,6 +17,7 @@ from ricochet import Run, RunError
 from ricochet.analysis.statistics import Estimate, estimate
 from ricochet.figures.drawing import COLOURS, plt
 from ricochet.reading.nature import TRAITS, allow
+from ricochet.reading.units import Units
 from ricochet.script import command_line, launch, measured, report
 
 import numpy as np
@@ -57,7 +58,7 @@ def divergence(time: np.ndarray, apart: np.ndarray, largest: float, begin: float
     return Divergence(time, logarithm, slope, estimate(slope), *ends)
 
 
-def draw(found: Divergence) -> plt.Figure:
+def draw(found: Divergence, units: Units) -> plt.Figure:
     """Draw each pair thin, and their geometric mean thick with the fitted line."""
     figure, axes = plt.subplots(figsize=(7, 5))
     for track in found.logarithm:
@@ -70,7 +71,8 @@ def draw(found: Divergence) -> plt.Figure:
     mean_slope, error = found.exponent
     label = f"$e^{{\\lambda t}}$, $\\lambda$ = {mean_slope:.3f} ± {error:.3f}"
     axes.plot(t, np.exp(line), color=COLOURS[1], lw=2.5, ls="--", label=label)
-    axes.set(xlabel="time t (reduced units)", ylabel="distance of the positions (reduced units)")
+    axes.set(xlabel=units.label("time t", "time"))
+    axes.set_ylabel(units.label("distance of the positions", "length"))
     axes.legend(loc="upper left")
     return figure
 
@@ -95,7 +97,7 @@ def main() -> None:
     row = {"pairs": len(found.slope), "from": found.begin, "to": found.end}
     row |= measured("lyapunov_exponent", found.exponent)
     tracks = {f"pair_{k + 1}": track for k, track in enumerate(apart)}
-    report(args, draw(found), [row], data={"time": found.time, **tracks})
+    report(args, draw(found, args.units), [row], data={"time": found.time, **tracks})
 
 
 if __name__ == "__main__":

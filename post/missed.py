@@ -103,8 +103,8 @@ def draw(runs: list[Run], rows: list[dict]) -> plt.Figure:
     label = f"measured, {size} pair{'s' * (size > 1)} of runs"
     style = {"ls": "", "marker": "o", "color": COLOURS[0], "capsize": 3, "label": label}
     axes.errorbar(dt, share, error, **style)
-    axes.set(xscale="log", yscale="log", xlabel="Δt (reduced units)", title=caption(runs))
-    axes.set_ylabel("pair collisions missed [%]")
+    axes.set(xscale="log", yscale="log", title=caption(runs))
+    axes.set(xlabel=runs[0].units.label("Δt", "time"), ylabel="pair collisions missed [%]")
     axes.set_xticks(dt, [f"{step:g}" for step in dt], minor=False)
     axes.set_xticks([], minor=True)
     axes.legend(loc="upper left")

@@ -106,7 +106,7 @@ def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Fi
     panels[0, 0].set_title("Start")
     panels[0, 1].set_title("Equilibrium")
     for axes in panels[-1]:
-        axes.set(xlabel="speed v (reduced units)", xlim=(0, top))
+        axes.set(xlabel=runs[0].units.label("speed v", "speed"), xlim=(0, top))
     figure.suptitle(caption(runs))
     return figure
 

@@ -29,7 +29,7 @@ from pathlib import Path
 
 from ricochet import Run, RunError
 from ricochet.analysis.paths import seen, turns_between, why_unknown
-from ricochet.figures.drawing import COLOURS, LABELS, caption, chosen_colour, scale_top
+from ricochet.figures.drawing import COLOURS, caption, chosen_colour, label_of, scale_top
 from ricochet.reading.files import destination
 from ricochet.reading.nature import known, rows_of
 from ricochet.reading.reader import SIDES, groups_of_rows, span
@@ -279,7 +279,7 @@ def film(
     facts |= {
         "time": run.time[frames].tolist(),
         "curves": curves(run),
-        "scales": {name: [LABELS[name], float(f"{top:.7g}")] for name, top in tops.items()},
+        "scales": {name: [label_of(run, name), float(f"{top:.7g}")] for name, top in tops.items()},
         "colour": colour,
         "traced": traced or ([0] if run.n_disks == 1 else []),
         **told,

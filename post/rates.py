@@ -158,7 +158,7 @@ def draw_pressure(axes: plt.Axes, curves: dict[str, Curve], mean: SeriesMean, st
     level = np.full(2, mean.mean)
     band(axes, np.array([start, end]), level, mean.error, color="black", lw=1, label=label)
     axes.axvspan(0, start, color="0.9", lw=0, zorder=0, label="left out")
-    axes.set(xlabel="time t (reduced units)", ylabel="pressure", xlim=(0, end))
+    axes.set_xlim(0, end)
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.4 * (high - low))  # room for the legend above what it names
     axes.legend(loc="upper right")
@@ -207,6 +207,8 @@ def main() -> None:
         means = over_all(runs, args.equilibration, notes)
         shown = pressures_in_time(runs)
         draw_pressure(panels[0, 0], shown, means["pressure_virial"], start)
+        panels[0, 0].set(xlabel=args.units.label("time t", "time"))
+        panels[0, 0].set(ylabel=args.units.label("pressure", "stress"))
         curves = {(f"pressure_{way}(t)",): curve for way, curve in shown.items()}
     if paths:
         draw_paths(panels[0, -1], paths, "mixture" not in runs[0].nature)

@@ -33,8 +33,8 @@ def draw(runs: list[Run], law: tuple, exact: float | None, found: Curves) -> plt
     right.plot(tau, expected[1] / expected[0], label="Luding et al.", **dashed)
     if exact is not None:
         right.axhline(exact, color="black", lw=1, label=f"Boltzmann equation: {exact:.4f}")
-    top = max(start)
-    left.set(yscale="log", ylim=(1e-3 * top, 1.5 * top), ylabel="temperature (reduced units)")
+    top, label = max(start), runs[0].units.label("temperature", "energy")
+    left.set(yscale="log", ylim=(1e-3 * top, 1.5 * top), ylabel=label)
     right.set(ylabel="$T_{rot} / T$", ylim=(0, None))
     for axes in (left, right):
         axes.set(xlabel="collisions per disk", xlim=(0, None))

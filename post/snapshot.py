@@ -44,7 +44,7 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
         values = np.array([drawing.values_of(run, frame, colour) for frame in frames])
         whole = scale(values, args.log, colour)
         beyond = "neither" if colour == "psi6" else "both" if args.log else "max"
-        bar = {"label": drawing.LABELS[colour], "extend": beyond}
+        bar = {"label": drawing.label_of(run, colour), "extend": beyond}
     longest = max(float(np.max(run.speed(frame))) for frame in frames) or 1.0
     # The longest arrow is a tenth of the box.
     arrows = {"angles": "xy", "scale_units": "xy", "scale": longest / (0.1 * run.edges.max())}

@@ -64,6 +64,7 @@ if TYPE_CHECKING:  # the modules that `__getattr__` loads, for type checkers
     from .reading import files as files
     from .reading import nature as nature
     from .reading import reader as reader
+    from .reading import units as units
     from .running import ensembles as ensembles
     from .running import program as program
     from .running import simulation as simulation

@@ -10,6 +10,7 @@ import re
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from itertools import groupby, repeat
 from pathlib import Path
 from typing import NoReturn
@@ -19,10 +20,11 @@ import numpy as np
 
 from .analysis.statistics import Curve, Estimate, SeriesMean, combine_runs, diagnostics
 from .analysis.thermodynamics import SPEEDS_FORGET, frames_from, packing, start_of_steady_state
-from .figures.drawing import LABELS, STYLE, plt, save, warn
+from .figures.drawing import COLOURINGS, STYLE, plt, save, warn
 from .reading.files import destination, did_you_mean
 from .reading.nature import Refused
 from .reading.reader import Restitution, Run, RunError, read_run
+from .reading.units import UNNAMED, Units, units_of
 from .running.ensembles import in_order, read_manifest
 
 matplotlib.use("Agg")
@@ -75,6 +77,14 @@ def not_negative(text: str) -> float:
     return value
 
 
+def unit_names(text: str) -> Units:
+    """Parse names of units such as 'length=cm,time=s'."""
+    try:
+        return units_of(text)
+    except ValueError as problem:
+        raise argparse.ArgumentTypeError(str(problem)) from None
+
+
 #: Options that several scripts have (type, value, meaning): a name means the same everywhere.
 OPTIONS = {
     "frames": (frame_list, "LIST", "which frames: numbers, ranges, as 0,10,-1 or 100:200 or ::5"),
@@ -87,7 +97,7 @@ OPTIONS = {
     "min_separation": (float, "X", "take frames at least X collisions per disk apart"),
     "wavenumber": (not_negative, "K", "wave number of F_s(k, t), times the mean diameter"),
     "disks": (disk_list, "IDS", "which disks: ids such as 1,5,9"),
-    "colour": (str, "WHAT", f"species, {', '.join(LABELS)} [species; speed if there is one]"),
+    "colour": (str, "WHAT", f"species, {', '.join(COLOURINGS)} [species; speed if there is one]"),
 }
 
 
@@ -110,7 +120,7 @@ class Parser(argparse.ArgumentParser):
             self.error(f"unknown argument {word}{did_you_mean(word, self._option_string_actions)}")
         if hasattr(known, "runs"):
             paths = known.runs if known.paired else finished(known.runs)
-            known.runs = [read_run(path) for path in paths]
+            known.runs = [replace(read_run(path), units=known.units) for path in paths]
             if len(known.runs) > 1 and not known.repeated:
                 known.runs = distinct(known.runs)
         results = [getattr(known, name, None) for name in ("output", "csv")]
@@ -181,6 +191,8 @@ def command_line(
     parser.add_argument("-o", "--output", type=Path, help=f"where to write [{output}]", **place)
     if csv:
         parser.add_argument("--csv", type=Path, metavar="FILE", help="write the numbers to a table")
+    names = "names of units, such as length=cm,time=s,mass=g, for axes [reduced units]"
+    parser.add_argument("--units", type=unit_names, default=UNNAMED, metavar="NAMES", help=names)
     for name, default in defaults.items():
         convert, value, meaning = OPTIONS[name]
         meaning += "" if default is None else f" [{default:g}]"

@@ -30,12 +30,12 @@ STYLE = Path(__file__).with_name("style.mplstyle")
 COLOURS = matplotlib.rc_params_from_file(STYLE)["axes.prop_cycle"].by_key()["color"]
 WALL: dict[str, Any] = {"color": "0.25", "linewidth": 1.2}
 
-#: What disks can be coloured by, apart from their species.
-LABELS = {
-    "speed": "speed (reduced units)",
-    "displacement": "displacement (reduced units)",
-    "collisions": "collisions so far",
-    "psi6": "direction of $\\psi_6$ against the mean one (degrees)",
+#: What disks can be coloured by, apart from their species: label of the scale, and its quantity.
+COLOURINGS = {
+    "speed": ("speed", "speed"),
+    "displacement": ("displacement", "length"),
+    "collisions": ("collisions so far", "number"),
+    "psi6": ("direction of $\\psi_6$ against the mean one (degrees)", "number"),
 }
 
 
@@ -102,8 +102,13 @@ def panel_grid(count: int, aspect: float) -> tuple[int, int]:
     return rows, int(np.ceil(count / rows))
 
 
+def label_of(run: Run, colour: str) -> str:
+    """Return the label of a colour scale, with the unit."""
+    return run.units.label(*COLOURINGS[colour])
+
+
 def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
-    """Return the number (..., N) that colours each disk, see `LABELS`."""
+    """Return the number (..., N) that colours each disk, see `COLOURINGS`."""
     if colour == "collisions" and run.event_count is not None:
         return run.event_count[as_index(frame)].astype(float)
     if colour == "psi6":
@@ -130,7 +135,7 @@ def colour_map(colour: str) -> str:
 
 def chosen_colour(run: Run, wish: str | None) -> str:
     """Return the wished colouring, or the default of the run; refuse what it has no data for."""
-    known = ("species", *LABELS)
+    known = ("species", *COLOURINGS)
     if wish is not None and wish not in known:
         hint = did_you_mean(wish, known)
         raise RunError(f"'{wish}' is not one of {', '.join(known)}{hint}")

@@ -13,7 +13,7 @@ Frames are read on demand, so a file may be larger than memory.  A file that is 
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -24,6 +24,7 @@ import numpy as np
 from .arrays import Index, as_index
 from .files import RunError, Unsound, did_you_mean, open_file, tree
 from .nature import Nature, nature_of
+from .units import UNNAMED, Units
 
 if TYPE_CHECKING:
     import pandas
@@ -215,6 +216,7 @@ class Run:
     walls: np.ndarray  # (W, 2, 2) straight walls, from one point to another
     parameters: dict[str, Any]  # group -> variable -> value, as used
     provenance: dict[str, Any]
+    units: Units = field(default=UNNAMED, kw_only=True)  # their names, for labels of axes
 
     def __repr__(self) -> str:
         """Return one line, however many disks there are."""

@@ -1,0 +1,84 @@
+"""Names of the units of an input, for the labels of axes.
+
+An input consists of plain numbers; only its author knows whether a length is in metres or in
+diameters.  A name changes labels, never a number.
+"""
+
+from typing import NamedTuple
+
+from .files import did_you_mean
+
+#: Powers of length, time and mass of each quantity; a density and a stress are those of a plane.
+POWERS = {
+    "number": (0, 0, 0),  # no unit
+    "length": (1, 0, 0),
+    "time": (0, 1, 0),
+    "mass": (0, 0, 1),
+    "speed": (1, -1, 0),
+    "squared speed": (2, -2, 0),
+    "energy": (2, -2, 1),
+    "number density": (-2, 0, 0),
+    "stress": (0, -2, 1),
+    "viscosity": (0, -1, 1),
+    "heat flux": (1, -3, 1),
+}
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+class Units(NamedTuple):
+    """Names of the units of length, time, mass and energy; empty where unknown."""
+
+    length: str = ""
+    time: str = ""
+    mass: str = ""
+    energy: str = ""  # empty: made of the other three
+
+    def label(self, words: str, quantity: str = "") -> str:
+        """Return the label of an axis, such as 'time (s)', or 'time (reduced units)'.
+
+        `quantity` is one of `POWERS`; without it the words are the quantity.
+        """
+        unit = self.name(quantity or words)
+        return f"{words} ({unit})" if unit else words
+
+    def name(self, quantity: str) -> str:
+        """Return the unit of one of `POWERS`, or 'reduced units' where a part of it is unknown."""
+        if quantity == "energy" and self.energy:
+            return self.energy
+        powers = zip(POWERS[quantity][::-1], self[2::-1], strict=True)  # mass is written first
+        parts = [(power, name) for power, name in powers if power]
+        return product(parts) if all(name for _, name in parts) else "reduced units"
+
+
+UNNAMED = Units()
+
+
+def product(parts: list[tuple[int, str]]) -> str:
+    """Return powers of units as text: 'cm/s', 'kg m²/s²', '1/cm²'; '' without any."""
+
+    def factors(sign: int) -> str:
+        own = [(abs(power), name) for power, name in parts if sign * power > 0]
+        return " ".join(
+            name + str(power).translate(SUPERSCRIPTS) * (power > 1) for power, name in own
+        )
+
+    above, below = factors(1), factors(-1)
+    if not below:
+        return above
+    return f"{above or 1}/({below})" if " " in below else f"{above or 1}/{below}"
+
+
+def units_of(text: str) -> Units:
+    """Parse names of units such as 'length=cm,time=s'; ValueError says what is wrong."""
+    found: dict[str, str] = {}
+    for part in text.split(","):
+        quantity, equals, name = (word.strip() for word in part.partition("="))
+        if quantity not in Units._fields:
+            hint = did_you_mean(quantity, Units._fields)
+            raise ValueError(f"'{quantity}' is not one of {', '.join(Units._fields)}{hint}")
+        if not equals or not name:
+            raise ValueError(f"'{part}' has no name of a unit, as length=cm has")
+        if quantity in found:
+            raise ValueError(f"{quantity} is there twice")
+        found[quantity] = name
+    return Units(**found)
