@@ -7,20 +7,21 @@ module errors
   public :: exit_finished, exit_usage, exit_files, exit_broken, exit_stopped
 
   integer, parameter :: exit_finished = 0   !! the run reached its stop rule
-  integer, parameter :: exit_usage = 2      !! wrong usage, bad input, checkpoint of another run
-  integer, parameter :: exit_files = 3      !! cannot read or write, disk full, file in use
-  integer, parameter :: exit_broken = 4     !! the simulation broke off: stuck clock, overlap, NaN
-  integer, parameter :: exit_stopped = 75   !! stopped by a signal or the wall-clock limit, after a checkpoint
+  integer, parameter :: exit_usage = 2      !! wrong usage, invalid input, or a checkpoint that belongs to another run
+  integer, parameter :: exit_files = 3      !! a file cannot be read or written, the disk is full, or the file is in use
+  integer, parameter :: exit_broken = 4     !! the simulation broke off: time stands still, disks overlap, or a number is NaN
+  integer, parameter :: exit_stopped = 75   !! stopped by a signal or by the wall-clock limit; a checkpoint was written
 
-  !> What went wrong, and the exit status that follows.
+  !> A failure: its message and the exit status of the program.
   type :: error_t
-    character(len=:), allocatable :: message   !! what, where, and what to do; one line per problem
+    character(len=:), allocatable :: message   !! problem, place, and remedy; one line per problem
     integer :: code = exit_usage               !! exit status of the program
   end type error_t
 
 contains
 
-  !> Allocates `error` with a message, made one legible line whatever names it has, and the exit status that goes with it.
+  !> Allocates `error` with an exit status and a message. Control characters in the message, which may come from names in the
+  !> input, are replaced so that it stays one legible line.
   pure subroutine fail(error, code, message)
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in) :: code                !! one of the `exit_` constants

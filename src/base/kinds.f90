@@ -1,4 +1,4 @@
-!> Kinds of numbers, and the time of an event that never happens. Every other module builds on this one.
+!> Kinds of numbers, and the time that stands for "no event". Every other module builds on this one.
 module kinds
   use, intrinsic :: iso_fortran_env, only: int16, int32, int64, real64
   implicit none
@@ -7,9 +7,9 @@ module kinds
 
   integer, parameter :: int128 = selected_int_kind(38)
 
-  !> Later than any event. Finite, so that sums and products with it are finite too.
+  !> The time of an event that never happens: later than any event. It is finite, so that sums and products with it stay finite.
   real(real64), parameter :: never = 1.0e150_real64
-  !> Up to this whole numbers are exact as reals, and real numbers tell steps of 1 apart.
+  !> 2**53. Up to this number all integers are exact as reals, and real numbers resolve steps of 1.
   real(real64), parameter :: most_exact = 2.0_real64**53
   real(real64), parameter :: pi = 3.14159265358979323846264338327950288_real64
 end module kinds

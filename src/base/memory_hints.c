@@ -1,6 +1,6 @@
-/* What Fortran cannot express about memory: hints, which change nothing but the time and the room that a run takes, and
-   an answer when there is none left. Everything here depends on the compiler, the linker and the system; without
-   MEMORY_HINTS (see HINTS in the Makefile) nothing is left, and a failed `allocate` is answered by the compiler. */
+/* Memory services that Fortran lacks: hints, which affect only the speed and the memory use of a run, and a message
+   when memory runs out. All of it depends on the compiler, the linker and the system. Without MEMORY_HINTS (see HINTS
+   in the Makefile) this file does nothing, and the compiler's own message answers a failed `allocate`. */
 #include <stdint.h>
 
 #ifdef MEMORY_HINTS
@@ -17,8 +17,8 @@
 
 static const size_t line = 64, large = 128*1024, page = 2*1024*1024;
 
-/* The answer to every `allocate`, and to every temporary array, that finds no memory: one line and the exit code of
-   files and system. What is committed in files stays as it is. */
+/* Checks the result of every allocation, explicit or of a temporary array. If there is no memory left, it prints one
+   line and ends the program with the exit code for files and system. Data already committed to files stay valid. */
 static void *obtained(void *memory, size_t bytes)
 {
     if (!memory && bytes) {
@@ -32,9 +32,9 @@ static void *obtained(void *memory, size_t bytes)
     return memory;
 }
 
-/* Large arrays start on a cache line, so that a record as long as a line lies in one. Larger ones lie on huge pages, if
-   the system has any to spare: the TLB covers few pages. The linker redirects malloc here (--wrap=malloc) because
-   `allocate` offers no control over alignment or page size. */
+/* Aligns large arrays to cache lines, so that a record of 64 bytes occupies a single line. Arrays of at least 2 MB are
+   placed on huge pages if the system offers them, because the TLB covers few pages. The linker redirects malloc here
+   (--wrap=malloc), because `allocate` has no control over alignment or page size. */
 void *__real_malloc(size_t bytes);
 __attribute__((used)) void *__wrap_malloc(size_t bytes)
 {
@@ -53,9 +53,9 @@ __attribute__((used)) void *__wrap_realloc(void *memory, size_t bytes)
     return obtained(__real_realloc(memory, bytes), bytes);
 }
 
-/* Large arrays that come and go are mapped and unmapped. Otherwise the C library raises the size from which it does so,
-   and each new one may end up behind the last one: the heap of a long run grows without end. Not so in the library: the
-   heap there is that of the program that has loaded it. */
+/* Fixes the size above which arrays are mapped and unmapped. By default the C library raises this size with use; large
+   arrays that are allocated again and again can then end up behind each other, and the heap of a long run grows without
+   end. The shared library leaves the size alone: its heap belongs to the program that has loaded it. */
 #if defined(M_MMAP_THRESHOLD) && (defined(__PIE__) || !defined(__PIC__))
 __attribute__((constructor, used)) static void map_large_arrays(void)
 {

@@ -10,7 +10,7 @@ module random_stream
   private
   public :: random_stream_t
 
-  !> What random numbers are drawn for during a run. Those at its start have streams of their own.
+  !> Purposes of the random numbers that are drawn during a run. The random numbers of the initial state have separate streams.
   integer, parameter, public :: thermal_walls = 3, kicks = 4, orientations = 5
 
   real(real64), parameter :: unit_53 = 2.0_real64**(-53)
@@ -46,13 +46,14 @@ contains
     call fill(self, state)
   end subroutine seed
 
-  !> Starts the stream of one draw in a run: whoever asks, in whatever order, gets the same numbers.
+  !> Starts the stream of a single draw during a run. The numbers depend only on the arguments, so that they are the same in
+  !> whatever order the draws are made, by whichever procedure or thread.
   pure subroutine seed_draw(self, number, purpose, id, count)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(in) :: number        !! the user's seed
     integer, intent(in) :: purpose              !! thermal_walls, ...
-    integer(int32), intent(in) :: id            !! of the disk
-    integer(int64), intent(in) :: count         !! of draws before, or of what calls for them
+    integer(int32), intent(in) :: id            !! id of the disk
+    integer(int64), intent(in) :: count         !! number of the draw, or of the event that requires it
 
     integer(int64) :: state
 
@@ -64,7 +65,7 @@ contains
     call fill(self, state)
   end subroutine seed_draw
 
-  !> Makes the state of the generator of seeds depend on one part of a key.
+  !> Mixes one part of a key into the state of the seed generator.
   pure subroutine add_key(state, part)
     integer(int64), intent(inout) :: state
     integer, intent(in) :: part
@@ -74,7 +75,7 @@ contains
     state = ieor(word, int(part, int64))
   end subroutine add_key
 
-  !> Fills the state of a stream from the generator of seeds.
+  !> Fills the state of a stream with numbers of the seed generator.
   pure subroutine fill(self, state)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(inout) :: state
@@ -136,9 +137,9 @@ contains
     e = e/sqrt(s)
   end subroutine draw_direction
 
-  !> Two independent normal deviates of mean 0 and variance 1, by the polar method (Marsaglia and
-  !> Bray, SIAM Rev. 6, 260 (1964)). The last bit may depend on the mathematical library, through the
-  !> logarithm.
+  !> Two independent Gaussian deviates of mean 0 and variance 1, by the polar method (Marsaglia and
+  !> Bray, SIAM Rev. 6, 260 (1964)). Their last bit may depend on the mathematical library, because a
+  !> logarithm is taken.
   pure subroutine draw_normals(self, z)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: z(2)
@@ -148,7 +149,7 @@ contains
     z = z*sqrt(-2*log(s)/s)
   end subroutine draw_normals
 
-  !> A uniform point of the unit disk, other than its centre, and its squared distance from the centre.
+  !> Draws a uniform point in the unit disk, except its centre, and returns its squared distance from the centre.
   pure subroutine draw_in_disk(stream, point, s)
     class(random_stream_t), intent(inout) :: stream
     real(real64), intent(out) :: point(2), s
@@ -162,7 +163,7 @@ contains
     end do
   end subroutine draw_in_disk
 
-  !> One step of SplitMix64.
+  !> Advances the seed generator by one step of SplitMix64 and returns its next number.
   pure subroutine draw_seed(state, word)
     integer(int64), intent(inout) :: state
     integer(int64), intent(out) :: word
@@ -176,8 +177,8 @@ contains
     word = ieor(word, ishft(word, -31))
   end subroutine draw_seed
 
-  !> A number modulo 2**64, as a signed word: the lower half of its bits, the uppermost of which becomes the sign. A product
-  !> of two words is in size at most 2**126.
+  !> The number modulo 2**64, as a signed word: the lower 64 bits, the highest of which becomes the sign. The product of two
+  !> words, at most 2**126 in size, is a valid argument.
   pure function wrapped(number) result(word)
     integer(int128), intent(in) :: number
     integer(int64) :: word

@@ -1,8 +1,9 @@
-!> Signals that stop a run, or make it write a checkpoint. The handler, and the variables that it sets, are in
+!> Signals that stop a run or request a checkpoint. The signal handler and the variables that it sets are in
 !> `system_calls.c`.
 !>
-!> From the first file of a run to its last there is something to lose, and a stop is recorded. The main loop heeds it
-!> with a checkpoint; once the loop has ended the file is completed, and the run is a finished one.
+!> While the files of a run are open, data could be lost: a stop signal is then only recorded. The main loop answers it with a
+!> checkpoint. A stop signal that arrives after the main loop has ended has no effect: the file is completed, and the run counts
+!> as finished.
 module signals
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_int, c_null_char
   use system, only: talks_to_terminal
@@ -11,8 +12,9 @@ module signals
   public :: watch_signals, end_at_signals, record_signals, stop_requested, checkpoint_requests
 
   interface
-    !> From now on TERM, INT, HUP and XCPU request a stop with a checkpoint, USR1 a checkpoint; signals that the
-    !> caller chose to ignore (nohup) stay ignored. A file that grows beyond its limit is a failed write.
+    !> Installs the signal handler. TERM, INT, HUP and XCPU request a stop with a checkpoint, USR1 requests a checkpoint. Signals
+    !> that the caller chose to ignore (as nohup does) stay ignored. A file that exceeds its size limit leads to a failed write
+    !> instead of a signal.
     subroutine watch_signals() bind(C, name="system_watch_signals")
     end subroutine watch_signals
 
@@ -22,13 +24,13 @@ module signals
       logical(c_bool) :: yes
     end function stop_requested
 
-    !> How many times USR1 has requested a checkpoint.
+    !> Number of times that USR1 has requested a checkpoint.
     function checkpoint_requests() result(requests) bind(C, name="system_checkpoint_requests")
       import :: c_int
       integer(c_int) :: requests
     end function checkpoint_requests
 
-    !> From now on a signal that requests a stop is only recorded: see `stop_requested`.
+    !> Selects that a stop signal is only recorded, to be queried with `stop_requested`.
     subroutine record_signals() bind(C, name="system_record_signals")
     end subroutine record_signals
 
@@ -41,8 +43,8 @@ module signals
 
 contains
 
-  !> From now on a signal that requests a stop, and one that has been recorded, ends the program at once: there is
-  !> nothing to lose.
+  !> Selects that a stop signal ends the program at once, with this message and exit status; a signal that was recorded
+  !> before has the same effect. Used while no data can be lost.
   subroutine end_at_signals(message, code)
     character(len=*), intent(in) :: message
     integer, intent(in) :: code                        !! exit status

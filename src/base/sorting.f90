@@ -7,13 +7,14 @@ module sorting
 
 contains
 
-  !> Where each item goes so that the keys ascend; items with equal keys keep their order.
+  !> Finds the position of each item in the order of ascending keys. Items with equal keys keep their order (counting sort).
   pure subroutine sort_by_count(key, n_keys, first, place)
-    integer(int32), intent(in) :: key(:)                  !! (n) from 1 to n_keys
+    integer(int32), intent(in) :: key(:)                  !! (n) key of each item, from 1 to n_keys
     integer(int32), intent(in) :: n_keys
-    integer(int32), allocatable, intent(out) :: first(:)  !! (n_keys+1) place of the first item of each key; n+1
-    integer(int32), intent(out) :: place(:)               !! (n) of each item
-    integer(int32), allocatable :: next(:)                ! (n_keys+1) place of the next item of each key
+    integer(int32), allocatable, intent(out) :: first(:)  !! (n_keys+1) position of the first item of each key; the last element is
+                                                          !! n+1
+    integer(int32), intent(out) :: place(:)               !! (n) position of each item in the sorted order
+    integer(int32), allocatable :: next(:)                ! (n_keys+1) position of the next item of each key
     integer(int32) :: k
 
     allocate (next(n_keys + 1), source=0_int32)

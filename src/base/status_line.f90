@@ -1,5 +1,5 @@
-!> One line on standard error that says what the program is doing: on a terminal it is updated in place, elsewhere a
-!> new one is written every half minute.
+!> One line on standard error that shows the progress of the program. On a terminal it is updated in place; in a file or
+!> pipe a new line is written every half minute.
 module status_line
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: real64
@@ -8,16 +8,16 @@ module status_line
   private
   public :: status_line_t
 
-  real(real64), parameter :: terminal_pause = 0.2_real64, file_pause = 30.0_real64   !! [s]
-  character(len=*), parameter :: erase_rest = achar(27)//"[K", &   !! of the terminal's line
-    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"          !! a narrow terminal cuts the line
+  real(real64), parameter :: terminal_pause = 0.2_real64, file_pause = 30.0_real64   !! time between updates [s]
+  character(len=*), parameter :: erase_rest = achar(27)//"[K", &   !! erases the rest of the line on the terminal
+    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"          !! a narrow terminal cuts the line off instead of wrapping it
 
   type :: status_line_t
     logical, private :: quiet = .true.
     logical, private :: terminal = .false.
     logical, private :: shown = .false.
-    real(real64), private :: pause = file_pause    !! between updates [s]
-    real(real64), private :: next_update = 0.0_real64    !! [s]
+    real(real64), private :: pause = file_pause    !! time between updates [s]
+    real(real64), private :: next_update = 0.0_real64    !! time of the next update, on the clock `seconds` [s]
   contains
     procedure :: open => open_line
     procedure :: is_due
@@ -28,7 +28,7 @@ module status_line
 
 contains
 
-  !> Makes the line ready. One that was never opened shows nothing.
+  !> Prepares the line. A line that was never opened shows nothing.
   subroutine open_line(self, quiet)
     class(status_line_t), intent(inout) :: self
     logical, intent(in) :: quiet
@@ -39,7 +39,7 @@ contains
     self%next_update = seconds() + self%pause
   end subroutine open_line
 
-  !> Whether it is time to show something new.
+  !> Whether the next update is due.
   function is_due(self) result(yes)
     class(status_line_t), intent(in) :: self
     logical :: yes
@@ -48,7 +48,7 @@ contains
     if (.not. self%quiet) yes = seconds() >= self%next_update
   end function is_due
 
-  !> Shows a text.
+  !> Shows a text in the line.
   subroutine show(self, text)
     class(status_line_t), intent(inout) :: self
     character(len=*), intent(in) :: text
@@ -63,11 +63,11 @@ contains
     flush (error_unit)
   end subroutine show
 
-  !> Shows, if it is time, which part of a task is done.
+  !> Shows how much of a task is done, if an update is due.
   subroutine show_share(self, task, share)
     class(status_line_t), intent(inout) :: self
     character(len=*), intent(in) :: task
-    real(real64), intent(in) :: share              !! from 0 to 1
+    real(real64), intent(in) :: share              !! completed fraction of the task, from 0 to 1
     character(len=8) :: percent
 
     if (.not. self%is_due()) return
@@ -75,7 +75,7 @@ contains
     call self%show(task//": "//trim(adjustl(percent)))
   end subroutine show_share
 
-  !> Erases the line on the terminal, so that what follows stands alone.
+  !> Erases the line on the terminal, so that the next message does not stand behind it.
   subroutine clear(self)
     class(status_line_t), intent(inout) :: self
 

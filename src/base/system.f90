@@ -1,5 +1,5 @@
-!> What the operating system offers and Fortran does not: a monotonic clock, terminals, file locks,
-!> atomic renames, free disk space, and an exit that prints nothing. Whatever needs a C header is in
+!> Services of the operating system that Fortran lacks: a monotonic clock, terminals, file locks,
+!> atomic renames, free disk space, and an exit that prints nothing. Parts that need a C header are in
 !> `system_calls.c`.
 module system
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_double, c_int, c_int64_t, c_null_char, c_size_t
@@ -14,14 +14,14 @@ module system
   public :: file_size, largest_file, read_bytes, read_file, write_word
   public :: fill_standard_streams, print_text, cores_of_process
 
-  !> What a path can name.
+  !> Kinds of objects that a path can name.
   character(len=20), parameter :: kinds_of_files(*) = [character(len=20) :: "nothing", "a file", "a folder", &
     "a symbolic link", "a pipe or a device", "hidden by the system"]
 
-  !> Answers of `c_lock` other than a descriptor.
-  integer(c_int), parameter :: taken = -1, foreign = -3, failed = -4     ! -2: there are no locks here
+  !> Results of `c_lock` other than a descriptor.
+  integer(c_int), parameter :: taken = -1, foreign = -3, failed = -4     ! -2: the file system has no locks
 
-  !> A lock on a run's output. The kernel drops it when the process ends, however it ends.
+  !> A lock on the output of a run. The kernel releases it when the process ends, for whatever reason.
   type :: lock_t
     character(len=:), allocatable :: path
     integer(c_int), private :: descriptor = -1
@@ -31,21 +31,21 @@ module system
   end type lock_t
 
   abstract interface
-    !> A call on a file, or on a text to be written; 0 for success.
+    !> A call that concerns a file, or a text to be written; it returns 0 for success.
     function path_call(path) bind(C) result(status)
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int) :: status
     end function path_call
 
-    !> A question about a file or folder, in bytes.
+    !> A call that returns a size of a file or folder in bytes.
     function size_call(path) bind(C) result(bytes)
       import :: c_char, c_int64_t
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int64_t) :: bytes
     end function size_call
 
-    !> A call that gives a file another name; 0 for success.
+    !> A call that renames a file; it returns 0 for success.
     function naming_call(from, to) bind(C) result(status)
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: from(*), to(*)
@@ -54,14 +54,14 @@ module system
   end interface
 
   interface
-    !> A clock that never goes backwards. [s]
+    !> The time of a clock that never goes backwards. [s]
     function seconds() result(t) bind(C, name="system_seconds")
       import :: c_double
       real(c_double) :: t
     end function seconds
 
-    !> Opens /dev/null for standard streams that the caller has closed. Otherwise the first files that are opened
-    !> would take their places, and messages would end up in them.
+    !> Opens /dev/null for each standard stream that the caller has closed. Otherwise the first files that are opened
+    !> would take over the numbers of these streams, and messages would be written into them.
     subroutine fill_standard_streams() bind(C, name="system_fill_standard_streams")
     end subroutine fill_standard_streams
 
@@ -71,13 +71,13 @@ module system
       logical(c_bool) :: yes
     end function talks_to_terminal
 
-    ! The calls of system_calls.c, which says more.
+    ! The functions below are described in system_calls.c.
     function cores_of_process() result(n) bind(C, name="system_cores")
       import :: c_int
       integer(c_int) :: n
     end function cores_of_process
 
-    !> The most that this process may write to a file (ulimit -f); huge without a limit. [bytes]
+    !> Largest size of a file that this process may write (ulimit -f), in bytes; huge if there is no limit.
     function largest_file() result(bytes) bind(C, name="system_largest_file")
       import :: c_int64_t
       integer(c_int64_t) :: bytes
@@ -140,18 +140,18 @@ module system
   procedure(path_call), bind(C, name="system_find_folder") :: c_find_folder
   procedure(path_call), bind(C, name="system_make_folder") :: c_make_folder
   procedure(path_call), bind(C, name="system_what_is") :: c_what_is   !! returns an index of `kinds_of_files`
-  procedure(path_call), bind(C, name="system_lock") :: c_lock         !! returns a descriptor or a number above
+  procedure(path_call), bind(C, name="system_lock") :: c_lock         !! returns a descriptor or one of the numbers above
   procedure(path_call), bind(C, name="system_print") :: c_print
   procedure(path_call), bind(C, name="unlink") :: c_unlink
-  procedure(size_call), bind(C, name="system_free_bytes") :: c_free_bytes     !! on the disk of a folder
+  procedure(size_call), bind(C, name="system_free_bytes") :: c_free_bytes     !! free space on the disk that holds a folder
   procedure(size_call), bind(C, name="system_file_size") :: c_file_size
   procedure(naming_call), bind(C, name="rename") :: c_rename
 
 contains
 
-  !> Writes lines to standard output. Fortran's own `write` does not notice a full disk behind it.
+  !> Writes a text to standard output. Fortran's own `write` does not notice when the disk behind it is full.
   subroutine print_text(text, error)
-    character(len=*), intent(in) :: text               !! without the last line end
+    character(len=*), intent(in) :: text               !! lines; a line end is added to the last one
     type(error_t), allocatable, intent(out) :: error
 
     if (c_print(text//new_line("a")//c_null_char) /= 0) &
@@ -175,8 +175,8 @@ contains
     name = buffer(:index(buffer, c_null_char) - 1)
   end function host_name
 
-  !> Renames a file and, in the same instant, replaces the one that had the new name. It has moved even if the
-  !> folder cannot be synchronized: then only a crash of the whole machine could still undo it.
+  !> Renames a file. A file that already has the new name is replaced in the same instant. `moved` is true even if the
+  !> folder cannot be synchronized; then only a crash of the whole machine could still undo the renaming.
   subroutine move_file(from, to, moved)
     character(len=*), intent(in) :: from, to
     logical, intent(out) :: moved
@@ -194,7 +194,7 @@ contains
     status = c_unlink(path//c_null_char)
   end subroutine remove_file
 
-  !> Makes the missing folders on the way to a file.
+  !> Creates the missing folders on the path of a file.
   subroutine make_folders_of(path, made)
     character(len=*), intent(in) :: path
     logical, intent(out) :: made
@@ -209,7 +209,7 @@ contains
     made = is_folder(folder_of(path))
   end subroutine make_folders_of
 
-  !> Returns when a file, or a folder with the names in it, has reached the disk.
+  !> Waits until the contents of a file, or the names in a folder, are stored on the disk.
   subroutine synchronize(path, done)
     character(len=*), intent(in) :: path
     logical, intent(out) :: done
@@ -217,7 +217,8 @@ contains
     done = c_synchronize(path//c_null_char) == 0
   end subroutine synchronize
 
-  !> Why a file cannot be opened; empty if it can. A file is to be written only if it has no other name, by a link.
+  !> The reason why a file cannot be opened; empty if it can. A file with a second name, by a symbolic or hard link, is
+  !> refused for writing.
   function opening_problem(path, writable) result(text)
     character(len=*), intent(in) :: path
     logical, intent(in) :: writable
@@ -228,7 +229,7 @@ contains
     text = buffer(:index(buffer, c_null_char) - 1)
   end function opening_problem
 
-  !> What a path names, in words. Links are not followed.
+  !> Kind of the object that a path names, in words. Symbolic links are not followed.
   function what_is(path) result(kind)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: kind
@@ -236,8 +237,8 @@ contains
     kind = trim(kinds_of_files(c_what_is(path//c_null_char)))
   end function what_is
 
-  !> What tells a file from any other, and from itself once it has changed: inode, size, and time of change; zeros if
-  !> there is none. A copy is another file.
+  !> Inode, size and change time of a file, which identify it and show whether it has changed. Zeros if there is no such
+  !> file. A copy of a file has another identity.
   function identity_of(path) result(identity)
     character(len=*), intent(in) :: path
     integer(int64) :: identity(3)
@@ -253,25 +254,25 @@ contains
     bytes = c_file_size(path//c_null_char)
   end function file_size
 
-  !> Reads the first bytes of a regular file. (Fortran's own `open` cuts blanks at the end of a name.)
+  !> Reads the first bytes of a regular file. Fortran's own `open` would cut trailing blanks off the name.
   subroutine read_bytes(path, bytes, n)
     character(len=*), intent(in) :: path
     character(len=*), intent(out) :: bytes
-    integer(int64), intent(out) :: n                   !! how many there are, at most len(bytes); -1: it cannot be read
+    integer(int64), intent(out) :: n                   !! number of bytes read, at most len(bytes); -1 if the file cannot be read
 
     n = c_read_bytes(path//c_null_char, bytes, len(bytes, int64))
   end subroutine read_bytes
 
-  !> All bytes of a regular file. (Fortran's own `read` may take for a line what could not be read, with `iostat` 0, and go
-  !> on so for ever.)
+  !> Reads all bytes of a regular file. Fortran's own `read` can return `iostat` 0 without having read anything, and so
+  !> repeat for ever.
   subroutine read_file(path, text, problem)
     character(len=*), intent(in) :: path
     character(len=:), allocatable, intent(out) :: text
-    character(len=:), allocatable, intent(out) :: problem    !! why it cannot be read; empty if it can
+    character(len=:), allocatable, intent(out) :: problem    !! reason why it cannot be read; empty if it can
     character(len=:), allocatable :: failure
     integer(int64) :: n
 
-    allocate (character(len=max(file_size(path), 8192_int64)) :: text)  ! what the system tells of itself has the size 0
+    allocate (character(len=max(file_size(path), 8192_int64)) :: text)  ! files in /proc have size 0
     call read_bytes(path, text, n)
     text = text(:max(n, 0_int64))
     problem = ""
@@ -281,17 +282,17 @@ contains
     if (problem == "") problem = failure
   end subroutine read_file
 
-  !> Writes a number over eight bytes of a file.
+  !> Overwrites eight bytes of a file with a number, lowest byte first.
   subroutine write_word(path, position, word, done)
     character(len=*), intent(in) :: path
-    integer(int64), intent(in) :: position             !! of the first byte, from 0
+    integer(int64), intent(in) :: position             !! position of the first byte, counted from 0
     integer(int64), intent(in) :: word
     logical, intent(out) :: done
 
     done = c_write_word(path//c_null_char, position, word) == 0
   end subroutine write_word
 
-  !> Whether a path leads to a folder.
+  !> Whether a path names a folder, possibly through links.
   function is_folder(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
@@ -308,7 +309,7 @@ contains
     if (folder == "") folder = "."
   end function folder_of
 
-  !> Free space on the disk where the file is or will be; huge if unknown. [bytes]
+  !> Free space on the disk that holds or will hold a file; huge if unknown. [bytes]
   function free_bytes(path) result(bytes)
     character(len=*), intent(in) :: path
     integer(int64) :: bytes
@@ -316,7 +317,7 @@ contains
     bytes = c_free_bytes(folder_of(path)//c_null_char)
   end function free_bytes
 
-  !> Why the last system call failed, in the system's words.
+  !> Reason of the failure of the last system call, in the words of the system.
   function last_problem() result(text)
     character(len=:), allocatable :: text
     character(len=256, kind=c_char) :: buffer
@@ -325,12 +326,12 @@ contains
     text = buffer(:index(buffer, c_null_char) - 1)
   end function last_problem
 
-  !> Takes the lock file `path` for this process, or says why it cannot. Where the file system has no locks the run
-  !> goes on without one.
+  !> Acquires the lock file `path` for this process. On a file system without locks the run
+  !> continues without one.
   subroutine acquire(self, path, problem)
     class(lock_t), intent(inout) :: self
     character(len=*), intent(in) :: path
-    character(len=:), allocatable, intent(out) :: problem    !! empty if there is none
+    character(len=:), allocatable, intent(out) :: problem    !! reason why the lock cannot be acquired; empty if it can
 
     self%path = path
     self%descriptor = c_lock(path//c_null_char)
@@ -347,7 +348,7 @@ contains
     end select
   end subroutine acquire
 
-  !> Removes the lock file and gives up the lock, if this process holds it.
+  !> Removes the lock file and releases the lock, if this process holds it.
   subroutine release(self)
     class(lock_t), intent(inout) :: self
 

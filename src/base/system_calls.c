@@ -1,5 +1,5 @@
-/* System calls whose constants, structures or errno are defined only in C headers: POSIX, flock, and the mask of cores.
-   The interfaces of these functions are in system.f90. Those that can fail return -1 and leave the reason in errno. */
+/* System calls whose constants, structures or errno are defined only in C headers (POSIX, flock, CPU affinity). The
+   Fortran interfaces are in system.f90. Functions that can fail return -1 and leave the reason in errno. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
@@ -28,11 +28,11 @@ double system_seconds(void)
     return (double)now.tv_sec + 1e-9*(double)now.tv_nsec;
 }
 
-/* All that a signal handler may write to; it may run in any thread. */
+/* All variables that the signal handler writes. It may run in any thread. */
 static atomic_int stop_signal, checkpoint_signals;
 static _Atomic double first_stop_at;
 
-/* How the program ends at a stop signal while there is nothing to lose. */
+/* The way in which the program ends at a stop signal while no data can be lost. */
 static struct {
     atomic_bool at_once;  /* else there is something to lose */
     int code;
@@ -45,9 +45,9 @@ static void end_at_once(void)
     _exit(ending.code);
 }
 
-/* Ends the program at once while there is nothing to lose. Else it only records the signal, and the main loop
-   acts. Launchers often send a signal twice within moments; a second stop signal that comes later than that ends
-   the program at once. */
+/* Signal handler. While no data can be lost, a stop signal ends the program at once. Otherwise it is only recorded, and
+   the main loop responds. Launchers often send a signal twice within a fraction of a second; a second stop signal that
+   arrives later than that ends the program at once. */
 static void note_signal(int number)
 {
     const double moments = 0.5;
@@ -79,7 +79,7 @@ void system_watch_signals(void)
 
 void system_record_signals(void) { ending.at_once = false; }
 
-/* A signal that has been recorded counts, too. */
+/* A signal that was recorded before also ends the program. */
 void system_end_at_signals(const char *message, int code)
 {
     system_record_signals();
@@ -116,8 +116,8 @@ void system_fill_standard_streams(void)
 
 bool system_talks_to_terminal(void) { return isatty(STDERR_FILENO) == 1; }
 
-/* Writes all bytes, also to a pipe that takes only some at a time. What says again and again that it is ready,
-   and then refuses, is left alone: it is no failure. */
+/* Writes all bytes, also to a pipe that accepts only some at a time. A pipe that repeatedly reports that it is ready
+   and then refuses data is given up, without a failure. */
 int system_print(const char *bytes)
 {
     size_t count = strlen(bytes);
@@ -138,7 +138,7 @@ int system_print(const char *bytes)
     return 0;
 }
 
-/* A limit of the process, as `ulimit` shows and raises it; INT64_MAX if there is none. */
+/* A resource limit of the process, as shown by `ulimit`; INT64_MAX if there is none. */
 static int64_t limit_of(int resource)
 {
     struct rlimit limit;
@@ -148,7 +148,8 @@ static int64_t limit_of(int resource)
 
 int64_t system_largest_file(void) { return limit_of(RLIMIT_FSIZE); }
 
-/* The limit of open files is named, with the option of `ulimit` that raises it. */
+/* Reason of the last failure. If the limit of open files was reached, the text names it and the option of `ulimit` that
+   raises it. */
 void system_describe_problem(char *text, size_t size)
 {
     const int problem = errno;
@@ -166,13 +167,13 @@ void system_name_host(char *text, size_t size)
 
 /* --- Files --- */
 
-/* The one place where files are opened by a name that the user chose. Never waits for the other end of a pipe. */
+/* Opens a file by a name that the user chose; no other function does. Never waits for the other end of a pipe. */
 static int open_file(const char *path, int flags)
 {
     return open(path, flags | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0644);
 }
 
-/* Closes a file, keeps errno, and returns the status that the caller is to return. */
+/* Closes a file without changing errno, and passes on the status that the caller will return. */
 static int closed(int descriptor, int status)
 {
     const int kept = errno;
@@ -181,8 +182,9 @@ static int closed(int descriptor, int status)
     return status;
 }
 
-/* Opens a regular file that exists. One that is to be written must have no other name, by a symbolic or hard link: what
-   is written there would change a file that is not the run's. Returns -1 and the reason if it cannot. */
+/* Opens an existing regular file. A file with a second name, by a symbolic or hard link, is refused for writing,
+   because that would change a file that does not belong to the run. Returns -1 and the reason if the file cannot be
+   opened. */
 static int open_regular(const char *path, int flags, const char **problem)
 {
     struct stat file;
@@ -203,7 +205,7 @@ static int open_regular(const char *path, int flags, const char **problem)
     return -1;
 }
 
-/* Why a file cannot be read, or written; empty if it can. */
+/* Reason why a file cannot be opened for reading, or for writing; empty if it can. */
 void system_opening_problem(const char *path, bool writable, char *text, size_t size)
 {
     const char *problem;
@@ -213,7 +215,7 @@ void system_opening_problem(const char *path, bool writable, char *text, size_t 
     text[size - 1] = '\0';
 }
 
-/* Reads the first bytes of a file; returns how many there are, at most `count`. */
+/* Reads the first bytes of a file; returns the number of bytes read, at most `count`. */
 int64_t system_read_bytes(const char *path, char *bytes, int64_t count)
 {
     const char *problem;
@@ -228,7 +230,7 @@ int64_t system_read_bytes(const char *path, char *bytes, int64_t count)
     return closed(descriptor, 0) + (more < 0 ? -1 : total);
 }
 
-/* Writes a number over eight bytes of a file, the lowest byte first. */
+/* Overwrites eight bytes of a file with a number, lowest byte first. */
 int system_write_word(const char *path, int64_t position, int64_t word)
 {
     const char *problem;
@@ -245,7 +247,8 @@ int system_find_folder(const char *path)
     return stat(path, &found) == 0 && S_ISDIR(found.st_mode) ? 0 : -1;
 }
 
-/* What a path names, as numbered in system.f90. Links are not followed. Only what certainly is not there is nothing. */
+/* Kind of the object that a path names, as numbered in system.f90. Links are not followed. "Nothing" is returned only
+   if it is certain that no such file exists. */
 int system_what_is(const char *path)
 {
     enum { nothing = 1, file, folder, symbolic_link, pipe_or_device, hidden };
@@ -256,7 +259,7 @@ int system_what_is(const char *path)
          : S_ISLNK(found.st_mode) ? symbolic_link : pipe_or_device;
 }
 
-/* Inode, size, time of change [ns]; links are not followed. */
+/* Inode, size and change time [ns] of a file; links are not followed. */
 void system_identify(const char *path, int64_t identity[3])
 {
     struct stat found = {0};
@@ -266,14 +269,15 @@ void system_identify(const char *path, int64_t identity[3])
     identity[2] = (int64_t)found.st_ctim.tv_sec*1000000000 + found.st_ctim.tv_nsec;
 }
 
-/* 0 for pipes and devices, -1 if there is no file. */
+/* Size of a file in bytes; 0 for pipes and devices, -1 if there is no file. */
 int64_t system_file_size(const char *path)
 {
     struct stat found;
     return stat(path, &found) == 0 ? (int64_t)found.st_size : -1;
 }
 
-/* Some file systems cannot synchronize a folder (EINVAL), and one that takes files need not be readable. */
+/* Waits until a file or folder is stored on the disk. Two failures are not errors: some file systems cannot synchronize
+   a folder (EINVAL), and a folder can be writable without being readable (EACCES). */
 int system_synchronize(const char *path)
 {
     const int descriptor = open_file(path, O_RDONLY);
@@ -281,7 +285,7 @@ int system_synchronize(const char *path)
     return closed(descriptor, fsync(descriptor) == 0 || errno == EINVAL ? 0 : -1);
 }
 
-/* Succeeds also if another process was faster. */
+/* Creates a folder. Succeeds also if another process has just created it. */
 int system_make_folder(const char *path)
 {
     return mkdir(path, 0777) == 0 || errno == EEXIST ? 0 : -1;
@@ -301,8 +305,9 @@ static bool is_name_of(const char *path, const struct stat *file)
     return lstat(path, &named) == 0 && named.st_dev == file->st_dev && named.st_ino == file->st_ino;
 }
 
-/* Returns a descriptor that holds the lock, or one of the numbers below, which system.f90 knows. A lock file is empty
-   and has one name; anything else is somebody's. One that this user may not write is that of another user's run. */
+/* Acquires a lock file. Returns a descriptor, or one of the negative numbers below, which are repeated in system.f90. A
+   lock file is empty and has one name; any other file was not made by a run. A lock file that this user may not write
+   belongs to the run of another user. */
 int system_lock(const char *path)
 {
     enum { taken = -1, without_locks = -2, foreign = -3, failed = -4 };
@@ -316,14 +321,14 @@ int system_lock(const char *path)
         if (descriptor < 0) return exists && errno == EACCES ? taken : failed;
         if (flock(descriptor, LOCK_EX | LOCK_NB) != 0)
             return closed(descriptor, errno == EWOULDBLOCK ? taken : without_locks);
-        /* The previous holder may have removed the file meanwhile. A lock on a file without a name is worth nothing. */
+        /* The previous holder may have removed the file meanwhile. A lock on a file without a name protects nothing. */
         if (is_name_of(path, &file)) return descriptor;
         close(descriptor);
     }
     return taken;
 }
 
-/* Removes the lock file, unless the name belongs to another file by now. */
+/* Removes the lock file, unless its name now belongs to another file. */
 void system_unlock(const char *path, int descriptor)
 {
     struct stat file;

@@ -1,8 +1,8 @@
-/* A barrier for threads that wait for each other many times in a thousandth of a second, on cores that other programs may
-   want as well. Whoever waits spins if it had to wait only briefly of late, and else sleeps: idle cores lose no time, and
-   on busy ones no thread uses up its share of the processor by waiting for another that has none. OpenMP's own barriers
-   spin for thousandths of a second each time, or never, as the environment says before the program begins.
-   The interfaces are in team.f90. */
+/* A barrier for threads that meet thousands of times per second, on cores that other programs may also use. A thread
+   spins if its recent waits were short, and sleeps otherwise. On idle cores no time is lost; on busy cores no thread
+   uses up its time slice while it waits for another one that is not running. OpenMP's own barriers either spin for
+   milliseconds each time or never, depending on environment variables that are read before the program begins. The
+   interfaces are in team.f90. */
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -11,17 +11,17 @@
 double system_seconds(void);
 
 struct barrier {
-    atomic_int threads; /* that take part */
-    atomic_int arrived; /* of these, in this round */
+    atomic_int threads; /* number of threads that have joined */
+    atomic_int arrived; /* number that have arrived in this round */
     atomic_int round;
     pthread_mutex_t lock;
     pthread_cond_t released;
 };
 _Static_assert(sizeof(struct barrier) <= 256, "barrier_t in team.f90 keeps 256 bytes for it");
 
-static const double longest_spin = 100e-6; /* [s] */
+static const double longest_spin = 100e-6; /* in seconds */
 
-static _Thread_local double usual_wait; /* of this thread [s] */
+static _Thread_local double usual_wait; /* running average of the waiting times of this thread [s] */
 
 void barrier_open(struct barrier *self)
 {
@@ -62,7 +62,7 @@ static void wait_for_release(struct barrier *self, int round)
     usual_wait += ((waited < 2*longest_spin ? waited : 2*longest_spin) - usual_wait)/8;
 }
 
-/* The last one to arrive learns that, at once; the others wait until it releases them. */
+/* Returns true at once to the last thread that arrives. The others wait until it releases them. */
 bool barrier_arrive(struct barrier *self)
 {
     const int round = self->round;
@@ -77,5 +77,6 @@ void barrier_release(struct barrier *self)
     pthread_mutex_lock(&self->lock);
     self->round++;
     pthread_mutex_unlock(&self->lock);
-    pthread_cond_broadcast(&self->released); /* now, so that nobody wakes up only to wait for the lock */
+    /* Called after unlocking, so that a thread that wakes up does not have to wait for the lock. */
+    pthread_cond_broadcast(&self->released);
 }

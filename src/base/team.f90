@@ -1,5 +1,5 @@
-!> The threads of a run: how many share a loop, and where they wait for each other while one of them does something for all.
-!> How they wait is in `team.c`.
+!> The threads of a run: their number, and the barriers at which they wait while one of them performs a serial step. The
+!> barriers are implemented in `team.c`.
 module team
   use, intrinsic :: iso_c_binding, only: c_bool, c_int64_t
 !$ use omp_lib, only: omp_set_num_threads
@@ -8,43 +8,43 @@ module team
   public :: make_team, many
   public :: barrier_t, close_barrier, is_last_at, join, open_barrier, release
 
-  !> Turns of a loop from which it pays to share it: threads that meet at its end cost each other some microseconds, and on
-  !> busy cores thousandths of a second.
+  !> Number of iterations from which sharing a loop among threads pays. A barrier at its end costs microseconds, or
+  !> milliseconds when other programs use the cores.
   integer, parameter :: many = 50000
 
-  !> Not to be copied while threads use it.
+  !> A barrier for threads. It must not be copied while threads use it.
   type, bind(C) :: barrier_t
     integer(c_int64_t) :: storage(32)
   end type barrier_t
 
   interface
-    !> Makes a barrier for threads that are still to join.
+    !> Initialises a barrier that no thread has joined yet.
     subroutine open_barrier(barrier) bind(C, name="barrier_open")
       import :: barrier_t
       type(barrier_t), intent(out) :: barrier
     end subroutine open_barrier
 
-    !> The thread that calls is one of those that wait for each other: each joins once, before any waits.
+    !> Registers the calling thread with the barrier. Each thread joins once, before any of them waits.
     subroutine join(barrier) bind(C, name="barrier_join")
       import :: barrier_t
       type(barrier_t), intent(inout) :: barrier
     end subroutine join
 
-    !> Waits until all have come and the last of them has released the others. That one does not wait: it is told, and
-    !> does what is to be done for all before it releases them.
+    !> Waits at the barrier until all threads have arrived and the last one calls `release`. The last thread to arrive does
+    !> not wait: it gets .true. and performs the serial step before it releases the others.
     function is_last_at(barrier) result(yes) bind(C, name="barrier_arrive")
       import :: barrier_t, c_bool
       type(barrier_t), intent(inout) :: barrier
       logical(c_bool) :: yes
     end function is_last_at
 
-    !> Lets the others go on, who find what this thread has written.
+    !> Releases the waiting threads; they see everything that the calling thread has written.
     subroutine release(barrier) bind(C, name="barrier_release")
       import :: barrier_t
       type(barrier_t), intent(inout) :: barrier
     end subroutine release
 
-    !> Takes the barrier away, when nobody waits any more.
+    !> Destroys the barrier, once no thread waits any more.
     subroutine close_barrier(barrier) bind(C, name="barrier_close")
       import :: barrier_t
       type(barrier_t), intent(inout) :: barrier
@@ -53,7 +53,7 @@ module team
 
 contains
 
-  !> From now on n threads share a loop, unless the loop says otherwise. Without OpenMP it is one.
+  !> Sets the number of threads that share a loop, unless a loop specifies another. Without OpenMP there is one thread.
   subroutine make_team(n)
     integer, intent(in) :: n
 

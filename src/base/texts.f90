@@ -1,4 +1,4 @@
-!> Short texts: lists of them, numbers as text, and the known word closest to a misspelt one.
+!> Short texts: lists of texts, numbers as text, and the known word that is closest to a misspelt one.
 module texts
   use, intrinsic :: ieee_arithmetic, only: ieee_is_normal
   use kinds, only: int64, real64
@@ -7,12 +7,12 @@ module texts
   public :: text_t, growing_text_t, written, written_exactly, lower_case, legible, shown, joined, place_of, nearest_word, suggestion
   public :: about, counted, line_at, lines_of, size_text, wrapped
 
-  !> An element of a list of texts, each with its own length.
+  !> A text of any length, as an element of a list.
   type :: text_t
     character(len=:), allocatable :: text
   end type text_t
 
-  !> A text that is put together piece by piece, in a time that grows with its length, not with the square of that.
+  !> A text that is assembled piece by piece, in a time proportional to its length.
   type :: growing_text_t
     private
     character(len=:), allocatable :: buffer
@@ -22,19 +22,19 @@ module texts
     procedure :: text => text_so_far
   end type growing_text_t
 
-  !> A number as a person would write it.
+  !> A number as text, in the form in which a person would write it.
   interface written
     procedure :: written_integer, written_long_integer, written_real
   end interface written
 
   character(len=*), parameter :: upper_letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
   character(len=*), parameter :: lower_letters = "abcdefghijklmnopqrstuvwxyz"
-  character(len=1), parameter, public :: eol = new_line("a")      !! ends a line
+  character(len=1), parameter, public :: eol = new_line("a")      !! line end
   character(len=*), parameter, public :: letters = lower_letters//upper_letters, digits = "0123456789"
 
 contains
 
-  !> Adds a piece at the end.
+  !> Appends a piece.
   pure subroutine add(self, piece)
     class(growing_text_t), intent(inout) :: self
     character(len=*), intent(in) :: piece
@@ -52,7 +52,7 @@ contains
     self%length = needed
   end subroutine add
 
-  !> All pieces.
+  !> All pieces so far as one text.
   pure function text_so_far(self) result(text)
     class(growing_text_t), intent(in) :: self
     character(len=:), allocatable :: text
@@ -61,7 +61,7 @@ contains
     if (allocated(self%buffer)) text = self%buffer(:self%length)
   end function text_so_far
 
-  !> A default integer in digits.
+  !> A default integer as decimal digits.
   pure function written_integer(number) result(text)
     integer, intent(in) :: number
     character(len=:), allocatable :: text
@@ -69,7 +69,7 @@ contains
     text = written_long_integer(int(number, int64))
   end function written_integer
 
-  !> A 64-bit integer in digits.
+  !> A 64-bit integer as decimal digits.
   pure function written_long_integer(number) result(text)
     integer(int64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -79,7 +79,7 @@ contains
     text = trim(buffer)
   end function written_long_integer
 
-  !> A real number without trailing zeros, and with an exponent only where that is shorter.
+  !> A real number without trailing zeros, with an exponent only where that is shorter.
   pure recursive function written_real(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -99,7 +99,7 @@ contains
     end if
   end function written_real
 
-  !> A real number with as many digits as are needed to read the same number back.
+  !> A real number with as many digits as are needed to read back exactly the same number.
   pure function written_exactly(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -126,7 +126,7 @@ contains
     end do
   end function lower_case
 
-  !> Text with control characters as `?`.
+  !> The text with each control character replaced by `?`.
   pure function legible(text) result(line)
     character(len=*), intent(in) :: text
     character(len=len(text)) :: line
@@ -138,7 +138,7 @@ contains
     end do
   end function legible
 
-  !> Text from a user or a file, made fit for a message: quoted, legible, cut if long.
+  !> A text from a user or a file in a form fit for a message: quoted, legible, and cut if it is long.
   pure function shown(text) result(quoted)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: quoted
@@ -155,7 +155,7 @@ contains
     quoted = '"'//quoted//'"'
   end function shown
 
-  !> The words in one line, with `glue` between them.
+  !> The words in one line, separated by `glue`.
   pure function joined(words, glue) result(line)
     character(len=*), intent(in) :: words(:)
     character(len=*), intent(in) :: glue
@@ -170,8 +170,8 @@ contains
     line = growing%text()
   end function joined
 
-  !> The text in lines of at most `width` characters, broken at blanks, with `margin` before all but the first line. A longer
-  !> word has a line of its own.
+  !> The text in lines of at most `width` characters, broken at blanks. All lines but the first start with `margin`. A word that
+  !> is longer gets a line of its own.
   pure function wrapped(text, width, margin) result(lines)
     character(len=*), intent(in) :: text, margin
     integer, intent(in) :: width
@@ -202,11 +202,11 @@ contains
     place = 0
   end function place_of
 
-  !> Advice after an unknown word: the known word that was probably meant, or all known words, or what else is to be listed.
+  !> Advice after an unknown word: the known word that was probably meant or, if there is none, a list of the known words.
   pure function suggestion(word, known, listed) result(advice)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
-    character(len=*), intent(in), optional :: listed(:)
+    character(len=*), intent(in), optional :: listed(:)  !! words to list instead of the known ones
     character(len=:), allocatable :: advice
 
     advice = nearest_word(word, known)
@@ -219,8 +219,8 @@ contains
     end if
   end function suggestion
 
-  !> The known word that was probably meant: one that starts with `word`, or differs from it in at most a third of the
-  !> letters. Empty if there is none.
+  !> The known word that was probably meant: one that starts with `word`, or one in which at most a third of the letters
+  !> differ. Empty if there is none.
   pure function nearest_word(word, known) result(nearest)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
@@ -244,8 +244,8 @@ contains
     end do
   end function nearest_word
 
-  !> How many insertions, deletions, substitutions and swaps of adjacent letters turn `a` into `b`
-  !> (Damerau 1964, optimal string alignment).
+  !> Number of insertions, deletions, substitutions and swaps of adjacent letters that turn `a` into `b`
+  !> (optimal string alignment; Damerau, Commun. ACM 7, 171 (1964)).
   pure function edit_distance(a, b) result(distance)
     character(len=*), intent(in) :: a, b
     integer :: distance
@@ -266,7 +266,7 @@ contains
     distance = d(len(a), len(b))
   end function edit_distance
 
-  !> A number of bytes, for messages.
+  !> A number of bytes as text, in kB or MB, for messages.
   pure function size_text(bytes) result(text)
     integer(int64), intent(in) :: bytes
     character(len=:), allocatable :: text
@@ -278,7 +278,7 @@ contains
     end if
   end function size_text
 
-  !> A positive number with three significant digits.
+  !> A positive number rounded to three significant digits.
   pure function about(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -288,7 +288,7 @@ contains
     text = written(anint(number/unit)*unit)
   end function about
 
-  !> `1 value`, `2 values`
+  !> A number with its noun: `1 value`, `2 values`.
   pure function counted(number, noun) result(text)
     integer(int64), intent(in) :: number
     character(len=*), intent(in) :: noun
@@ -298,17 +298,17 @@ contains
     if (number /= 1) text = text//"s"
   end function counted
 
-  !> The line of a text in which a character stands, or would stand behind the end.
+  !> The line of a text that contains character k, which may lie just behind its end.
   pure function line_at(text, k) result(line)
     character(len=*), intent(in) :: text
-    integer, intent(in) :: k                      !! place of the character
+    integer, intent(in) :: k                      !! position of the character
     character(len=:), allocatable :: line
 
     line = text(index(text(:k - 1), eol, back=.true.) + 1:)
     line = line(:index(line//eol, eol) - 1)
   end function line_at
 
-  !> The lines of a text, without their ends.
+  !> Splits a text into its lines, without line ends.
   subroutine lines_of(text, lines)
     character(len=*), intent(in) :: text
     type(text_t), allocatable, intent(out) :: lines(:)
@@ -320,7 +320,7 @@ contains
     do while (first <= len(text))
       last = first - 1 + index(text(first:)//eol, eol)
       line%text = text(first:last - 1)
-      lines = [lines, line]                           ! see `command_line: take_option`
+      lines = [lines, line]                           ! not [lines, text_t(...)]: see `command_line: take_option`
       first = last + 1
     end do
   end subroutine lines_of
