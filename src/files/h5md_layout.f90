@@ -1,5 +1,5 @@
-!> The layout of an output file: H5MD 1.1 (https://www.nongnu.org/h5md/h5md.html). Groups and fixed paths are here; the
-!> names of observables are in `observables`, those of the event log in `samples`.
+!> Layout of an output file, which follows H5MD 1.1 (https://www.nongnu.org/h5md/h5md.html). This module holds groups and fixed
+!> paths; the names of observables are in `observables`, those of the event log in `samples`.
 module h5md_layout
   implicit none
   private
@@ -11,9 +11,9 @@ module h5md_layout
     events_group = "events/", &
     parameters_group = "parameters/", &
     provenance = "provenance", &
-    checkpoint_group = "checkpoint/", &           !! the state to go on from
+    checkpoint_group = "checkpoint/", &           !! state from which a run can be resumed
     box_group = disks_group//"box", &
-    all_disks = "all"                             !! the group of means over all disks in `observables_group`
+    all_disks = "all"                             !! group for averages over all disks, in `observables_group`
 
   ! Datasets
   character(len=*), parameter, public :: &
@@ -29,7 +29,7 @@ module h5md_layout
   character(len=*), parameter, public :: &
     wall_time = provenance//"@wall_time", &
     saved_at = provenance//"/saved_at", &
-    replaced_file = provenance//"@replaced"       !! identity of the file that the finished one may replace
+    replaced_file = provenance//"@replaced"       !! identity of the file that the finished output may replace
 
   ! Elements: groups of step, time, value
   character(len=*), parameter, public :: &
@@ -47,7 +47,7 @@ module h5md_layout
     sample_counter = observables_group//"committed", &
     event_counter = events_group//"committed"
 
-  !> What stands beside groups that have the name of a species, besides observables.
+  !> Names in the groups of species and observables that are not names of species, besides those of observables.
   character(len=*), parameter, public :: beside_species(3) = [character(len=9) :: "committed", "names", "counts"]
 
 end module h5md_layout

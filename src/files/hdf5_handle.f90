@@ -1,7 +1,7 @@
-!> An HDF5 file that is open: created, opened, renamed, flushed and closed; groups in it, and further names.
+!> An open HDF5 file: creating, opening, renaming, flushing and closing it, groups in it, and hard links.
 !>
-!> The first call that fails is remembered, and nothing is done after it. So a writer need not test every
-!> call: `report` says at the end whether all went well.
+!> The first failed call is recorded, and all later calls do nothing. A writer therefore need not test every
+!> call: `report` returns the recorded failure at the end.
 module hdf5_handle
   use, intrinsic :: iso_c_binding, only: c_int
   use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, &
@@ -19,17 +19,17 @@ module hdf5_handle
   private
   public :: hdf5_handle_t, hdf5_version
 
-  integer(size_t), parameter :: sieve = 4096      !! size of the buffer that small writes share [bytes]
+  integer(size_t), parameter :: sieve = 4096      !! size of the buffer that collects small writes [bytes]
 
   type :: hdf5_handle_t
     character(len=:), allocatable :: path
-    character(len=:), allocatable :: final_path   !! the path once it is complete, which messages name
-    character(len=:), allocatable :: failure      !! what could not be done first, after "cannot "
-    logical, private :: has_reason = .false.      !! `failure` says why
+    character(len=:), allocatable :: final_path   !! path of the completed file, used in messages
+    character(len=:), allocatable :: failure      !! the first action that failed, in words that follow "cannot "
+    logical, private :: has_reason = .false.      !! `failure` includes the reason
     integer(hid_t) :: id = -1
-    integer(hid_t) :: links = -1                  !! properties of links: they make the groups on their path
-    integer(hid_t) :: storage = -1                !! properties of datasets: see `prepare`
-    integer(int64) :: unsaved = 0                 !! written since the last flush [bytes]
+    integer(hid_t) :: links = -1                  !! HDF5 properties of links: missing groups on the path are created
+    integer(hid_t) :: storage = -1                !! HDF5 properties of datasets: see `prepare`
+    integer(int64) :: unsaved = 0                 !! amount written since the last flush [bytes]
   contains
     procedure :: create
     procedure :: open => open_file
@@ -44,7 +44,7 @@ module hdf5_handle
   end type hdf5_handle_t
 
   interface
-    !> Makes the library unable to follow a kind of link.
+    !> Removes support for one kind of link from the HDF5 library.
     function forget_link(kind) result(status) bind(C, name="H5Lunregister")
       import :: c_int
       integer(c_int), value :: kind
@@ -54,14 +54,14 @@ module hdf5_handle
 
 contains
 
-  !> Remembers what could not be done if `status` says so and it is the first time.
+  !> Records the failed action if `status` is an error and no failure has been recorded before.
   subroutine check(self, status, action, reason, needed)
     class(hdf5_handle_t), intent(inout) :: self
-    integer, intent(in) :: status                 !! of an HDF5 call; negative: it failed
-    character(len=*), intent(in) :: action        !! what it was to do, in words that follow "cannot "
-    character(len=*), intent(in), optional :: reason    !! if it is known
-    integer(int64), intent(in), optional :: needed      !! for it, if not what is unsaved [bytes]
-    integer(hsize_t) :: bytes                     ! of the file, with all room that it has been promised
+    integer, intent(in) :: status                 !! return value of an HDF5 call; negative: it failed
+    character(len=*), intent(in) :: action        !! the intended action, in words that follow "cannot "
+    character(len=*), intent(in), optional :: reason    !! reason of the failure, if known
+    integer(int64), intent(in), optional :: needed  !! space that the action needs, if it differs from the unsaved amount [bytes]
+    integer(hsize_t) :: bytes                     ! size of the file, including space allocated in advance
     integer(int64) :: most
     integer :: known
 
@@ -80,7 +80,8 @@ contains
     end if
   end subroutine check
 
-  !> The failure, if there was one, as an error: the file, what could not be done, and why, or the space on its disk.
+  !> Returns the recorded failure, if any, as an error. It names the file, the action, and the reason or the free space
+  !> on the disk.
   subroutine report(self, error)
     class(hdf5_handle_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
@@ -94,7 +95,7 @@ contains
     error%message = error%message//": "//written(self%unsaved)//" bytes needed, "//written(free)//" bytes free"
   end subroutine report
 
-  !> The version of the HDF5 library, for the provenance.
+  !> Version of the HDF5 library, for the provenance of a file.
   function hdf5_version() result(text)
     character(len=:), allocatable :: text
     integer :: major, minor, release, status
@@ -103,9 +104,9 @@ contains
     text = written(major)//"."//written(minor)//"."//written(release)
   end function hdf5_version
 
-  !> Starts the library, once in a process: each start takes memory for good. It is silent on errors. No exit handler:
-  !> files are closed by then, or could not be (disk full), and it would crash. No links into other files, which may be
-  !> devices, or not ours to write.
+  !> Initialises the HDF5 library, once per process, because each initialisation leaks memory. The library then prints no
+  !> errors. It gets no exit handler: by then files are closed, or could not be closed (disk full), in which case the handler
+  !> would crash. External links are disabled, because they could lead to devices or to files of others.
   subroutine start_library(status)
     integer, intent(out) :: status
     logical, save :: started = .false.
@@ -121,12 +122,13 @@ contains
     started = status >= 0
   end subroutine start_library
 
-  !> Sets the properties of a file. No file locks: they keep readers out, and a reader's lock could stop a run. Storage
-  !> of datasets is allocated at once, never filled, and has no time stamps, so that the same run gives the same bytes.
-  !> Small ones share no block: HDF5 would cut that off in two steps, and between them say a wrong length of the file.
+  !> Sets the properties of a file. HDF5's file locks are disabled: they would keep readers out, and a reader's lock could stop a
+  !> run. The storage of datasets is allocated at once, is not filled, and has no time stamps, so that equal runs write equal
+  !> bytes. Small datasets do not share a block: HDF5 would release such a block in two steps, between which the header of the
+  !> file states a wrong length.
   subroutine prepare(self, access, status)
     class(hdf5_handle_t), intent(inout) :: self
-    integer(hid_t), intent(out) :: access         !! properties of access to the file
+    integer(hid_t), intent(out) :: access         !! HDF5 properties for access to the file
     integer, intent(out) :: status
 
     call start_library(status)
@@ -142,7 +144,7 @@ contains
     if (status >= 0) call h5pset_obj_track_times_f(self%storage, .false., status)
   end subroutine prepare
 
-  !> Creates a file; it must not exist.
+  !> Creates a file, which must not exist yet.
   subroutine create(self, path, final_path)
     class(hdf5_handle_t), intent(out) :: self
     character(len=*), intent(in) :: path
@@ -181,7 +183,7 @@ contains
     call h5pclose_f(access, closed)
   end subroutine open_file
 
-  !> Gives the open file its final path, in place of the file that has it.
+  !> Renames the open file to its final path and replaces the file that has this path.
   subroutine rename_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     logical :: moved
@@ -192,7 +194,7 @@ contains
     if (moved) self%path = self%final_path
   end subroutine rename_file
 
-  !> Hands all that was written to the operating system: then it survives a kill of the program.
+  !> Passes all written data to the operating system, so that they survive a kill of the program.
   subroutine flush_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     integer :: status
@@ -203,8 +205,8 @@ contains
     if (status >= 0) self%unsaved = 0
   end subroutine flush_file
 
-  !> Closes the file if it is open, and frees its properties, which it has even if it could not be opened; its failure, if
-  !> any, can still be reported.
+  !> Closes the file if it is open, and frees its HDF5 properties, which exist even if the file could not be opened. A
+  !> recorded failure can still be reported.
   subroutine close_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     integer :: status
@@ -220,7 +222,7 @@ contains
     self%id = -1
   end subroutine close_file
 
-  !> Closes the file and removes it; its failure can still be reported.
+  !> Closes the file and deletes it. A recorded failure can still be reported.
   subroutine discard(self)
     class(hdf5_handle_t), intent(inout) :: self
 
@@ -228,7 +230,7 @@ contains
     call remove_file(self%path)
   end subroutine discard
 
-  !> Makes a group and those that lead to it.
+  !> Creates a group and the missing groups on its path.
   subroutine make_group(self, name)
     class(hdf5_handle_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -241,7 +243,7 @@ contains
     if (status >= 0) call h5gclose_f(group, closed)
   end subroutine make_group
 
-  !> Gives an object a second name.
+  !> Adds a hard link to an object.
   subroutine link(self, name, second_name)
     class(hdf5_handle_t), intent(inout) :: self
     character(len=*), intent(in) :: name, second_name

@@ -20,7 +20,8 @@ module hdf5_objects
 
   integer, parameter :: scalar(0) = [integer ::]  !! extents of a single value
 
-  ! No file of ours has more of them: what a file says about its size is not to be relied on.
+  ! Limits on the texts in a file. No output of this program exceeds them; the sizes that a damaged file states are not
+  ! trusted.
   integer(int64), parameter :: most_texts = 10000
   integer(size_t), parameter :: longest_text = 67108864      !! [bytes]
 
@@ -41,13 +42,14 @@ module hdf5_objects
 
 contains
 
-  !> Takes the dataset out of the file that was made last; the file then ends where the values of the one before end. At
-  !> every moment it can be opened: first the dataset loses its name, while it is open and so still there; then the header
-  !> says where the file ends, which HDF5 does only after it has cut it; then it is closed, and gone.
+  !> Removes the dataset that was created last; the file then ends where the values of the dataset `before` end. The file can be
+  !> opened at every moment in between. First the dataset loses its name, while it is still open and therefore still stored. Then
+  !> the new length is written into the header of the file (HDF5 itself would do so only after cutting the file). Then the
+  !> dataset is closed, which frees its storage.
   subroutine remove_last(self, name, before)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, before
-    integer(int64), parameter :: header_end = 40  ! where the header of an HDF5 file has its length
+    integer(int64), parameter :: header_end = 40  ! position of the file length in the header of an HDF5 file
     integer(hid_t) :: dataset, kept
     integer(hsize_t) :: bytes
     integer(hsize_t), allocatable :: extents(:)
@@ -66,16 +68,16 @@ contains
     call self%flush()
     if (allocated(self%failure)) return
     call write_word(self%path, header_end, int(offset + bytes, int64), done)
-    if (done) call h5dclose_f(dataset, closed)     ! else it stays open, or the file would be cut all the same
+    if (done) call h5dclose_f(dataset, closed)     ! otherwise it stays open, because closing it would cut the file
     call self%check(merge(0, -1, done), "remove "//name)
   end subroutine remove_last
 
-  !> Makes a dataset.
+  !> Creates a dataset.
   subroutine make_dataset(self, name, type, extents)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(hid_t), intent(in) :: type            !! HDF5 type in the file
-    integer(hsize_t), intent(in) :: extents(:)    !! shape; empty: a single value
+    integer(hsize_t), intent(in) :: extents(:)    !! shape; empty for a single value
     integer(hid_t) :: dataset, space
     integer :: status, closed
 
@@ -87,19 +89,19 @@ contains
     call h5sclose_f(space, closed)
   end subroutine make_dataset
 
-  !> Opens a dataset whose values are in this file, all of them. Those of another file may be a device, or not ours to
-  !> write; and of a damaged one HDF5 1.10 reads what is not there.
+  !> Opens a dataset whose values are stored completely in this file. Values in other files are refused, because those could be
+  !> devices or files of others. The stored size is checked, because HDF5 1.10 reads beyond the end of a damaged dataset.
   subroutine open_dataset(self, name, dataset, extents, status, like, bytes_each)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(hid_t), intent(out) :: dataset
     integer(hsize_t), allocatable, intent(out) :: extents(:)
-    integer, intent(out) :: status                !! negative: there is none
-    integer(hid_t), intent(in), optional :: like  !! an HDF5 type of the kind that it must have: real, integer, text
-    integer, intent(out), optional :: bytes_each  !! of a value
+    integer, intent(out) :: status                !! negative if there is no such dataset
+    integer(hid_t), intent(in), optional :: like  !! an HDF5 type; the dataset must be of the same class: real, integer or text
+    integer, intent(out), optional :: bytes_each  !! size of a value
     integer(hid_t) :: creation, space, type
     integer(hsize_t) :: most(32), shape(32), n, stored
-    integer(size_t) :: bytes                      ! of a value
+    integer(size_t) :: bytes                      ! size of a value
     integer :: layout, n_files, kinds(2), rank, closed
 
     extents = [-1_hsize_t]
@@ -114,7 +116,7 @@ contains
     if (status >= 0) call h5dget_space_f(dataset, space, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
     call h5sget_simple_extent_npoints_f(space, n, closed)
-    if (closed < 0) n = 0                          ! of none it says, as of their bytes, that it fails
+    if (closed < 0) n = 0                          ! for a dataset of no values HDF5 reports failures here and for the storage size
     if (status >= 0) call h5sget_simple_extent_dims_f(space, shape, most, status)
     call h5sclose_f(space, closed)
     if (status >= 0) call h5dget_type_f(dataset, type, status)
@@ -131,7 +133,7 @@ contains
     end if
     call h5tclose_f(type, closed)
     if (status >= 0) extents = shape(:rank)
-    if (status >= 0 .and. rank == 0 .and. n == 0) extents = [n]           ! it was made to have no values
+    if (status >= 0 .and. rank == 0 .and. n == 0) extents = [n]           ! the dataset was created with no values
     if (status < 0) call h5dclose_f(dataset, closed)
   end subroutine open_dataset
 
@@ -139,7 +141,7 @@ contains
   function extents(self, name, bytes) result(extent)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
-    integer, intent(out), optional :: bytes       !! of a value in the file
+    integer, intent(out), optional :: bytes       !! size of a value in the file
     integer(hsize_t), allocatable :: extent(:)
     integer(hid_t) :: dataset
     integer :: status
@@ -150,7 +152,7 @@ contains
     if (status >= 0) call h5dclose_f(dataset, status)
   end function extents
 
-  !> Number of values in a dataset; -1 if it does not exist, or says that it has more than any file can hold.
+  !> Number of values in a dataset; -1 if it does not exist, or if its stated size exceeds that of any file.
   function length(self, name) result(n)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -159,7 +161,7 @@ contains
     n = product_of(self%extents(name))
   end function length
 
-  !> Number of values of a shape; -1 if no file can hold as many.
+  !> Number of values of an array with these extents; -1 if no file can hold as many.
   pure function product_of(extents) result(n)
     integer(hsize_t), intent(in) :: extents(:)
     integer(int64) :: n
@@ -168,19 +170,20 @@ contains
     if (product(real(extents, real64)) < real(huge(n), real64)) n = product(extents)
   end function product_of
 
-  !> Writes or reads a part of a dataset from or to the memory at an address.
+  !> Writes or reads a part of a dataset, from or to a memory address.
   subroutine transfer(self, name, first, counts, type, address, writing)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
-    integer(int64), intent(in) :: first           !! along the last dimension, from 1
-    integer(int64), intent(in) :: counts(:)       !! values along each dimension; of all but the last one these are all
+    integer(int64), intent(in) :: first           !! first index along the last dimension, from 1
+    integer(int64), intent(in) :: counts(:)  !! number of values along each dimension; all but the last dimension are transferred
+                                             !! completely
     integer(hid_t), intent(in) :: type            !! HDF5 type in memory
     type(c_ptr), intent(in) :: address
     logical, intent(in) :: writing
     integer(hid_t) :: dataset, in_file, in_memory
     integer(hsize_t) :: start(size(counts))
     integer(hsize_t), allocatable :: extents(:)
-    integer(size_t) :: bytes                      ! of a value
+    integer(size_t) :: bytes                      ! size of a value
     type(c_ptr) :: place
     integer :: status, closed
 
@@ -199,11 +202,11 @@ contains
     call self%check(status, trim(merge("write   ", "be read:", writing))//" "//name)
     call h5sclose_f(in_file, closed)
     call h5sclose_f(in_memory, closed)
-    call h5dclose_f(dataset, status)              ! writes what has been buffered
+    call h5dclose_f(dataset, status)              ! also writes buffered values
     call self%check(status, "write "//name)
   end subroutine transfer
 
-  !> Writes reals as doubles.
+  !> Writes real numbers in double precision.
   subroutine put_reals(self, name, extents, values)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -213,7 +216,7 @@ contains
     call self%put_values(name, extents, h5t_ieee_f64le, h5t_native_double, c_loc(values))
   end subroutine put_reals
 
-  !> Writes integers of 32 bits.
+  !> Writes 32-bit integers.
   subroutine put_integers(self, name, extents, values)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -223,7 +226,7 @@ contains
     call self%put_values(name, extents, h5t_std_i32le, h5kind_to_type(int32, h5_integer_kind), c_loc(values))
   end subroutine put_integers
 
-  !> Writes integers of 64 bits.
+  !> Writes 64-bit integers.
   subroutine put_longs(self, name, extents, values)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -233,11 +236,11 @@ contains
     call self%put_values(name, extents, h5t_std_i64le, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
   end subroutine put_longs
 
-  !> Writes one text; an empty one as a blank.
+  !> Writes one text. An empty text is stored as a blank.
   subroutine put_text(self, name, text)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, text
-    character(len=:), allocatable, target :: padded     ! not on the stack, as it may be long
+    character(len=:), allocatable, target :: padded     ! allocated, because a long text would not fit on the stack
     integer(hid_t) :: string
     integer :: closed
 
@@ -263,7 +266,7 @@ contains
     call h5tclose_f(string, closed)
   end subroutine put_texts
 
-  !> The HDF5 type of texts of one length, padded with blanks.
+  !> The HDF5 type of texts with a fixed length, padded with blanks.
   function string_of(length) result(string)
     integer, intent(in) :: length
     integer(hid_t) :: string
@@ -273,7 +276,7 @@ contains
     call h5tset_size_f(string, int(length, size_t), status)
   end function string_of
 
-  !> Writes a dataset or an attribute, new or not; one that is there must have as many values.
+  !> Writes a dataset or an attribute. It is created if necessary; an existing one must have the same number of values.
   subroutine put_values(self, name, extents, stored_as, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -300,11 +303,11 @@ contains
     if (product_of(there) /= product(int(extents, int64))) call self%check(-1, "write "//name)
     if (.not. allocated(self%failure)) call h5dwrite_f(dataset, in_memory, address, status)
     call self%check(status, "write "//name)
-    call h5dclose_f(dataset, status)              ! writes what has been buffered
+    call h5dclose_f(dataset, status)              ! also writes buffered values
     call self%check(status, "write "//name)
   end subroutine put_values
 
-  !> Writes an attribute, new or not, of an object that exists.
+  !> Writes an attribute of an existing object. The attribute is created if necessary.
   subroutine put_attribute(self, name, extents, stored_as, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -326,17 +329,17 @@ contains
     call h5sclose_f(space, closed)
   end subroutine put_attribute
 
-  !> Reads a dataset, or an attribute, of n reals.
+  !> Reads a dataset or an attribute of n real numbers.
   subroutine fetch_reals(self, name, n, values)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
-    integer, intent(in) :: n                      !! how many values there must be
+    integer, intent(in) :: n                      !! required number of values
     real(real64), intent(inout), target :: values(*)
 
     call self%fetch_values(name, n, h5t_native_double, c_loc(values))
   end subroutine fetch_reals
 
-  !> Reads a dataset, or an attribute, of n integers.
+  !> Reads a dataset or an attribute of n integers.
   subroutine fetch_longs(self, name, n, values)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -346,7 +349,8 @@ contains
     call self%fetch_values(name, n, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
   end subroutine fetch_longs
 
-  !> Reads a dataset, or an attribute, of n values; they stay as they are if it has another number or kind, or cannot be read.
+  !> Reads a dataset or an attribute of n values. `values` is unchanged if it has another number of values or another type, or
+  !> cannot be read.
   subroutine fetch_values(self, name, n, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -374,7 +378,7 @@ contains
       call h5oclose_f(object, closed)
     else
       if (in_memory == h5t_native_double) then
-        call self%open_dataset(name, dataset, extents, status)      ! integers make reals, too
+        call self%open_dataset(name, dataset, extents, status)      ! integers are accepted as reals
       else
         call self%open_dataset(name, dataset, extents, status, like=in_memory)
       end if
@@ -386,7 +390,7 @@ contains
     call self%check(status, "be read: "//name)
   end subroutine fetch_values
 
-  !> Reads a list of texts, each cut or padded to a length.
+  !> Reads a list of texts. Each is cut or padded to the given length.
   subroutine fetch_texts(self, name, length, texts)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -402,7 +406,7 @@ contains
     call h5tclose_f(string, closed)
   end subroutine fetch_texts
 
-  !> Reads one text, as long as it is.
+  !> Reads one text of any length.
   subroutine fetch_text(self, name, text)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name

@@ -1,6 +1,6 @@
-!> Datasets that are filled along their last dimension, sample by sample. Their storage is allocated as a
-!> whole when they are made (the disk gives room only to what is filled). After that nothing but values is
-!> written, so a reader, or a kill at any moment, finds the file in order.
+!> Datasets to which samples are added along the last dimension. Their whole storage is allocated when they are
+!> created (the disk provides space only for the filled part). Later only values are written, so that the file is consistent
+!> for a reader, and after a kill, at any moment.
 module hdf5_series
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8, real32
@@ -12,18 +12,18 @@ module hdf5_series
   private
   public :: series_t, double_precision, single_precision, short_integer, long_integer
 
-  !> How the values are stored.
+  !> Types in which values are stored.
   integer, parameter :: double_precision = 1, single_precision = 2, short_integer = 3, long_integer = 4
   integer, parameter :: bytes_of(4) = [8, 4, 4, 8]
-  integer(int64), parameter :: copied_at_once = 1048576     !! [bytes]
+  integer(int64), parameter :: copied_at_once = 1048576     !! size of the buffer for copying [bytes]
 
-  !> One series: its name, storage and shape are given, then it is made, or found in a file.
+  !> One series. Its name, storage and shape are set first; then it is created, or located in a file.
   type :: series_t
     character(len=96) :: name = ""                !! path of the dataset
     integer :: storage = double_precision
-    integer :: rank = 0                           !! of one sample; 0: a number
-    integer :: shape(2) = 1                       !! of one sample, as far as it has dimensions
-    integer(int64) :: capacity = 0                !! samples there is room for
+    integer :: rank = 0                           !! number of dimensions of one sample; 0: a single number
+    integer :: shape(2) = 1                       !! shape of one sample; 1 in dimensions that it lacks
+    integer(int64) :: capacity = 0                !! number of samples that fit into the dataset
   contains
     procedure :: make
     procedure :: find
@@ -38,7 +38,7 @@ module hdf5_series
 
 contains
 
-  !> Number of values of one sample.
+  !> Number of values in one sample.
   elemental function width(self)
     class(series_t), intent(in) :: self
     integer :: width
@@ -46,7 +46,7 @@ contains
     width = product(self%shape)
   end function width
 
-  !> Whether no value is too large for the storage.
+  !> Whether all values are within the range of the storage type.
   pure function holds(self, values) result(yes)
     class(series_t), intent(in) :: self
     real(real64), intent(in) :: values(:, :)      !! (width,samples)
@@ -56,7 +56,7 @@ contains
     if (self%storage == short_integer) yes = all(abs(values) <= huge(0_int32))
   end function holds
 
-  !> Bytes of one sample in the file.
+  !> Size of one sample in the file [bytes].
   elemental function room(self) result(bytes)
     class(series_t), intent(in) :: self
     integer(int64) :: bytes
@@ -73,7 +73,7 @@ contains
     type = types(self%storage)
   end function storage_type
 
-  !> Extents of a dataset of `count` samples.
+  !> Extents of a dataset with `count` samples.
   pure function extents(self, count)
     class(series_t), intent(in) :: self
     integer(int64), intent(in) :: count
@@ -82,7 +82,7 @@ contains
     extents = [int(self%shape(:self%rank), int64), count]
   end function extents
 
-  !> Makes the series with room for `capacity` samples.
+  !> Creates the series with space for `capacity` samples.
   subroutine make(self, file, capacity)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -92,7 +92,7 @@ contains
     call file%make_dataset(trim(self%name), self%storage_type(), int(self%extents(capacity), hsize_t))
   end subroutine make
 
-  !> Finds the series in a file that has it; its samples must have the shape that is expected, integers may be longer.
+  !> Locates the series in a file. The samples there must have the expected shape; their integers may be longer.
   subroutine find(self, file)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -108,12 +108,12 @@ contains
     call file%check(merge(0, -1, there), "be read: there is no "//trim(self%name)//" of the expected shape")
   end subroutine find
 
-  !> Stores samples, converted to the type in the file: HDF5 would take ten times as long to shorten reals. A single sample
-  !> of doubles is not copied, as it may be large.
+  !> Stores samples, converted to the type in the file. HDF5's own conversion to shorter reals would take ten times as long. A
+  !> single sample in double precision is not copied, because it may be large.
   subroutine store(self, file, first, values)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: first           !! number of the first of these samples, from 1
+    integer(int64), intent(in) :: first           !! number of the first of these samples, counted from 1
     real(real64), intent(in), target :: values(:, :)     !! (width,samples)
     real(real64), allocatable, target :: doubles(:, :)
     real(real32), allocatable, target :: singles(:, :)
@@ -149,11 +149,11 @@ contains
     call file%transfer(trim(self%name), first, self%extents(count), type, address, writing=.true.)
   end subroutine store
 
-  !> Loads one sample as doubles.
+  !> Loads one sample in double precision.
   subroutine load(self, file, number, values)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: number          !! from 1
+    integer(int64), intent(in) :: number          !! number of the sample, counted from 1
     real(real64), intent(inout), target :: values(*)
 
     if (number < 1 .or. number > self%capacity) call file%check(-1, "be read: "//trim(self%name))
@@ -161,7 +161,7 @@ contains
       writing=.false.)
   end subroutine load
 
-  !> Copies the first `count` samples from the same series in another file.
+  !> Copies the first `count` samples of the same series from another file.
   subroutine copy(self, file, source, count)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file, source

@@ -1,5 +1,5 @@
-!> A record: numbers one after the other in one dataset of an open file. They are counted, written or read, each by one line
-!> for all three; a checksum behind the last one tells whether they are right.
+!> A sequence of numbers stored in one dataset of an open file, followed by a checksum. The same calls count, write or read the
+!> numbers, depending on the mode, so that all three treat them in the same order.
 module record
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_int, c_int8_t, c_loc, c_long, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8
@@ -14,12 +14,12 @@ module record
   integer, parameter :: counting = 0, writing = 1, reading = 2
   integer(int64), parameter :: bytes_of_word = 8
 
-  !> All numbers are words of 64 bits.
+  !> A sequence of numbers, each a word of 64 bits.
   type :: record_t
     character(len=:), allocatable :: name         !! path of the dataset
     integer :: way = counting
-    integer(int64) :: words = 0                   !! so far
-    integer(int64), private :: crc = 0            !! of these
+    integer(int64) :: words = 0                   !! number of words so far
+    integer(int64), private :: crc = 0            !! checksum of these words
   contains
     generic :: exchange => exchange_real, exchange_reals, exchange_long, exchange_longs
     procedure :: make
@@ -30,10 +30,10 @@ module record
   end type record_t
 
   interface
-    !> CRC-32, by zlib, which HDF5 brings along.
+    !> CRC-32 from zlib, which is a dependency of HDF5.
     pure function crc32(crc, bytes, length) bind(C) result(continued)
       import :: c_int, c_int8_t, c_long
-      integer(c_long), value :: crc                   !! of the bytes before; 0 if there are none
+      integer(c_long), value :: crc                   !! checksum of the preceding bytes; 0 if there are none
       integer(c_int8_t), intent(in) :: bytes(*)
       integer(c_int), value :: length
       integer(c_long) :: continued
@@ -42,7 +42,7 @@ module record
 
 contains
 
-  !> Checksum of some bytes, in eight hexadecimal digits.
+  !> Checksum of an array of bytes, as eight hexadecimal digits.
   pure function checksum(bytes) result(text)
     integer(int8), intent(in) :: bytes(:)
     character(len=8) :: text
@@ -50,7 +50,7 @@ contains
     write (text, "(z8.8)") crc32(0_c_long, bytes, size(bytes, kind=c_int))
   end function checksum
 
-  !> Makes the dataset of a record that has been counted.
+  !> Creates the dataset of a record whose words have been counted.
   subroutine make(self, file)
     class(record_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -60,7 +60,7 @@ contains
     call words%make(file, self%words)
   end subroutine make
 
-  !> Begins anew, to count, write or read.
+  !> Restarts the record, in order to count, write or read it.
   subroutine begin(self, way)
     class(record_t), intent(inout) :: self
     integer, intent(in) :: way
@@ -70,7 +70,7 @@ contains
     self%crc = 0
   end subroutine begin
 
-  !> The next number is a real.
+  !> Counts, writes or reads one real number.
   subroutine exchange_real(self, file, value)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -79,7 +79,7 @@ contains
     call self%pass(file, c_loc(value), 1)
   end subroutine exchange_real
 
-  !> The next numbers are reals.
+  !> Counts, writes or reads an array of real numbers.
   subroutine exchange_reals(self, file, values)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -88,7 +88,7 @@ contains
     call self%pass(file, c_loc(values), size(values))
   end subroutine exchange_reals
 
-  !> The next number is an integer.
+  !> Counts, writes or reads one integer.
   subroutine exchange_long(self, file, value)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -97,7 +97,7 @@ contains
     call self%pass(file, c_loc(value), 1)
   end subroutine exchange_long
 
-  !> The next numbers are integers.
+  !> Counts, writes or reads an array of integers.
   subroutine exchange_longs(self, file, values)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -106,7 +106,7 @@ contains
     call self%pass(file, c_loc(values), size(values))
   end subroutine exchange_longs
 
-  !> Ends a record with its checksum, or fails if that which is there is another.
+  !> Writes the checksum at the end of a record, or reads and compares it. A difference is a failure of the file.
   subroutine seal(self, file)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -118,7 +118,7 @@ contains
     if (there /= crc) call file%check(-1, "be read: the checksum of "//self%name//" is wrong")
   end subroutine seal
 
-  !> Writes or reads the next n words from or to the memory at an address: numbers, or records of them.
+  !> Counts n words, or transfers them from or to a memory address, where they are numbers or derived types without padding.
   subroutine pass(self, file, address, n)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file

@@ -1,5 +1,5 @@
-!> The files of a run, all named after its output OUT.h5, and what of it may be replaced or removed: only what a run
-!> has written, and of that nothing that somebody may still want.
+!> The files of a run, whose names follow from its output OUT.h5, and the rules for replacing and removing them: only files that
+!> a run has written are replaced or removed, and no results without `--force`.
 module run_files
   use errors, only: error_t, exit_files, exit_usage, fail
   use kinds, only: int64
@@ -9,16 +9,16 @@ module run_files
   private
   public :: output_of, is_file, source_of, check_name, check_places, check_replaced, take_final_name
 
-  ! What the name of a file ends with.
+  ! Endings of the names of these files
   character(len=*), parameter, public :: &
     unfinished = ".part", &                       !! the output while it is being written
-    unfinished_new = ".part_new", &               !! the same until all that is written once is in it
-    lock = ".lock"                                !! keeps other runs from this output
+    unfinished_new = ".part_new", &               !! the same, until all data that are written only once are in it
+    lock = ".lock"                                !! lock file that keeps other runs from this output
   character(len=9), parameter :: endings(*) = [character(len=9) :: "", unfinished, unfinished_new, lock]
 
 contains
 
-  !> The output of the run that has a file of this name, not being its output; empty if there can be none.
+  !> Path of the output to which an auxiliary file of this name belongs; empty if the name is not one of an auxiliary file.
   pure function output_of(path) result(output)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: output
@@ -32,7 +32,7 @@ contains
     end do
   end function output_of
 
-  !> Whether there is a file of this name.
+  !> Whether a file of this name exists.
   function is_file(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
@@ -40,16 +40,16 @@ contains
     yes = what_is(path) /= "nothing"
   end function is_file
 
-  !> The file from which a run goes on: its output, finished or not.
+  !> The file from which a run is resumed: the finished output, or the unfinished one if it exists.
   function source_of(output) result(path)
-    character(len=*), intent(in) :: output        !! path of the finished one
+    character(len=*), intent(in) :: output        !! path of the finished output
     character(len=:), allocatable :: path
 
     path = output
     if (is_file(output//unfinished)) path = output//unfinished
   end function source_of
 
-  !> Refuses an output that would have the name of another file of a run.
+  !> Refuses a name for the output that is reserved for an auxiliary file of another run.
   pure subroutine check_name(output, error)
     character(len=*), intent(in) :: output        !! path of the output
     type(error_t), allocatable, intent(out) :: error
@@ -58,7 +58,7 @@ contains
       //"for files of the run with the output "//shown(output_of(output))//"; choose another name")
   end subroutine check_name
 
-  !> Fails if something that no run has written stands where the run is to write.
+  !> Fails if one of the paths that the run will write to is taken by a file that no run has written.
   subroutine check_places(output, error)
     character(len=*), intent(in) :: output        !! path of the output
     type(error_t), allocatable, intent(out) :: error
@@ -79,7 +79,7 @@ contains
     end do
   end subroutine check_places
 
-  !> Whether a file begins as HDF5 files do, or as one whose run was killed before it was complete: empty, or with zeros.
+  !> Whether the first bytes of a file are those of an HDF5 file, or of one whose run was killed early (empty or zeros).
   function begins_like_a_run(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
@@ -91,10 +91,10 @@ contains
       repeat(achar(0), 8)]))
   end function begins_like_a_run
 
-  !> Fails if the finished output would replace another file than the one that was there when the run began.
+  !> Fails if the file that the finished output would replace is not the one that existed when the run began.
   subroutine check_replaced(output, replaced, error)
     character(len=*), intent(in) :: output        !! path of the output
-    integer(int64), intent(in) :: replaced(:)     !! the identity of that file
+    integer(int64), intent(in) :: replaced(:)     !! identity of that file
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: there(3)
 
@@ -104,10 +104,10 @@ contains
       //"the results stay in "//output//unfinished//" until it is moved away")
   end subroutine check_replaced
 
-  !> Gives an output that is complete its final name.
+  !> Renames a completed output to its final name.
   subroutine take_final_name(output, replaced, error)
     character(len=*), intent(in) :: output        !! path of the output
-    integer(int64), intent(in) :: replaced(:)     !! the identity of the file that it may replace
+    integer(int64), intent(in) :: replaced(:)     !! identity of the file that it may replace
     type(error_t), allocatable, intent(out) :: error
     logical :: done
 

@@ -1,8 +1,8 @@
-!> Series that are filled together: frames, observables, or events. A counter in the file says how many samples
-!> are complete; it is written after their values have been flushed, and readers and restarts go by it.
+!> Series that are filled together: frames, observables, or events. A counter in the file holds the number of complete
+!> samples. It is written after the values have been flushed; readers and resumed runs rely on it.
 !>
-!> A sample is one record of reals, the values of each series one after the other; integers are exact up to
-!> 2**53. Small samples are buffered: a call of HDF5 costs as much as a hundred kilobytes.
+!> A sample is an array of reals that contains the values of all series in turn. Integers are exact up to
+!> 2**53. Small samples are buffered, because one HDF5 call costs as much time as writing a hundred kilobytes.
 module sample_track
   use kinds, only: int64, real64
   use hdf5_objects, only: hdf5_file_t, scalar
@@ -13,20 +13,20 @@ module sample_track
   private
   public :: track_t
 
-  integer(int64), parameter :: batch_bytes = 262144     !! samples that are written together
-  integer(int64), parameter :: most_in_batch = 512      !! samples
-  integer(int64), parameter :: first_bytes = 67108864   !! room made for an unknown number of samples
-  integer(int64), parameter :: fewest = 16              !! samples there is room for, however large
-  integer(int64), parameter :: growth = 4               !! room is multiplied by this when it is used up
+  integer(int64), parameter :: batch_bytes = 262144     !! size of the samples that are written together
+  integer(int64), parameter :: most_in_batch = 512      !! largest number of samples that are written together
+  integer(int64), parameter :: first_bytes = 67108864   !! space reserved when the number of samples is unknown
+  integer(int64), parameter :: fewest = 16              !! smallest number of samples for which space is reserved
+  integer(int64), parameter :: growth = 4               !! factor by which the capacity grows when it is used up
 
   type :: track_t
-    type(series_t), allocatable :: series(:)            !! step and time first, if they share them
-    character(len=:), allocatable :: counter            !! path of its dataset
-    integer(int64) :: planned = 0                       !! samples of the whole run; 0: unknown
-    integer(int64) :: capacity = 0                      !! samples there is room for
-    integer(int64), private :: committed = 0            !! samples that are complete in the file
-    integer(int64), private :: waiting = 0              !! samples in the buffer
-    real(real64), private :: waiting_since = 0.0_real64 !! of the oldest of them [s]
+    type(series_t), allocatable :: series(:)            !! the series; step and time come first if the others share them
+    character(len=:), allocatable :: counter            !! path of the counter dataset
+    integer(int64) :: planned = 0                       !! number of samples of the whole run; 0: unknown
+    integer(int64) :: capacity = 0                      !! number of samples that fit into the file
+    integer(int64), private :: committed = 0            !! number of complete samples in the file
+    integer(int64), private :: waiting = 0              !! number of samples in the buffer
+    real(real64), private :: waiting_since = 0.0_real64 !! time when the oldest of them was added [s]
     real(real64), allocatable, private :: buffer(:, :)  !! (width,batch)
   contains
     procedure :: appended
@@ -46,7 +46,7 @@ module sample_track
 
 contains
 
-  !> Samples taken over, written or not.
+  !> Number of samples accepted, whether written or still in the buffer.
   elemental function appended(self) result(n)
     class(track_t), intent(in) :: self
     integer(int64) :: n
@@ -54,7 +54,7 @@ contains
     n = self%committed + self%waiting
   end function appended
 
-  !> Bytes of one sample in the file.
+  !> Size of one sample in the file [bytes].
   elemental function room(self) result(bytes)
     class(track_t), intent(in) :: self
     integer(int64) :: bytes
@@ -70,7 +70,7 @@ contains
     n = max(1_int64, min(most_in_batch, batch_bytes/self%room()))
   end function batch
 
-  !> Room to begin with.
+  !> Initial capacity in samples.
   elemental function first_capacity(self) result(n)
     class(track_t), intent(in) :: self
     integer(int64) :: n
@@ -79,7 +79,7 @@ contains
     if (n == 0) n = max(fewest, first_bytes/self%room())
   end function first_capacity
 
-  !> The capacity that `count` more samples need, with room for later ones if it has to grow.
+  !> Capacity required for `count` more samples. If it has to grow, it grows by a factor, to leave space for later samples.
   pure function enlarged(self, count) result(n)
     class(track_t), intent(in) :: self
     integer(int64), intent(in) :: count
@@ -91,7 +91,7 @@ contains
     end do
   end function enlarged
 
-  !> Lets series have longer integers, in the next file, where these samples need them.
+  !> Switches series to 64-bit integers where these samples require it. The change takes effect in the next file.
   subroutine widen(self, samples, widened)
     class(track_t), intent(inout) :: self
     real(real64), intent(in) :: samples(:, :)           !! (width,count)
@@ -111,7 +111,7 @@ contains
     end do
   end subroutine widen
 
-  !> Makes the track in a new file.
+  !> Creates the series and the counter in a new file.
   subroutine make(self, file, capacity)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -126,7 +126,7 @@ contains
     call self%put_counter(file)
   end subroutine make
 
-  !> Gives all elements the step and time of the first, as H5MD wants it for what is sampled together.
+  !> Links step and time of the first element into all others, as H5MD prescribes for elements that are sampled together.
   subroutine link_step_and_time(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -142,7 +142,7 @@ contains
     end do
   end subroutine link_step_and_time
 
-  !> Finds the track in a file and goes back to its first `count` samples; the file stays as it is.
+  !> Locates the series in a file and returns to the first `count` samples. The file is not changed.
   subroutine resume(self, file, count)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -163,7 +163,7 @@ contains
     self%committed = count
   end subroutine resume
 
-  !> Tells readers which samples are complete: after `resume`, no more than those it went back to.
+  !> Writes the number of complete samples. After `resume` this hides the samples behind the first `count` from readers.
   subroutine put_counter(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -171,7 +171,7 @@ contains
     call file%put(self%counter, scalar, [self%committed])
   end subroutine put_counter
 
-  !> Makes the track in a new file with another capacity, and copies all samples that are written.
+  !> Creates the series in a new file with another capacity and copies all written samples.
   subroutine move(self, file, source, capacity)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file, source
@@ -184,7 +184,7 @@ contains
     end do
   end subroutine move
 
-  !> Notes a failure of the file if it lacks samples, or has room for more.
+  !> Checks that the file holds all samples and no unused space; otherwise a failure of the file is recorded.
   subroutine verify(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -202,7 +202,7 @@ contains
     end do
   end subroutine verify
 
-  !> Takes over the next samples, for which there must be room. They are committed at once if they fill a batch.
+  !> Appends samples, for which there must be space in the file. A full batch is committed at once.
   subroutine append(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -222,7 +222,7 @@ contains
     if (self%waiting == self%batch()) call self%flush(file, 0.0_real64)
   end subroutine append
 
-  !> Commits the samples in the buffer if the oldest has waited for some time.
+  !> Commits the buffered samples if the oldest of them has waited for at least `least_wait`.
   subroutine flush_buffer(self, file, least_wait)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -234,7 +234,7 @@ contains
     self%waiting = 0
   end subroutine flush_buffer
 
-  !> Stores samples behind those that are complete, and then counts them: their values reach the disk first.
+  !> Stores samples behind the complete ones, flushes them, and only then increases the counter.
   subroutine commit(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file

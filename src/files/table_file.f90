@@ -1,4 +1,4 @@
-!> Tables of numbers in HDF5 files that others have written: each column, or some columns side by side, is a dataset at the top.
+!> Tables of numbers in HDF5 files of other programs. Each column, or group of adjacent columns, is a dataset at the top level.
 module table_file
   use kinds, only: real64
   use errors, only: error_t
@@ -7,12 +7,13 @@ module table_file
   public :: read_table
 
   interface
-    !> Reads a table. The submodule `table_in_hdf5` does that, `table_without_hdf5` refuses: the linker gets one of them.
+    !> Reads a table. The submodule `table_in_hdf5` implements this; `table_without_hdf5` refuses it. The linker selects one of
+    !> them.
     module subroutine read_table(path, names, widths, most, table, error)
       character(len=*), intent(in) :: path
-      character(len=*), intent(in) :: names(:)                 !! of the datasets
-      integer, intent(in) :: widths(:)                         !! columns in each of them: their shape is (rows, width), or (rows)
-      integer, intent(in) :: most                              !! rows
+      character(len=*), intent(in) :: names(:)                 !! names of the datasets
+      integer, intent(in) :: widths(:)  !! number of columns in each dataset, whose shape is (rows, width), or (rows)
+      integer, intent(in) :: most                              !! largest number of rows
       real(real64), allocatable, intent(out) :: table(:, :)    !! (columns,rows)
       type(error_t), allocatable, intent(out) :: error
     end subroutine read_table

@@ -1,4 +1,4 @@
-!> Reads tables with HDF5.
+!> Reads tables from HDF5 files.
 submodule(table_file) table_in_hdf5
   use kinds, only: int64
   use errors, only: exit_usage, fail
@@ -17,7 +17,7 @@ contains
     real(real64), allocatable, intent(out) :: table(:, :)
     type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
-    real(real64), allocatable :: values(:)                     ! row by row
+    real(real64), allocatable :: values(:)                     ! the values in the order of rows
     integer(int64) :: length
     integer :: k, n, first
 

@@ -1,4 +1,4 @@
-!> Refuses tables in HDF5 files, in a library that is linked without HDF5.
+!> Refuses tables in HDF5 files, for a library that is linked without HDF5.
 submodule(table_file) table_without_hdf5
   use errors, only: exit_usage, fail
   implicit none
