@@ -1,5 +1,5 @@
-!> When samples are due: at multiples of a time, of a number of collisions or of a number of events, at chosen times, and at
-!> the start and the end of a run. And how far the output has come.
+!> Sampling schedules: samples are due at multiples of a time, of a number of collisions or of a number of events, at given
+!> times, and at the start and the end of a run. Also the progress of the output.
 module cadence
   use kinds, only: int64, never, real64
   use evolution, only: limits_t
@@ -10,18 +10,18 @@ module cadence
   private
   public :: cadence_t, by_time, by_collisions, by_events, progress_t, frames, values
 
-  !> What is counted.
+  !> Quantities by which intervals are measured.
   integer, parameter :: by_time = 1, by_collisions = 2, by_events = 3
 
-  integer, parameter :: units_lost = 4          !! times that differ by so many units in the last place are one
+  integer, parameter :: units_lost = 4  !! times that differ by at most this number of units in the last place count as equal
 
   type :: cadence_t
-    real(real64) :: every(3) = never              !! interval of time; of collisions and of events, whole or not
-    type(sampling_t) :: chosen                    !! as in the input, for its times
-    integer(int64) :: count = 0                   !! samples taken; the first is due at once
-    real(real64) :: next(3) = never               !! time, collisions and events at which the next are due
-    real(real64) :: last_time = -1.0_real64       !! of the last sample [time]
-    integer(int64) :: last_events = -1            !! that had happened then, collisions and kicks
+    real(real64) :: every(3) = never  !! intervals of time, of collisions and of events; the latter two need not be integers
+    type(sampling_t) :: chosen                    !! the sampling rules of the input, for the given times
+    integer(int64) :: count = 0                   !! number of samples taken; the first is due at once
+    real(real64) :: next(3) = never               !! time, collisions and events at which the next samples are due
+    real(real64) :: last_time = -1.0_real64       !! time of the last sample [time]
+    integer(int64) :: last_events = -1            !! number of events and kicks before the last sample
   contains
     procedure :: is_due
     procedure :: is_new
@@ -32,10 +32,10 @@ module cadence
     procedure, private :: next_time, number_within
   end type cadence_t
 
-  !> With the state, all that is needed to go on.
+  !> The progress of the output. Together with the state of the simulation it is all that is needed to resume a run.
   type :: progress_t
-    type(cadence_t) :: cadence(2)                 !! of frames and of values of the observables
-    integer(int64) :: events = 0                  !! collisions written to the event log
+    type(cadence_t) :: cadence(2)                 !! schedules of frames and of observables
+    integer(int64) :: events = 0                  !! number of collisions written to the event log
   end type progress_t
   integer, parameter :: frames = 1, values = 2
 
@@ -45,7 +45,7 @@ module cadence
 
 contains
 
-  !> The progress of a run that has written nothing yet.
+  !> The progress of a run that has not written anything yet.
   pure function new_progress(settings) result(progress)
     type(settings_t), intent(in) :: settings
     type(progress_t) :: progress
@@ -57,7 +57,7 @@ contains
     end do
   contains
 
-    !> Of time, of collisions in all or per disk, and of events.
+    !> Intervals of time, of collisions (given in total or per disk), and of events.
     pure function intervals(every)
       real(real64), intent(in) :: every(:)        !! see `settings: sampled_by`
       real(real64) :: intervals(3)
@@ -76,7 +76,7 @@ contains
       .or. any([sim%tally%collisions, sim%tally%events] >= self%next(by_collisions:))
   end function is_due
 
-  !> Whether there is no sample of the present state yet.
+  !> Whether the present state has not been sampled yet.
   pure function is_new(self, sim) result(yes)
     class(cadence_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -85,7 +85,7 @@ contains
     yes = self%count == 0 .or. sim%time() > self%last_time .or. sim%tally%events + sim%kicks /= self%last_events
   end function is_new
 
-  !> Counts a sample taken now.
+  !> Registers a sample of the present state.
   pure subroutine take(self, sim)
     class(cadence_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -96,19 +96,20 @@ contains
     call self%look_ahead(sim)
   end subroutine take
 
-  !> Finds when the next samples are due: at the first multiples ahead. This follows from the state alone, whenever
-  !> the last sample was taken; but for one that is due now, when something may still happen.
+  !> Finds when the next samples are due: at the next multiples of the intervals. The result follows from the present state,
+  !> independently of when the last sample was taken. Exception: a sample that is due now, at a time at which events may still
+  !> occur.
   elemental subroutine look_ahead(self, sim)
     class(cadence_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    logical :: over                               ! the present moment, for samples
+    logical :: over                               ! all samples of the present time have been taken or missed
 
     over = sim%settled .or. self%last_time >= sim%time()
     self%next(by_time) = self%next_time(sim%time(), merge(sim%time(), self%last_time, over))
     self%next(by_collisions:) = next_number([sim%tally%collisions, sim%tally%events], self%every(by_collisions:))
   end subroutine look_ahead
 
-  !> Lowers the limits so that the simulation pauses at the next sample.
+  !> Lowers the limits so that the simulation stops at the next sample.
   pure subroutine tighten(self, limits)
     class(cadence_t), intent(in) :: self
     type(limits_t), intent(inout) :: limits
@@ -119,9 +120,9 @@ contains
     limits%sampled = max(limits%sampled, self%last_time)
   end subroutine tighten
 
-  !> The first time from one on, and beyond another, at which a sample is due: a multiple of the interval (a product, not a
-  !> sum, so that it does not drift), a step of the decades, or a time in the list. What differs by rounding is due once, at
-  !> the last of these.
+  !> The first time at which a sample is due that is not before `time` and later than `past`: a multiple of the interval, a
+  !> logarithmic step, or a given time. Multiples are computed as products, because sums would accumulate rounding errors. If such
+  !> times differ only by rounding, one sample is due, at the last of them.
   pure function next_time(self, time, past) result(next)
     class(cadence_t), intent(in) :: self
     real(real64), intent(in) :: time, past        !! [time]
@@ -160,9 +161,9 @@ contains
       is_ahead = t >= time .and. t > past + units_lost*spacing(past)
     end function is_ahead
 
-    !> The first of some times that is.
+    !> The first of the given times that is still to come.
     pure real(real64) function first_ahead(times)
-      real(real64), intent(in) :: times(:)        !! in their order [time]
+      real(real64), intent(in) :: times(:)        !! in ascending order [time]
       integer :: behind, ahead, middle
 
       behind = 0
@@ -180,8 +181,8 @@ contains
     end function first_ahead
   end function next_time
 
-  !> The first number of collisions or events beyond n that reaches another multiple of an interval: where a run would end
-  !> that is to have so many.
+  !> The first number of collisions or events beyond n at which the next multiple of an interval is reached. A run with a stop
+  !> rule of that multiple would end at the same number.
   elemental function next_number(n, every) result(next)
     integer(int64), intent(in) :: n
     real(real64), intent(in) :: every
@@ -197,8 +198,8 @@ contains
     next = whole_collisions(multiple*every)
   end function next_number
 
-  !> Number of samples of a run if it can be known in advance: there is at most one interval, and one rule of the same
-  !> kind ends the run, that of time if times are chosen. Otherwise 0.
+  !> Number of samples of a run, if it is known in advance, otherwise 0. It is known if there is at most one interval, and if the
+  !> only stop rule is of the same kind as the interval (of time if times are given).
   elemental function planned(self, limits) result(n)
     class(cadence_t), intent(in) :: self
     type(limits_t), intent(in) :: limits          !! of the run
@@ -218,7 +219,7 @@ contains
     if (given(by_events)) n = numbers_within(limits%events, self%every(by_events))
   end function planned
 
-  !> Number of times up to t at which samples are due, 0 and t itself among them. 0: too many to plan for.
+  !> Number of times from 0 to t at which samples are due, including both. 0: too many to plan for.
   pure function number_within(self, t) result(n)
     class(cadence_t), intent(in) :: self
     real(real64), intent(in) :: t                 !! [time]
@@ -236,7 +237,7 @@ contains
     if (n > too_many) n = 0
   end function number_within
 
-  !> Number of times 0, dt, 2 dt, ... up to t, and t itself. 0: too many to plan for.
+  !> Number of times 0, dt, 2 dt, ... up to t, including t itself. 0: too many to plan for.
   pure function multiples_within(t, dt) result(n)
     real(real64), intent(in) :: t, dt
     integer(int64) :: n
@@ -250,7 +251,7 @@ contains
     n = n + 1
   end function multiples_within
 
-  !> Number of samples by number from 0 to a limit, both included.
+  !> Number of samples from 0 up to a limit of collisions or events, including both.
   pure function numbers_within(limit, every) result(n)
     integer(int64), intent(in) :: limit
     real(real64), intent(in) :: every

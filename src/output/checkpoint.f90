@@ -1,9 +1,10 @@
-!> Checkpoints: what changes in a simulation, and how far its output has come, kept in the output itself. A run that goes
-!> on from one gives the same data as one that never stopped, bit for bit.
+!> Checkpoints: the variable state of a simulation and the progress of its output, stored in the output file. A resumed run
+!> yields data that are bit-identical to those of an uninterrupted run.
 !>
-!> While a run lasts its file has room for two: one counts, the other is written next. When all of it has reached the disk,
-!> a number says that it counts from now on. So there is a whole one at every moment, from the first on; each has a checksum.
-!> A finished file keeps one. In that of a run that broke off there is none.
+!> During a run its file has two slots for checkpoints. One of them is valid, the next checkpoint is written to the other. When
+!> it has reached the disk completely, a number in the file is changed and makes it the valid one. A complete checkpoint
+!> therefore exists at every moment. Each has a checksum. A finished file keeps one slot. The file of a run that broke off
+!> has no valid checkpoint.
 module checkpoint
   use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int8
@@ -30,19 +31,21 @@ module checkpoint
   public :: checkpoint_bytes, copy_checkpoints, has_both_checkpoints, has_broken_off, make_checkpoints, mark_as_broken
   public :: put_checkpoint, put_last_checkpoint, read_checkpoint, recall_overrides, recall_input
 
-  integer, parameter :: layout = 10               !! of the checkpoints; another one is not understood
+  integer, parameter :: layout = 10               !! version of the layout of checkpoints; other versions cannot be read
   character(len=*), parameter :: slots(2) = checkpoint_group//["1", "2"]
-  character(len=*), parameter :: current = checkpoint_group//"current"     !! the number of that which counts, or:
+  character(len=*), parameter :: current = checkpoint_group//"current"     !! number of the valid slot, or `none`
   integer, parameter :: none = 0
   character(len=*), parameter :: described = checkpoint_group//"input_checksum"
 
-  !> A second name of the first. HDF5 writes over the name that was made last when it is taken away, one call before it
-  !> strikes it off the list: a kill between would leave a file that h5dump cannot list.
+  !> A hard link to the first slot. When the link that was created last is deleted, HDF5 overwrites its name one call before it
+  !> removes it from the list; after a kill in between, h5dump could not list the file. This link is therefore created last and
+  !> never deleted.
   character(len=*), parameter :: kept = checkpoint_group//"kept"
 
 contains
 
-  !> The program, with what makes two builds give different bits: the version, and arithmetic that is not exact.
+  !> Identifies the program and the properties by which two builds can give different bits: the version of checkpoints, and
+  !> compiler flags that permit inexact arithmetic.
   pure function program() result(text)
     character(len=:), allocatable :: text
 
@@ -51,7 +54,7 @@ contains
     if (index(build_flags, "-ffast-math") + index(build_flags, "-Ofast") > 0) text = text//", fast math"
   end function program
 
-  !> The input as it was used, without variables that may change on `--resume`: one variable to a line.
+  !> The input as it was used, except for variables that may change on `--resume`: one variable per line.
   pure function fixed_input(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -60,7 +63,7 @@ contains
 
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
-        if (groups(g)%values(k)%name == "relative_to") cycle           ! is in the values of others
+        if (groups(g)%values(k)%name == "relative_to") cycle           ! included in the values of other variables
         if (.not. groups(g)%values(k)%is_set() .or. table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add(groups(g)%value_line(k)//eol)
       end do
@@ -68,7 +71,7 @@ contains
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
         if (.not. allocated(groups(g)%values(k)%reals)) cycle
-        if (size(groups(g)%values(k)%reals) <= most_written) cycle      ! in the text with all digits
+        if (size(groups(g)%values(k)%reals) <= most_written) cycle      ! written completely in the text above
         if (table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add("checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
           //trim(groups(g)%values(k)%name)//" = "//checksum(transfer(groups(g)%values(k)%reals, [0_int8]))//eol)
@@ -77,10 +80,11 @@ contains
     text = growing%text()
   end function fixed_input
 
-  !> What the command line set when the run began, and may not change, need not be said again.
+  !> Adds the overrides of the original command line that may not change on `--resume`, so that they need not be repeated.
   subroutine recall_overrides(output, overrides)
-    character(len=*), intent(in) :: output                       !! path
-    type(text_t), allocatable, intent(inout) :: overrides(:)     !! GROUP.VARIABLE=VALUE of now; then those of both
+    character(len=*), intent(in) :: output                       !! path of the output
+    type(text_t), allocatable, intent(inout) :: overrides(:)  !! in: GROUP.VARIABLE=VALUE of the present command line; out: with
+                                                              !! those recalled
     type(hdf5_file_t) :: file
     type(text_t) :: override
     type(text_t), allocatable :: given(:)
@@ -104,11 +108,11 @@ contains
     overrides = [overrides, given]
   end subroutine recall_overrides
 
-  !> The texts of the input that a file describes: checked, and of this program.
+  !> Reads the texts of the input that a file contains, after checking that they are undamaged and were written by this program.
   subroutine recall_input(file, text, overrides, changes, error)
     type(hdf5_file_t), intent(inout) :: file
     character(len=:), allocatable, intent(out) :: text, overrides
-    character(len=:), allocatable, intent(out) :: changes         !! made while it ran; not allocated: none
+    character(len=:), allocatable, intent(out) :: changes         !! changes made during the run; not allocated if there are none
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: there
 
@@ -124,7 +128,7 @@ contains
     call file%report(error)
   end subroutine recall_input
 
-  !> Checksum of the texts of an input that a file has.
+  !> Checksum of the texts of the input in a file.
   function description_checksum(file) result(text)
     type(hdf5_file_t), intent(inout) :: file
     character(len=8) :: text
@@ -137,7 +141,7 @@ contains
     text = checksum(transfer(input//eol//overrides//eol//changes, [0_int8]))
   end function description_checksum
 
-  !> The variable of an override.
+  !> Name of the variable of an override.
   pure function variable_of(override) result(name)
     character(len=*), intent(in) :: override
     character(len=:), allocatable :: name
@@ -145,11 +149,11 @@ contains
     name = lower_case(trim(adjustl(override(:index(override//"=", "=") - 1))))
   end function variable_of
 
-  !> Gives a new file its checkpoints: both are of the present state.
+  !> Creates both slots in a new file and writes the present state to each.
   subroutine make_checkpoints(file, groups, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
-    type(simulation_t), intent(inout) :: sim      !! stays as it is
+    type(simulation_t), intent(inout) :: sim      !! unchanged on return
     type(progress_t), intent(in) :: progress
 
     call file%put(checkpoint_group//"program", program())
@@ -161,7 +165,7 @@ contains
     call file%link(slots(1), kept)
   end subroutine make_checkpoints
 
-  !> Gives a new file both checkpoints of another, laid out as `make_checkpoints` does: `remove_last` relies on it.
+  !> Copies both slots of another file into a new file, in the same layout as `make_checkpoints`, on which `remove_last` relies.
   subroutine copy_checkpoints(file, source)
     type(hdf5_file_t), intent(inout) :: file
     type(hdf5_file_t), intent(inout) :: source
@@ -184,10 +188,10 @@ contains
     call file%link(slots(1), kept)
   end subroutine copy_checkpoints
 
-  !> Writes a checkpoint in place of the one that does not count; it counts when it has reached the disk.
+  !> Writes a checkpoint to the slot that is not valid, and makes this slot the valid one when the data have reached the disk.
   subroutine put_checkpoint(file, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
-    type(simulation_t), intent(inout) :: sim      !! stays as it is
+    type(simulation_t), intent(inout) :: sim      !! unchanged on return
     type(progress_t), intent(in) :: progress
     integer :: slot
     logical :: done
@@ -201,10 +205,10 @@ contains
     call file%flush()
   end subroutine put_checkpoint
 
-  !> Makes a checkpoint that stays for good, in the first place, and gives up the room of the other.
+  !> Writes the final checkpoint to the first slot and removes the second one.
   subroutine put_last_checkpoint(file, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
-    type(simulation_t), intent(inout) :: sim      !! stays as it is
+    type(simulation_t), intent(inout) :: sim      !! unchanged on return
     type(progress_t), intent(in) :: progress
 
     call put_checkpoint(file, sim, progress)
@@ -212,14 +216,14 @@ contains
     call file%remove_last(slots(2), before=slots(1))
   end subroutine put_last_checkpoint
 
-  !> Marks the new file of a run that broke off: nothing in it is to go on from.
+  !> Marks a new file as the output of a run that broke off, which cannot be resumed.
   subroutine mark_as_broken(file)
     type(hdf5_file_t), intent(inout) :: file
 
     call file%put(current, scalar, [int(none, int64)])
   end subroutine mark_as_broken
 
-  !> The number of the checkpoint that counts, or what stands for it; -1 if the file does not say.
+  !> Number of the valid slot, or `none`; -1 if the file lacks it.
   function checkpoint_number(file) result(number)
     type(hdf5_file_t), intent(inout) :: file
     integer :: number
@@ -230,7 +234,7 @@ contains
     number = int(there(1))
   end function checkpoint_number
 
-  !> Whether a file has room for a second checkpoint.
+  !> Whether a file has the second slot.
   function has_both_checkpoints(file) result(yes)
     type(hdf5_file_t), intent(inout) :: file
     logical :: yes
@@ -240,7 +244,7 @@ contains
 
   !> Whether the run of an unfinished output broke off.
   function has_broken_off(output) result(yes)
-    character(len=*), intent(in) :: output        !! path of the finished one
+    character(len=*), intent(in) :: output        !! path of the finished output
     logical :: yes
     type(hdf5_file_t) :: file
 
@@ -249,9 +253,9 @@ contains
     call file%close()
   end function has_broken_off
 
-  !> Bytes of one checkpoint.
+  !> Size of one checkpoint [bytes].
   function checkpoint_bytes(sim) result(bytes)
-    type(simulation_t), intent(inout) :: sim      !! stays as it is
+    type(simulation_t), intent(inout) :: sim      !! unchanged on return
     integer(int64) :: bytes
     type(hdf5_file_t) :: no_file
     type(record_t) :: record
@@ -261,7 +265,7 @@ contains
     bytes = 8*record%words
   end function checkpoint_bytes
 
-  !> Writes one of the two; makes it if it is not there.
+  !> Writes a checkpoint to a slot, which is created if necessary.
   subroutine put_slot(file, name, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
     character(len=*), intent(in) :: name
@@ -280,13 +284,13 @@ contains
     call exchange_all(file, record, sim, copy)
   end subroutine put_slot
 
-  !> Restores a run from its output, finished or not, which goes on with what `progress` says.
+  !> Restores a run from its output, finished or not. The output continues from the returned `progress`.
   subroutine read_checkpoint(output, input, sim, progress, finished, error)
-    character(len=*), intent(in) :: output      !! path
+    character(len=*), intent(in) :: output      !! path of the finished output
     type(run_input_t), intent(in) :: input
-    type(simulation_t), intent(inout) :: sim    !! in: with the box, law and species of the input
+    type(simulation_t), intent(inout) :: sim    !! in: with the box, contact law and species of the input
     type(progress_t), intent(out) :: progress
-    logical, intent(out) :: finished            !! the run had come to its end
+    logical, intent(out) :: finished            !! the run had finished
     type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
     character(len=:), allocatable :: source
@@ -313,7 +317,7 @@ contains
     call progress%cadence%look_ahead(sim)
   end subroutine read_checkpoint
 
-  !> Reads the checkpoint that counts; if it is damaged the other one.
+  !> Reads the valid checkpoint; if it is damaged, the other one.
   subroutine read_slot(file, sim, progress, error)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
@@ -321,7 +325,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(record_t) :: record
     type(simulation_t) :: blank
-    character(len=:), allocatable :: failure      ! of the first trial
+    character(len=:), allocatable :: failure      ! failure of the first attempt
     integer(int64) :: words
     integer :: number, trial
 
@@ -350,7 +354,7 @@ contains
     call file%report(error)
   end subroutine read_slot
 
-  !> Refuses the checkpoint of another program.
+  !> Refuses a checkpoint that another program, or another version, has written.
   subroutine check_program(file, error)
     type(hdf5_file_t), intent(inout) :: file
     type(error_t), allocatable, intent(out) :: error
@@ -362,7 +366,7 @@ contains
     if (.not. allocated(error)) call file%report(error)
   end subroutine check_program
 
-  !> Refuses the checkpoint of another program or another input.
+  !> Refuses a checkpoint of another program or of another input.
   subroutine check_origin(file, groups, error)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -383,9 +387,9 @@ contains
       //", here "//legible(line_at(here, k))//"; --resume needs the input as it was there, --force instead starts over")
   end subroutine check_origin
 
-  !> Writes or reads a checkpoint. When read, a simulation must know its box and species.
+  !> Counts, writes or reads a checkpoint. For reading, the box and the species of the simulation must already be set.
   subroutine exchange_all(file, record, sim, progress)
-    type(hdf5_file_t), intent(inout) :: file      !! not used while the record is counted
+    type(hdf5_file_t), intent(inout) :: file      !! not used while words are counted
     type(record_t), intent(inout) :: record
     type(simulation_t), intent(inout), target :: sim
     type(progress_t), intent(inout) :: progress
@@ -416,7 +420,8 @@ contains
     end if
     call exchange_disks()
     do k = 1, size(progress%cadence)
-      associate (cadence => progress%cadence(k))      ! its steps are part of the input; when it is due follows from them
+      associate (cadence => progress%cadence(k))  ! intervals belong to the input; the times of the next samples follow from these
+                                                  ! numbers
         call record%exchange(file, cadence%count)
         call record%exchange(file, cadence%last_events)
         call record%exchange(file, cadence%last_time)
@@ -426,7 +431,7 @@ contains
     call record%seal(file)
   contains
 
-    !> What collisions have gathered.
+    !> The sums and counters over all events.
     subroutine exchange_tally()
       call sim%tally%make_room(size(sim%box%surface))
       associate (tally => sim%tally)
@@ -442,7 +447,7 @@ contains
       end associate
     end subroutine exchange_tally
 
-    !> The whole numbers of each sum, which have twice as many bits as an integer.
+    !> The integers that represent each exact sum; they are twice as long as ordinary integers.
     subroutine exchange_sums(sums)
       type(exact_sum_t), intent(inout) :: sums(:)
       integer(int128), target :: parts(2*size(sums))
@@ -453,7 +458,7 @@ contains
       sums%rare = parts(size(sums) + 1:)
     end subroutine exchange_sums
 
-    !> The disks.
+    !> The state of the disks.
     subroutine exchange_disks()
       real(real64), allocatable :: mass(:)
 
@@ -467,20 +472,21 @@ contains
         call exchange_short(tag%id)
         call record%exchange(file, tag%collisions)
         call exchange_short(tag%met)
-        if (sim%with%own_sizes) call record%exchange(file, disk%radius)      ! else sizes follow from the input
+        if (sim%with%own_sizes) call record%exchange(file, disk%radius)      ! otherwise the radii follow from the input
       end associate
       settled = merge(1, 0, sim%settled)
       do k = 1, merge(1, 0, sim%with%rotation) + merge(2, 0, sim%with%orientation)
-        call record%exchange(file, settled)     ! words of no meaning: the length tells which numbers the disks have
+        call record%exchange(file, settled)  ! padding words: the length of the record shows whether disks have rotation and
+                                             ! orientation
       end do
       if (allocated(sim%extra)) call record%pass(file, c_loc(sim%extra(1)), size(sim%extra)*storage_size(sim%extra)/64)
       if (.not. sim%with%own_sizes) return
-      mass = sim%masses()                       ! they may turn out to be those of the species
+      mass = sim%masses()                       ! may all be equal to the masses of the species
       call record%exchange(file, mass)
       if (record%way == reading) sim%own_mass = mass
     end subroutine exchange_disks
 
-    !> Integers of half a word.
+    !> 32-bit integers, stored as words of 64 bits.
     subroutine exchange_short(values)
       integer(int32), intent(inout) :: values(:)
       integer(int64) :: words(size(values))

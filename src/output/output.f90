@@ -1,8 +1,8 @@
-!> The output of a run: when something is written, and the life of its file. During the run that is OUT.h5.part, and a lock
-!> keeps other runs away; the name OUT.h5 means that the run is finished.
+!> Output of a run: decides when something is written, and manages the file. During the run its name is OUT.h5.part, and a lock
+!> file keeps other runs away; the name OUT.h5 means that the run has finished.
 !>
-!> A file never changes its layout. When the number of samples is known at the start it has room for just these. Otherwise,
-!> when the room is used up, and at the end, a new file replaces it in one instant.
+!> The layout of a file never changes. If the number of samples is known at the start, the file has space for exactly these.
+!> Otherwise a new file replaces it, by an atomic renaming, when the space is used up and at the end.
 module output
   use kinds, only: int64, real64
   use cadence, only: frames, progress_t, values
@@ -29,20 +29,21 @@ module output
   private
   public :: output_t, planned_bytes
 
-  real(real64), parameter :: longest_wait = 0.05_real64  !! of a sample before it is written [s]
-  integer, parameter :: events = 3              !! the track of the event log, behind those of `frames` and `values`
-  integer, parameter :: kept = 1, anew = 2, dropped = 3         !! what becomes of checkpoints in a new file
+  real(real64), parameter :: longest_wait = 0.05_real64  !! longest time that a sample waits in a buffer while the run is active [s]
+  integer, parameter :: events = 3              !! index of the track of the event log, behind `frames` and `values`
+  integer, parameter :: kept = 1, anew = 2, dropped = 3  !! checkpoints of a new file: copied, written for the present state, or
+                                                         !! none
 
   type :: output_t
     type(progress_t) :: progress
-    character(len=:), allocatable :: path         !! of the finished file
-    type(run_input_t) :: input                    !! described in the file
+    character(len=:), allocatable :: path         !! path of the finished file
+    type(run_input_t) :: input                    !! the input that the file describes
     type(hdf5_file_t), allocatable, private :: file
-    type(track_t), allocatable, private :: track(:)      !! frames, observables, and the event log if there is one
-    type(frame_column_t), allocatable, private :: columns(:)  !! of the frames
+    type(track_t), allocatable, private :: track(:)      !! (2 or 3) frames, observables and, if requested, the event log
+    type(frame_column_t), allocatable, private :: columns(:)  !! columns of the frames
     type(lock_t), private :: lock
     integer(int64), private :: replaced(3) = 0_int64     !! identity of the file that had this path when the run began
-    real(real64), private :: opened = 0.0_real64  !! by the clock of `seconds` [s]
+    real(real64), private :: opened = 0.0_real64  !! time when this part of the run began, by the clock `seconds` [s]
     real(real64), private :: spent = 0.0_real64   !! wall time of earlier parts of the run [s]
   contains
     procedure :: claim
@@ -60,15 +61,15 @@ module output
 
 contains
 
-  !> Makes the folders, takes the lock that keeps other runs from this output, and looks at what else is there.
+  !> Creates the folders of the output, acquires its lock, and checks for files that must not be overwritten.
   subroutine claim(self, path, error)
     class(output_t), intent(inout) :: self
-    character(len=*), intent(in) :: path          !! of the finished file
+    character(len=*), intent(in) :: path          !! path of the finished file
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: problem
     logical :: made
 
-    call record_signals()                         ! from here on there is something to lose
+    call record_signals()                         ! from here on data could be lost
     self%file = hdf5_file_t()
     self%path = path
     self%opened = seconds()
@@ -82,18 +83,18 @@ contains
       if (problem /= "") call fail(error, exit_files, path//": "//problem)
     end if
     if (.not. allocated(error)) call check_places(path, error)
-    if (.not. allocated(error)) call remove_file(path//unfinished_new)      ! a run that was killed has left it half made
+    if (.not. allocated(error)) call remove_file(path//unfinished_new)      ! left incomplete by a run that was killed
     self%replaced = identity_of(path)
     if (is_file(path) .and. all(self%replaced == 0) .and. .not. allocated(error)) &
       call fail(error, exit_files, path//": cannot be looked at: "//last_problem())
   end subroutine claim
 
-  !> Opens the output of a new run, which has been claimed, and writes the first samples.
+  !> Opens the output of a new run after `claim`, and writes the first samples.
   subroutine open_output(self, input, sim, force, error)
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(inout) :: sim
-    logical, intent(in) :: force                  !! replace a finished file, at the end, or an unfinished one
+    logical, intent(in) :: force                  !! allows that an unfinished output is replaced now and a finished one at the end
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: planned
     integer :: k
@@ -126,7 +127,7 @@ contains
     if (allocated(error)) call self%file%discard()
   end subroutine open_output
 
-  !> Fails if a new run would replace an output, or delete what another run has left; but that of one that broke off.
+  !> Fails if a new run would replace a finished output, or an unfinished one, unless the run of the latter broke off.
   subroutine check_start(self, error)
     class(output_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
@@ -141,8 +142,8 @@ contains
     end if
   end subroutine check_start
 
-  !> Opens the output of a run that goes on, which has been claimed, and goes back to where its checkpoint stands. That of a
-  !> finished run stays as it is until the longer one has finished. The file must describe the input of now.
+  !> Opens the output of a resumed run after `claim`, and returns to the samples of its checkpoint. The output of a finished run
+  !> is not changed until the longer run has finished. If the file does not describe the present input, it is rebuilt.
   subroutine resume(self, input, sim, progress, finished, error)
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
@@ -187,7 +188,7 @@ contains
     call self%file%report(error)
   end subroutine resume
 
-  !> Sets up the tracks, and says how many samples of each are planned.
+  !> Sets up the tracks and the number of samples planned for each.
   subroutine plan(self, input, sim)
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
@@ -210,12 +211,13 @@ contains
     end associate
   end subroutine plan
 
-  !> Bytes that the output of a run needs at least: where the number of samples is unknown the first and the last count.
+  !> Smallest possible size of the output of a run in bytes. Where the number of samples is unknown, only the first and the last
+  !> are counted.
   function planned_bytes(input, sim) result(bytes)
     type(run_input_t), intent(in) :: input
-    type(simulation_t), intent(inout) :: sim      !! stays as it is
+    type(simulation_t), intent(inout) :: sim      !! unchanged on return
     integer(int64) :: bytes
-    real(real64), parameter :: constants = 24.0_real64    !! per disk: id, species, mass, radius [bytes]
+    real(real64), parameter :: constants = 24.0_real64    !! size of id, species, mass and radius of a disk [bytes]
     type(output_t) :: output
 
     output%progress = progress_t(input%settings)
@@ -224,7 +226,7 @@ contains
       + sum(real(max(output%track%planned, 2_int64), real64)*real(output%track%room(), real64))), int64)
   end function planned_bytes
 
-  !> Creates a file under a temporary name, with everything but the tracks and the checkpoints.
+  !> Creates a file under a temporary name and writes everything except tracks and checkpoints.
   subroutine create_file(self, file, sim)
     class(output_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -236,7 +238,7 @@ contains
     call file%put(wall_time, scalar, [self%spent])
   end subroutine create_file
 
-  !> Lowers the limits so that the simulation pauses at the next sample.
+  !> Lowers the limits so that the simulation stops at the next sample.
   pure subroutine tighten(self, limits)
     class(output_t), intent(in) :: self
     type(limits_t), intent(inout) :: limits
@@ -245,7 +247,7 @@ contains
     call self%progress%cadence(values)%tighten(limits)
   end subroutine tighten
 
-  !> Takes the samples that are due; to be called whenever the simulation pauses.
+  !> Takes the samples that are due. Called whenever the simulation has stopped at a limit.
   subroutine take_due_samples(self, sim, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -264,7 +266,7 @@ contains
   !> Takes a frame, or a sample of the observables.
   subroutine take_sample(self, track, sim)
     class(output_t), intent(inout) :: self
-    integer, intent(in) :: track                  !! frames or values
+    integer, intent(in) :: track                  !! `frames` or `values`
     type(simulation_t), intent(inout) :: sim
 
     associate (cadence => self%progress%cadence(track))
@@ -274,7 +276,7 @@ contains
     end associate
   end subroutine take_sample
 
-  !> Takes over the collisions that the log holds, and empties it; `take_due_samples` reports a failure.
+  !> Moves the collisions in the log to the output, and empties the log. A failure is reported by the next `take_due_samples`.
   subroutine take_events(self, sim, log)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -286,7 +288,7 @@ contains
     log%n = 0
   end subroutine take_events
 
-  !> Adds samples to a track, in another file if there is no room for them in this one.
+  !> Adds samples to a track. If they do not fit, the file is replaced by a larger one first.
   subroutine add(self, track, samples, sim)
     class(output_t), intent(inout) :: self
     integer, intent(in) :: track
@@ -302,7 +304,7 @@ contains
     call self%track(track)%append(self%file, samples)
   end subroutine add
 
-  !> Commits the samples that have waited in a buffer for some time; without `least_wait` all.
+  !> Commits the samples that have waited in a buffer for at least `least_wait`; without this argument all samples.
   subroutine flush_buffers(self, least_wait)
     class(output_t), intent(inout) :: self
     real(real64), intent(in), optional :: least_wait      !! [s]
@@ -321,7 +323,7 @@ contains
     class(output_t), intent(inout) :: self
     integer(int64), intent(in) :: capacities(:)
     type(simulation_t), intent(inout) :: sim
-    integer, intent(in) :: checkpoints            !! those of the new file: `kept`, made `anew` of this moment, or `dropped`
+    integer, intent(in) :: checkpoints  !! checkpoints of the new file: `kept`, written `anew` for the present state, or `dropped`
     type(hdf5_file_t), allocatable :: new
     integer(int64) :: needed
     integer :: k
@@ -340,7 +342,7 @@ contains
     if (checkpoints == anew) call make_checkpoints(new, self%input%groups, sim, self%progress)
     if (checkpoints == dropped) call mark_as_broken(new)
     call new%flush()
-    if (allocated(self%file%failure)) then        ! it cannot be read
+    if (allocated(self%file%failure)) then        ! the old file could not be read
       call new%discard()
       return
     end if
@@ -350,10 +352,10 @@ contains
     if (allocated(self%file%failure)) call self%file%discard()
   end subroutine rebuild
 
-  !> Makes a checkpoint of this moment.
+  !> Writes a checkpoint of the present state.
   subroutine save(self, sim, error)
     class(output_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim      !! stays as it is
+    type(simulation_t), intent(inout) :: sim      !! unchanged on return
     type(error_t), allocatable, intent(out) :: error
 
     call self%flush_buffers()
@@ -362,13 +364,13 @@ contains
     call self%file%report(error)
   end subroutine save
 
-  !> Ends the output of a finished run: a check of the file, its final name. If that fails, its checkpoint leads back to the
-  !> moment before.
+  !> Completes the output of a finished run: the file is checked and gets its final name. If that fails, the checkpoint in it
+  !> allows the run to be resumed just before its end.
   subroutine finish(self, sim, cost, note, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: cost(3)           !! see `write_end`
-    character(len=*), intent(in) :: note          !! why it ended if no stop rule was met
+    character(len=*), intent(in) :: note          !! reason of the end, if no stop rule was met
     type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
     integer :: k
@@ -387,14 +389,14 @@ contains
     if (.not. allocated(error)) call self%release()
   end subroutine finish
 
-  !> Writes the last samples, gives up unused room, and says how the run ended. The checkpoint of a finished run goes on
-  !> before the last samples: in a longer run they might not be due.
+  !> Writes the last samples, removes unused space, and records how the run ended. The checkpoint of a finished run precedes the
+  !> last samples: in a longer run they might not be due.
   subroutine write_end(self, sim, cost, note, broken)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: cost(3)           !! since the start or the last resume: wall time [s], collisions per
     !! processor time [1/s], events on one core where there were more
-    character(len=*), intent(in) :: note          !! why the run ended if no stop rule was met
+    character(len=*), intent(in) :: note          !! reason of the end, if no stop rule was met
     logical, intent(in) :: broken
     type(progress_t) :: before
     integer :: track
@@ -410,12 +412,12 @@ contains
     if (.not. broken) call put_last_checkpoint(self%file, sim, before)
   end subroutine write_end
 
-  !> Leaves the output of a run that broke off under the name of an unfinished one, with its last state.
+  !> Completes the output of a run that broke off, with its last state, but leaves it under the name of an unfinished output.
   subroutine break_off(self, sim, cost, note)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: cost(3)           !! see `write_end`
-    character(len=*), intent(in) :: note          !! why
+    character(len=*), intent(in) :: note          !! reason
     type(error_t), allocatable :: uncountable
 
     call check_counts(sim, uncountable)

@@ -1,4 +1,4 @@
-!> Shows how far a run is, at which rate, and when it will be done.
+!> Progress report of a run: completed fraction, rate, and estimated time of arrival (ETA).
 module progress_line
   use kinds, only: int64, never, real64
   use simulation_state, only: simulation_t
@@ -10,15 +10,15 @@ module progress_line
   private
   public :: progress_line_t
 
-  integer, parameter :: window = 20                !! reports over which rates are taken
+  integer, parameter :: window = 20                !! number of reports over which rates are averaged
 
   type, extends(status_line_t) :: progress_line_t
     private
-    real(real64) :: started = 0.0_real64           !! when the program started [s]
-    integer :: n = 0                               !! reports so far
-    ! At the last reports
+    real(real64) :: started = 0.0_real64           !! time when the program started [s]
+    integer :: n = 0                               !! number of reports so far
+    ! At the last reports, in a ring buffer:
     real(real64) :: clock(0:window - 1) = 0.0_real64       !! [s]
-    real(real64) :: share(0:window - 1) = 0.0_real64       !! of the run that was done
+    real(real64) :: share(0:window - 1) = 0.0_real64       !! completed fraction of the run
     integer(int64) :: collisions(0:window - 1) = 0_int64
   contains
     procedure :: start
@@ -27,19 +27,19 @@ module progress_line
 
 contains
 
-  !> Prepares for a run, or for the next part of one.
+  !> Prepares the report for a run, or for the next part of one.
   subroutine start(self, sim, stop_rule, started)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(stop_rule_t), intent(in) :: stop_rule
-    real(real64), intent(in) :: started            !! when the program started [s]
+    real(real64), intent(in) :: started            !! time when the program started [s]
 
     self%started = started
     self%n = 0
     call remember(self, sim, stop_rule)
   end subroutine start
 
-  !> Writes a line if it is time.
+  !> Shows a report if one is due.
   subroutine report(self, sim, stop_rule)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

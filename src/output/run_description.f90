@@ -1,4 +1,4 @@
-!> What an output file holds once: its format and author, the box, the disks, every parameter, its provenance.
+!> Constant contents of an output file: format and author, box, disks, all parameters, and provenance.
 module run_description
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_fortran_env, only: compiler_version
@@ -21,12 +21,12 @@ module run_description
   private
   public :: describe_end, describe_run, describes
 
-  integer, parameter :: longest_attribute = 1000      !! values; HDF5 has no room for more than 64 kB
-  integer, parameter :: longest_note = 500            !! letters kept for why the run ended
+  integer, parameter :: longest_attribute = 1000      !! largest number of values; HDF5 limits attributes to 64 kB
+  integer, parameter :: longest_note = 500            !! length of the text with the reason of the end
 
 contains
 
-  !> Writes everything, with placeholders for what is known only at the end.
+  !> Writes everything, with placeholders for values that are known only at the end.
   subroutine describe_run(file, input, sim)
     type(hdf5_file_t), intent(inout) :: file
     type(run_input_t), intent(in) :: input
@@ -62,7 +62,7 @@ contains
       call file%put("h5md/modules/thermodynamics@version", [2], [1_int32, 0_int32])
     end subroutine describe_format
 
-    !> Sides and boundaries of the box.
+    !> Boundary conditions and edges of the box.
     subroutine describe_box()
       character(len=8) :: boundary(2)
 
@@ -74,7 +74,7 @@ contains
       call file%put(box_group//"/lower", [2], sim%box%lower)
     end subroutine describe_box
 
-    !> What never changes of the disks, in the order of the input.
+    !> Constant properties of the disks, in the order of the input.
     subroutine describe_disks()
       integer(int32), allocatable :: numbers(:)
       real(real64), allocatable :: sizes(:)
@@ -91,14 +91,14 @@ contains
       call file%put(disk_radius, [size(sizes)], sizes)
     end subroutine describe_disks
 
-    !> The input as it was given, and every variable as it was used.
+    !> The input as it was given, and the value of every variable as it was used.
     subroutine describe_input()
       character(len=:), allocatable :: group
       integer :: g, k
 
       do g = 1, size(input%groups)
         associate (own => input%groups(g))
-          if (any(obstacle_groups == own%name)) cycle     ! one table for each name
+          if (any(obstacle_groups == own%name)) cycle     ! described by one table for each name of group
           group = parameters_group//trim(own%name)
           if (is_repeated(own%name)) group = group//"/"//trim(own%instance)
           call file%make_group(group)
@@ -112,7 +112,7 @@ contains
       if (allocated(input%changes)) call file%put(changes_at_work, input%changes)
     end subroutine describe_input
 
-    !> What the thermodynamics module of H5MD requires beside the observables of a group.
+    !> Dimension and number of particles, which the thermodynamics module of H5MD requires beside the observables of a group.
     subroutine describe_populations()
       character(len=:), allocatable :: group
       integer(int32) :: n
@@ -129,7 +129,7 @@ contains
       end do
     end subroutine describe_populations
 
-    !> The build and the machine that a file comes from.
+    !> The build and the machine that created the file.
     subroutine describe_origin()
       call file%make_group(provenance)
       call file%put(provenance//"@program_version", program_version)
@@ -142,7 +142,7 @@ contains
     end subroutine describe_origin
   end subroutine describe_run
 
-  !> Who runs the program, according to the environment.
+  !> Name of the user, according to the environment.
   function author() result(name)
     character(len=:), allocatable :: name
     integer :: length
@@ -153,16 +153,16 @@ contains
     if (name == "") name = "unknown"
   end function author
 
-  !> Whether a run gives the same bits with any value of a variable (`run.threads`): then it is not among those that
-  !> describe the run.
+  !> Whether the results of a run are independent of a variable. This holds for `run.threads`, which is therefore not stored
+  !> among the parameters.
   pure function changes_nothing(variable) result(yes)
-    character(len=*), intent(in) :: variable      !! may go on with its value
+    character(len=*), intent(in) :: variable      !! name; it may be followed by its value
     logical :: yes
 
     yes = index(variable, "run.threads") == 1
   end function changes_nothing
 
-  !> What the command line has changed, one variable to a line.
+  !> The overrides of the command line, one variable per line.
   pure function overrides_text(input) result(text)
     type(run_input_t), intent(in) :: input
     character(len=:), allocatable :: text
@@ -187,7 +187,7 @@ contains
     yes = text == input%text .and. overrides == overrides_text(input)
   end function describes
 
-  !> One variable; nothing if it has no value.
+  !> Writes the value of one variable, if it has one.
   subroutine describe_value(file, group, value)
     type(hdf5_file_t), intent(inout) :: file
     character(len=*), intent(in) :: group
@@ -217,8 +217,8 @@ contains
     end select
   end subroutine describe_value
 
-  !> All groups of one name as a table, with a dataset for each variable. A choice of two words is stored as a
-  !> flag with the name of the second.
+  !> Writes all groups of one name as a table, with a dataset for each variable. A choice of two words is stored as a
+  !> flag that is named after the second word.
   subroutine describe_table(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -233,7 +233,7 @@ contains
       associate (row => table(groups(1)%values(k)%row))
         path = parameters_group//trim(row%group)//"/"
         second = trim(row%choices(index(trim(row%choices), " ", back=.true.) + 1:))
-        if (row%name == "file") cycle                       ! its obstacles are stored: see `describe_rows`
+        if (row%name == "file") cycle                       ! the obstacles themselves are stored: see `describe_rows`
         if (row%kind == "text") then
           do g = 1, n
             texts(g) = groups(g)%text_of(trim(row%name))
@@ -243,7 +243,7 @@ contains
         else
           if (.not. any([(groups(g)%values(k)%is_set(), g=1, n)])) cycle
           if (row%size == 0) cycle                          ! a polyline: see `describe_rows`
-          values = spread(ieee_value(0.0_real64, ieee_quiet_nan), 1, row%size*n)     ! where it is not given
+          values = spread(ieee_value(0.0_real64, ieee_quiet_nan), 1, row%size*n)     ! NaN for groups without a value
           do g = 1, n
             if (size(groups(g)%reals_of(trim(row%name))) /= row%size) cycle
             values(row%size*(g - 1) + 1:row%size*g) = groups(g)%values(k)%reals
@@ -255,22 +255,22 @@ contains
     end do
   end subroutine describe_table
 
-  !> The geometry of all obstacles of groups of one name, in the order of their codes, and the number of the group of each: where
-  !> a group has several, from a file or as a polyline.
+  !> Writes the geometry of all obstacles in the groups of one name, in the order of their codes, and the number of the group of
+  !> each. Needed where a group contains several obstacles, from a file or as a polyline.
   subroutine describe_rows(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: path
     integer(int32), allocatable :: group(:)
     real(real64), allocatable :: values(:)
-    integer :: g, k, n(size(groups))                  ! n: obstacles of each group
+    integer :: g, k, n(size(groups))                  ! number of obstacles in each group
 
     if (.not. any([(has_many(groups(g)), g=1, size(groups))])) return
     path = parameters_group//trim(groups(1)%name)//"_rows/"
     allocate (values(0))
     do k = 1, size(groups(1)%values)
       associate (row => table(groups(1)%values(k)%row))
-        if (row%status /= "example") cycle            ! not what places an obstacle
+        if (row%status /= "example") cycle            ! only variables that define the geometry
         values = [(groups(g)%reals_of(trim(row%name)), g=1, size(groups))]
         n = [(size(groups(g)%reals_of(trim(row%name)))/row%size, g=1, size(groups))]
         if (row%size == 1) call file%put(path//trim(row%name), [size(values)], values)
@@ -281,13 +281,14 @@ contains
     call file%put(path//"group", [size(group)], group)
   end subroutine describe_rows
 
-  !> Writes, or overwrites, what is known only at the end.
+  !> Writes or overwrites the values that are known only at the end.
   subroutine describe_end(file, threads, wall_seconds, rate, note)
     type(hdf5_file_t), intent(inout) :: file
-    integer, intent(in) :: threads                    !! that the last part of the run had
-    real(real64), intent(in) :: wall_seconds          !! of the whole run, all its parts together [s]
-    real(real64), intent(in) :: rate(2)               !! of its last part: collisions per processor time [1/s], events on one core
-    character(len=*), intent(in) :: note              !! why it ended if no stop rule was met
+    integer, intent(in) :: threads                    !! number of threads in the last part of the run
+    real(real64), intent(in) :: wall_seconds          !! wall time of the whole run, summed over its parts [s]
+    real(real64), intent(in) :: rate(2)  !! last part of the run: collisions per processor time [1/s], number of events executed by
+                                         !! the serial engine
+    character(len=*), intent(in) :: note              !! reason of the end, if no stop rule was met
     character(len=longest_note) :: padded
 
     padded = note

@@ -1,5 +1,5 @@
-!> What a frame, a sample of the observables and a sample of the event log consist of: the series of each, in the order in
-!> which `moments` has their values.
+!> The series in a frame, in a sample of the observables and in a sample of the event log. The order is the same
+!> as that of the values in `moments`.
 module samples
   use kinds, only: int32, int64, most_exact
   use errors, only: error_t, exit_broken, fail
@@ -16,9 +16,9 @@ contains
 
   !> The series of the frames: step, time, and the values of all disks.
   pure function frame_series(list, n, single) result(series)
-    type(frame_column_t), intent(in) :: list(:)   !! the columns
-    integer, intent(in) :: n                      !! disks
-    logical, intent(in) :: single                 !! numbers with a fraction in single precision
+    type(frame_column_t), intent(in) :: list(:)   !! columns of the frames
+    integer, intent(in) :: n                      !! number of disks
+    logical, intent(in) :: single                 !! reals are stored in single precision
     type(series_t) :: series(2 + size(list))
     integer :: k
 
@@ -48,7 +48,7 @@ contains
     end do
   end function observable_series
 
-  !> The series of the event log; its records come from the log.
+  !> The series of the event log, in the order of its records.
   pure function event_series() result(series)
     type(series_t) :: series(5)
 
@@ -57,7 +57,7 @@ contains
       series_t(events_group//"momentum_change", double_precision, 1, [2, 1])]
   end function event_series
 
-  !> Fails if a count of a simulation is too large for samples, which hold it as a real.
+  !> Fails if a counter of the simulation is too large for a sample, in which it is stored as a real.
   subroutine check_counts(sim, error)
     type(simulation_t), intent(in) :: sim
     type(error_t), allocatable, intent(out) :: error
@@ -66,13 +66,13 @@ contains
 
     too_far = .false.
     do i = 1, merge(sim%n_disks(), 0, any(sim%box%periodic))
-      too_far = too_far .or. any(abs(sim%extra(i)%image) >= most_exact)         ! a frame may have to count one period more
+      too_far = too_far .or. any(abs(sim%extra(i)%image) >= most_exact)         ! a frame may have to count one more period
     end do
     if (sim%tally%events > int(most_exact, int64) .or. too_far) &
       call fail(error, exit_broken, "more than 2**53 collisions or periods: the output cannot count further")
   end subroutine check_counts
 
-  !> Step and time of an H5MD element.
+  !> The series of step and time of an H5MD element.
   pure function step_and_time(element) result(series)
     character(len=*), intent(in) :: element
     type(series_t) :: series(2)
