@@ -1,6 +1,6 @@
-!> What domains tell each other. After a window of time each compares what its copies did with what the disks did that
-!> they stand for; if no own disk can have met a wrong copy, the copies are put right. The rule, and why it is right, is
-!> in docs/theory.md.
+!> The exchange between domains. After each time window a domain compares its copies of disks with the disks themselves, which
+!> other domains own. If none of its own disks can have met a copy whose history was wrong, the copies are corrected; otherwise
+!> the window is invalid. docs/theory.md states this criterion and proves that it is sufficient.
 module domain_borders
   use kinds, only: int16, int32, int64
   use domains, only: copy_of, domain_t, forever, list_copies, news_t
@@ -12,8 +12,8 @@ module domain_borders
 
 contains
 
-  !> Finds out whether the k-th domain's own disks can have met anybody whose history was not the true one, and notes what
-  !> is to be put right. Reads what the neighbours hold.
+  !> Determines whether the own disks of the k-th domain can have met a disk with a wrong or missing history, and lists the
+  !> corrections for its copies. Reads the states of the neighbouring domains.
   subroutine compare_copies(domain, k)
     type(domain_t), intent(inout) :: domain(:)
     integer(int32), intent(in) :: k
@@ -26,15 +26,15 @@ contains
       do m = 1, size(self%neighbour)
         if (self%good) call compare(self, domain(self%neighbour(m)), found)
       end do
-      if (found < self%engine%tracks%n_copies()) self%good = .false.    ! a copy that nobody owns
+      if (found < self%engine%tracks%n_copies()) self%good = .false.    ! the owner of a copy was not found
     end associate
   end subroutine compare_copies
 
-  !> Compares with the histories of a neighbour's own disks.
+  !> Compares the copies with the disks that one neighbour owns.
   subroutine compare(self, other, found)
     type(domain_t), intent(inout) :: self
     type(domain_t), intent(in) :: other
-    integer(int32), intent(inout) :: found         !! copies whose owners have been found
+    integer(int32), intent(inout) :: found         !! number of copies whose owners have been found
     integer(int32) :: r, s, t, cell(2), shift(2)
     logical :: met, near, same
 
@@ -49,7 +49,8 @@ contains
           found = found + 1
           associate (track => mine%track(mine%track_of(s)))
             same = track%digest == theirs%track(r)%digest .and. same_state() &
-              .and. self%patch%holds(self%sim%tag(s)%cell)   ! one that left the patch was missing, wherever it is now
+              .and. self%patch%holds(self%sim%tag(s)%cell)  ! a copy that has left the patch is wrong from then on, even if it is
+                                                            ! back
             if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
             near = came_near(theirs%track(r), met)
             if (.not. met) met = mine%could_have_met(int(track%low, int32), int(track%high, int32))
@@ -66,7 +67,8 @@ contains
     end associate
   contains
 
-    !> Whether a disk that a neighbour owns came into the patch, in any image; `met`: to where it could have met an own disk.
+    !> Whether a disk of the neighbour was inside the patch during the window, in any periodic image; `met`: whether it was where it
+    !> could have met an own disk.
     function came_near(track, met) result(near)
       type(track_t), intent(in) :: track
       logical, intent(out) :: met
@@ -87,7 +89,7 @@ contains
       end do
     end function came_near
 
-    !> Whether the copy in slot s is where the neighbour's disk in slot t is, and met what it met.
+    !> Whether the copy in slot s and the neighbour's disk in slot t have the same state, last collision partner included.
     pure function same_state() result(yes)
       logical :: yes
 
@@ -97,10 +99,11 @@ contains
           .and. self%sim%tag(s)%collisions == other%sim%tag(t)%collisions .and. self%sim%tag(s)%met == other%sim%tag(t)%met
       end associate
       if (.not. yes .or. .not. allocated(self%sim%extra)) return
-      yes = all(transfer(self%sim%extra(s), [0_int64]) == transfer(other%sim%extra(t), [0_int64]))    ! whatever components
+      ! Compares all components bitwise.
+      yes = all(transfer(self%sim%extra(s), [0_int64]) == transfer(other%sim%extra(t), [0_int64]))
     end function same_state
 
-    !> Notes what is to be taken over from the neighbour's slot t.
+    !> Adds the true state of the disk in the neighbour's slot t to the list of corrections.
     subroutine note_news()
       if (.not. allocated(self%news)) allocate (self%news(256))
       if (self%n_news == size(self%news)) self%news = [self%news, self%news]
@@ -114,10 +117,10 @@ contains
     end subroutine note_news
   end subroutine compare
 
-  !> Puts the copies right by the news, takes over who came, gives up who left.
+  !> Applies the corrections: updates copies, adds those of disks that have entered the patch, removes those that have left.
   subroutine refresh(self)
     type(domain_t), intent(inout) :: self
-    integer(int32), allocatable :: waiting(:)      ! (n_waiting) slots whose events are to be predicted
+    integer(int32), allocatable :: waiting(:)      ! (n_waiting) slots whose events have to be predicted
     integer(int32) :: k, n_waiting, slot
 
     allocate (waiting(self%n_news))
@@ -140,7 +143,7 @@ contains
     self%n_news = 0
   contains
 
-    !> Takes over one piece of news.
+    !> Applies one correction.
     subroutine take_over(news)
       type(news_t), intent(in) :: news
       integer(int32) :: s, stamp, window
@@ -152,7 +155,7 @@ contains
       end if
       if (s == 0) then
         s = self%vacant
-        self%good = s > 0 .and. self%good            ! else no room: to be loaded anew
+        self%good = s > 0 .and. self%good            ! no vacant slot: the domain has to be loaded again
         if (s == 0) return
         self%vacant = self%home(s)
       else if (self%patch%holds(self%sim%tag(s)%cell)) then
@@ -171,7 +174,7 @@ contains
       waiting(n_waiting) = s
     end subroutine take_over
 
-    !> The copy in slot s leaves the patch.
+    !> Removes the copy in slot s, whose disk has left the patch.
     subroutine leave(s)
       integer(int32), intent(in) :: s
 

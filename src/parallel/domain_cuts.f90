@@ -1,5 +1,5 @@
-!> Where a simulation is cut into domains: slabs of columns of cells, each cut into rectangles, so that all hold about as
-!> many disks. Each domain's patch is its rectangle and the cells around it, as many as the halo is wide.
+!> Spatial decomposition of a simulation into domains: slabs of columns of cells, each divided into rectangles that contain about
+!> equal numbers of disks. The patch of a domain is its rectangle and the halo of cells around it.
 module domain_cuts
   use kinds, only: int16, int32, real64
   use cell_faces, only: patch_t
@@ -10,10 +10,10 @@ module domain_cuts
   type :: domain_cuts_t
     type(patch_t) :: whole
     integer(int32) :: halo = 0
-    integer(int32) :: n = 0                        !! domains
-    integer(int32), allocatable :: low(:, :), high(:, :)   !! (2,n) columns, rows of each
-    integer(int32), allocatable, private :: slab_of(:)     !! (columns)
-    integer(int32), allocatable, private :: domain_of(:, :)!! (rows,slabs)
+    integer(int32) :: n = 0                        !! number of domains
+    integer(int32), allocatable :: low(:, :), high(:, :)   !! (2,n) first and last column and row of each domain
+    integer(int32), allocatable, private :: slab_of(:)     !! (columns) slab of each column
+    integer(int32), allocatable, private :: domain_of(:, :)!! (rows,slabs) domain of each row in each slab
   contains
     procedure :: cut
     procedure :: patch_of
@@ -22,14 +22,14 @@ module domain_cuts
 
 contains
 
-  !> Cuts the box into at most `wanted` domains for some threads, none narrower than two halos.
+  !> Divides the box into at most `wanted` domains for some threads. No domain is narrower than two halos.
   subroutine cut(self, whole, periodic, cell, wanted, threads, halo)
     class(domain_cuts_t), intent(inout) :: self
     type(patch_t), intent(in) :: whole
     logical, intent(in) :: periodic(2)
-    integer(int16), intent(in) :: cell(:, :)       !! (2,disks) where they are
+    integer(int16), intent(in) :: cell(:, :)       !! (2,disks) cell of each disk
     integer(int32), intent(in) :: wanted, threads, halo
-    integer(int32), allocatable :: slab(:), piece(:)       ! first cells of the pieces, and the first beyond the last
+    integer(int32), allocatable :: slab(:), piece(:)       ! first cell of each piece; the last element is one past the end
     integer(int32), allocatable :: weight(:), weights(:, :)
     integer(int32) :: n(2), i, s, k, r
 
@@ -62,7 +62,8 @@ contains
     end do
   contains
 
-    !> How many slabs, and domains in each: not many fewer than wanted, none too narrow, and so that the work is least.
+    !> Numbers of slabs and of domains in each slab. The product is not much smaller than wanted, no domain is too narrow, and the
+    !> estimated work is smallest.
     pure function numbers() result(n)
       integer(int32) :: n(2), most(2), columns, rows
 
@@ -75,7 +76,7 @@ contains
       end do
     end function numbers
 
-    !> What one thread has to do: its number of domains times the cells in the largest patch, as if cuts were even.
+    !> Estimated work of one thread: its number of domains times the number of cells in the largest patch, for equal pieces.
     pure function work(n)
       integer(int32), intent(in) :: n(2)
       real(real64) :: work
@@ -85,8 +86,8 @@ contains
     end function work
   end subroutine cut
 
-  !> First cells of the n pieces into which a line of cells is cut, and the first beyond the last: of about equal weight,
-  !> each at least `least` cells long.
+  !> First cells of the n pieces into which a line of cells is divided; the last element is one past the end. The pieces have
+  !> about equal weight and are at least `least` cells long.
   pure function pieces(weight, n, least) result(first)
     integer(int32), intent(in) :: weight(:), n, least
     integer(int32) :: first(n + 1), k, place
@@ -126,7 +127,7 @@ contains
     call patch%find_sides(periodic)
   end function patch_of
 
-  !> The domains with disks in the patch of the k-th.
+  !> The domains that own disks in the patch of the k-th domain.
   pure function neighbours_of(self, k, patch) result(list)
     class(domain_cuts_t), intent(in) :: self
     integer(int32), intent(in) :: k

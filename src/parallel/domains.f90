@@ -1,6 +1,6 @@
-!> One domain of a simulation that several threads share: an engine of its own for the disks in a rectangle of cells and
-!> for copies of those around, up to the ends of a patch. There its world ends: who should come in is missing, and wrong
-!> histories creep inwards, until `domain_borders` puts them right.
+!> One domain of a simulation that is divided among threads. It has an engine of its own for the disks in a rectangle of cells
+!> and for copies of the disks in the halo around it; rectangle and halo form the patch. Disks that would enter the patch during
+!> a window are missing, so that wrong histories spread inwards from its edge, until `domain_borders` corrects the copies.
 module domains
   use kinds, only: int32, int64, real64
   use cell_faces, only: patch_t
@@ -18,43 +18,46 @@ module domains
   public :: copy_of, domain_t, forever, list_copies, load, merge_logs, move_on, news_t, next_time, write_back
 
   real(real64), parameter :: forever = 2.0e150_real64      !! later than any event
-  real(real64), parameter :: longest_window = 5.0_real64   !! of one domain, after which it is given up [s]
-  integer(int64), parameter :: turns_to_look = 100000      !! between two looks at signals and clock
-  integer(int32), parameter :: spare = 32, spare_at_least = 200    !! slots for disks to come: one of so many, and more
+  real(real64), parameter :: longest_window = 5.0_real64  !! longest wall time for a window of one domain, after which the window is
+                                                          !! given up [s]
+  integer(int64), parameter :: turns_to_look = 100000      !! number of iterations between two checks of signals and of the clock
+  integer(int32), parameter :: spare = 32, spare_at_least = 200  !! vacant slots for disks that enter: a fraction 1/spare of the
+                                                                 !! disks, plus spare_at_least
 
-  !> The true state of a disk of which this domain has a wrong copy, or none yet; or which has left.
+  !> Correction: the true state of a disk whose copy in this domain is wrong or missing, or has to be removed.
   type, extends(whole_disk_t) :: news_t
-    integer(int32) :: home = 0                     !! number of the disk in the whole simulation
-    integer(int32) :: cell(2) = 0                  !! in this domain's patch, or beyond its ends
-    integer(int32) :: slot = 0                     !! of the copy; 0: none
+    integer(int32) :: home = 0                     !! index of the disk in the whole simulation
+    integer(int32) :: cell(2) = 0                  !! cell relative to this domain's patch; may lie outside of it
+    integer(int32) :: slot = 0                     !! slot of the copy; 0: there is none
   end type news_t
 
   type :: domain_t
-    integer(int32) :: low(2) = 0, high(2) = 0      !! columns, rows of the whole grid that it owns
-    integer(int32) :: halo = 0                     !! columns, rows of copies beyond the domain
-    integer(int32), allocatable :: neighbour(:)    !! domains that have disks in this one's patch
+    integer(int32) :: low(2) = 0, high(2) = 0      !! columns and rows of the whole grid that the domain owns
+    integer(int32) :: halo = 0                     !! width of the halo in cells
+    integer(int32), allocatable :: neighbour(:)    !! domains that own disks in this domain's patch
     type(patch_t) :: patch
-    type(simulation_t) :: sim                      !! own disks and copies in slots, clocks since the same epoch
+    type(simulation_t) :: sim  !! own disks and copies in slots; times count from the same epoch as in the whole simulation
     type(event_driven_t) :: engine
-    integer(int32), allocatable :: home(:)         !! (slots) number of the disk in the whole simulation; or next vacant slot
-    integer(int32) :: vacant = 0                   !! the first vacant slot; 0: none
-    type(event_log_t), allocatable :: log          !! of the collisions booked here
-    integer(int64) :: turns = 0                    !! of the engine, in this window
-    logical :: done = .false.                      !! the engine came to the end of the window
+    integer(int32), allocatable :: home(:)  !! (slots) index of the disk in the whole simulation; in a vacant slot: the next vacant
+                                            !! slot
+    integer(int32) :: vacant = 0                   !! first vacant slot; 0: none
+    type(event_log_t), allocatable :: log          !! log of the collisions recorded here
+    integer(int64) :: turns = 0                    !! iterations of the engine in this window
+    logical :: done = .false.                      !! the engine has reached the end of the window
     logical :: good = .false.                      !! no own disk can have met a wrong copy
     integer(int32) :: n_news = 0
-    type(news_t), allocatable :: news(:)           !! (n_news, and room for more) to be taken over
-    integer(int32), allocatable, private :: key(:), slot(:)  !! (0:) the copies by their ids: a hash table
-    integer(int32), private :: last_key = 0        !! one less than a power of two
+    type(news_t), allocatable :: news(:)           !! (at least n_news) corrections to be applied
+    integer(int32), allocatable, private :: key(:), slot(:)  !! (0:last_key) ids and slots of the copies: a hash table
+    integer(int32), private :: last_key = 0        !! a power of two minus 1
   end type domain_t
 
 contains
 
-  !> Fills a domain with the disks that are in its patch, and predicts their events.
+  !> Loads the disks that are in the domain's patch, and predicts their events.
   subroutine load(self, sim, disks)
     type(domain_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: disks(:)         !! their numbers
+    integer(int32), intent(in) :: disks(:)         !! indices of these disks
     integer(int32) :: i, n, slots
 
     n = size(disks, kind=int32)
@@ -80,7 +83,7 @@ contains
     call start()
   contains
 
-    !> Makes slots for n disks and some more.
+    !> Allocates slots for n disks and some vacant ones.
     subroutine make_room()
       integer(int32) :: slots
 
@@ -101,7 +104,7 @@ contains
       call self%sim%make_room(slots, like=sim)
     end subroutine make_room
 
-    !> Builds cells and queue for the first n slots.
+    !> Sets up the cells and the event queue for the first n slots.
     subroutine start()
       logical :: cut_low(2), cut_high(2)
       integer(int32) :: k
@@ -135,7 +138,7 @@ contains
     end subroutine start
   end subroutine load
 
-  !> Lists the copies by their ids.
+  !> Builds the hash table that finds copies by their ids.
   subroutine list_copies(self)
     type(domain_t), intent(inout) :: self
     integer(int32) :: k, place, copies
@@ -160,7 +163,7 @@ contains
     end do
   end subroutine list_copies
 
-  !> Where a copy is, or would be, in the table.
+  !> Position of an id in the hash table, or the free position where it would be stored.
   pure function place_of(self, id) result(place)
     type(domain_t), intent(in) :: self
     integer(int32), intent(in) :: id
@@ -172,7 +175,7 @@ contains
     end do
   end function place_of
 
-  !> The slot of the copy with an id; 0: there is none.
+  !> The slot of the copy with the given id; 0 if there is none.
   pure function copy_of(self, id) result(slot)
     type(domain_t), intent(in) :: self
     integer(int32), intent(in) :: id
@@ -183,11 +186,11 @@ contains
     if (self%key(place) == id) slot = self%slot(place)
   end function copy_of
 
-  !> Follows the domain, copies and all, to the end of a window; gives up after so many turns of the engine, or too long
-  !> a time.
+  !> Advances the domain with its copies to the end of a window. Gives up after the given number of iterations of the engine, or
+  !> after `longest_window`.
   subroutine move_on(self, t_end, turns)
     type(domain_t), intent(inout) :: self
-    real(real64), intent(in) :: t_end              !! since the epoch [time]
+    real(real64), intent(in) :: t_end              !! end of the window, since the epoch [time]
     integer(int64), intent(in) :: turns
     type(limits_t) :: limits
     type(error_t), allocatable :: error
@@ -195,7 +198,7 @@ contains
     integer(int64) :: left
 
     self%done = .false.
-    if (.not. self%good) return                    ! there was no room for all copies
+    if (.not. self%good) return                    ! there was no slot for all copies
     began = seconds()
     limits%time = t_end
     left = turns
@@ -212,7 +215,7 @@ contains
     self%turns = self%turns + turns - left
   end subroutine move_on
 
-  !> When its next event is due.
+  !> Time of the next event in the domain.
   function next_time(self) result(t)
     type(domain_t), intent(inout) :: self
     real(real64) :: t                              !! since the epoch [time]
@@ -222,7 +225,7 @@ contains
     t = self%sim%disk(i)%event_time
   end function next_time
 
-  !> Writes the states of the own disks back into the whole simulation.
+  !> Copies the states of the own disks to the whole simulation.
   subroutine write_back(self, sim)
     type(domain_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim
@@ -234,8 +237,8 @@ contains
     end do
   end subroutine write_back
 
-  !> Moves what all domains have logged to the log of the whole, in the order of time. Of simultaneous collisions in
-  !> different domains nobody knows which comes first: then it is not good.
+  !> Moves the log entries of all domains to the log of the whole simulation, sorted by time. The order of simultaneous
+  !> collisions in different domains is unknown; if there are any, `good` is .false.
   subroutine merge_logs(domain, log, good)
     type(domain_t), intent(inout) :: domain(:)
     type(event_log_t), intent(inout) :: log

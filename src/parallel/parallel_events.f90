@@ -1,8 +1,8 @@
-!> Event-driven dynamics on several cores, or on one whose cache takes in a part of the disks at a time, with every
-!> bit of the plain engine. Space is cut into domains; each has an engine of its own, and they compare at the end of
-!> every window of time (see `partition`, `domains`). If a window does not hold, all go back to the state in which they
-!> set out. What is rare and awkward is left to the plain engine: small or idle systems, a moment within simultaneous
-!> collisions, a collapse.
+!> Parallel event-driven dynamics: on several cores, or on one core with domains that fit into its cache. The results are
+!> bit-identical to those of the serial engine. The box is divided into domains, each with its own engine; after each time
+!> window the domains are compared (see `partition` and `domains`). If a window turns out to be invalid, all domains are rolled
+!> back to the state before the visit. Rare and difficult situations are left to the serial engine: small or inactive systems,
+!> a stop within simultaneous collisions, and inelastic collapse.
 module parallel_events
   use kinds, only: int32, int64, real64
   use domains, only: merge_logs
@@ -17,30 +17,32 @@ module parallel_events
   private
   public :: parallel_events_t
 
-  integer, parameter :: most_windows = 24                      !! of a visit
-  real(real64), parameter :: shortest = 0.1_real64             !! window to be tried, in usual ones
-  !> Events per disk that are to come before a count is at its limit, for several domains to go on, or to begin.
+  integer, parameter :: most_windows = 24                      !! largest number of windows in a visit
+  real(real64), parameter :: shortest = 0.1_real64             !! shortest window that is tried, relative to the normal one
+  !> Numbers of events per disk that must remain before a stop or pause at a count, for domains to continue and to begin.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
-  ! Shortest and longest spell of the plain engine [events per disk].
-  integer(int64), parameter :: moment(2) = 5                        !! to pass what domains cannot
-  integer(int64), parameter :: failing(2) = [5, 5*2**20]            !! while windows do not hold
-  integer(int64), parameter :: busy(2) = [50, 1600]                 !! while cores are busy
+  ! Shortest and longest periods of the serial engine [events per disk]:
+  integer(int64), parameter :: moment(2) = 5                        !! to pass a situation that domains cannot handle
+  integer(int64), parameter :: failing(2) = [5, 5*2**20]            !! while windows are invalid
+  integer(int64), parameter :: busy(2) = [50, 1600]                 !! while the cores are busy with other programs
 
-  !> Who has predicted the events.
+  !> The engine that has predicted the events.
   integer, parameter :: nobody = 0, plain_engine = 1, all_domains = 2
 
   type, extends(evolution_t) :: parallel_events_t
-    type(event_driven_t) :: plain                  !! an engine for all that is not worth more; it is copied to run
+    type(event_driven_t) :: plain                  !! initial state of the serial engine, which is copied to use it
     type(partition_t) :: parts
-    integer(int32) :: least_disks = 1250           !! of a domain; twice as many in a periodic box, which has twice as many cuts
-    integer(int32) :: most_disks = 62000           !! likewise, if it is to fit into caches
-    real(real64) :: least_cores = 1.25_real64      !! that several threads must have had of late: else one is faster
+    integer(int32) :: least_disks = 1250  !! smallest number of disks in a domain; doubled in a periodic box, which is cut at twice
+                                          !! as many places
+    integer(int32) :: most_disks = 62000           !! largest number of disks in a domain that fits into the cache
+    real(real64) :: least_cores = 1.25_real64  !! average number of cores below which the serial engine is faster than several
+                                               !! threads
     integer(int64) :: windows_done = 0, windows_failed = 0
-    ! To save memory this engine is there only while there are no domains.
-    type(event_driven_t), allocatable, private :: engine   !! the plain one at work
-    integer, private :: holder = nobody            !! of the events predicted
-    integer(int64), private :: spell = 0           !! of the plain engine, the last time [events per disk]
-    integer(int64), private :: plain_until = -1    !! number of events up to which the plain engine goes on
+    ! The serial engine exists only while there are no domains, to save memory.
+    type(event_driven_t), allocatable, private :: engine   !! the serial engine in use
+    integer, private :: holder = nobody            !! engine that holds the predicted events
+    integer(int64), private :: spell = 0           !! last period of the serial engine [events per disk]
+    integer(int64), private :: plain_until = -1    !! number of events up to which the serial engine is used
   contains
     procedure :: start
     procedure :: renew
@@ -50,7 +52,7 @@ module parallel_events
 
 contains
 
-  !> Events are predicted when it is clear by whom.
+  !> Prepares a run. Events are not predicted before it is clear which engine will execute them.
   subroutine start(self, sim)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -67,7 +69,7 @@ contains
     if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
   end subroutine start
 
-  !> Only the plain engine can go on with its events; domains are filled again.
+  !> Updates the events after changes to disks. Only the serial engine can do this; domains are loaded again.
   subroutine renew(self, sim, changed)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -81,7 +83,7 @@ contains
     end if
   end subroutine renew
 
-  !> How many domains are worth their copies, and so how many threads find something to do.
+  !> Number of domains that justifies the cost of their copies; this is also the number of threads that can be used.
   pure function most_domains(self, n_disks, periodic) result(n)
     class(parallel_events_t), intent(in) :: self
     integer(int32), intent(in) :: n_disks
@@ -91,14 +93,14 @@ contains
     n = n_disks/(self%least_disks*merge(2, 1, all(periodic)))
   end function most_domains
 
-  !> Goes on to a limit, or for as long as the caller can wait.
+  !> Advances the simulation up to a limit, or for about the time that a caller can wait.
   subroutine advance(self, sim, limits, error, log)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
     type(event_log_t), intent(inout), optional :: log
-    logical :: plainly                             ! the plain engine goes on
+    logical :: plainly                             ! the serial engine is used
 
     self%arrived = .false.
     if (limits%reached(sim%tally) .or. is_full(log)) return
@@ -107,12 +109,12 @@ contains
     if (plainly) call advance_plainly()
     if (self%parts%wanted > self%parts%threads .and. allocated(self%parts%domain) .and. &
       (sim%now >= sim%epoch_end .or. sim%tally%events >= most_events(sim))) then
-      deallocate (self%parts%domain)               ! to leave room for sorting many
+      deallocate (self%parts%domain)               ! to leave memory for sorting the disks
       self%holder = nobody
     end if
   contains
 
-    !> Whether several domains can be faster than the plain engine.
+    !> Whether several domains can be faster than the serial engine.
     pure function worthwhile() result(yes)
       logical :: yes
       real(real64) :: least
@@ -122,8 +124,8 @@ contains
         .and. limits%collisions - sim%tally%collisions > least .and. limits%time > sim%now
     end function worthwhile
 
-    !> Lets the domains move on by some windows of time. If one of them does not hold the state stays as it was, and shorter
-    !> windows are tried the next time.
+    !> Advances the domains by several windows. If one of these is invalid, the simulation keeps its state from before, and the
+    !> next visit tries shorter windows.
     subroutine visit()
       real(real64) :: t
       integer :: windows, listed
@@ -144,7 +146,7 @@ contains
         listed = log%n
         if (good) call merge_logs(self%parts%domain, log, good)
       end if
-      ! The plain engine finds the very event at which a count is at its limit, or a collapse.
+      ! The serial engine finds the exact event at which a count reaches its limit or a collapse occurs.
       too_far = good
       if (good) too_far = limits%outgrown(self%parts%tally_now(sim)) .or. t - sim%last_advance < sim%blink
       if (good .and. .not. too_far) then
@@ -162,28 +164,28 @@ contains
         call retire(busy)
         self%parts%cores = self%parts%threads
       end if
-      ! The plain engine finds out whether nothing happens in the whole.
+      ! The serial engine determines whether no event will occur any more.
       if (all(self%parts%domain%engine%idle)) call retire(moment)
     end subroutine visit
 
-    !> The number of windows that a failure may discard. It decreases with the number of recent failures.
+    !> Number of windows in a visit, all of which an invalid one discards. It decreases with the number of recent failures.
     pure function windows_of_visit() result(n)
       integer :: n
 
       n = max(1, int(most_windows*self%parts%shortening**4))
     end function windows_of_visit
 
-    !> Makes windows longer after a visit in which all held. Within a visit they stay as they are: windows that the next
-    !> failure throws away could otherwise make up for each halving, for ever.
+    !> Makes windows longer after a visit in which all were valid. Within a visit their length is constant. Otherwise windows that
+    !> are later discarded could compensate each halving, and the run would make no progress.
     subroutine lengthen_windows(windows)
-      integer, intent(in) :: windows               !! of the visit
+      integer, intent(in) :: windows               !! number of windows in the visit
 
       associate (shortening => self%parts%shortening)
         shortening = min(1.0_real64, 1.1_real64**windows*shortening)
       end associate
     end subroutine lengthen_windows
 
-    !> Makes windows shorter after one that did not hold. If that does not help the plain engine takes over.
+    !> Makes windows shorter after an invalid one. If they are already shortest, the serial engine is used for a while.
     subroutine shorten_windows()
       self%windows_failed = self%windows_failed + 1
       associate (shortening => self%parts%shortening)
@@ -194,10 +196,10 @@ contains
       call retire(failing)
     end subroutine shorten_windows
 
-    !> Leaves the run to the plain engine for a spell: twice as long as the last one, unless domains have gone on for longer
-    !> than that since. So a run that does not suit domains costs hardly more than with the plain engine alone.
+    !> Selects the serial engine for a period: twice the last one, unless domains have been successful for longer than that
+    !> since. A run for which domains are unsuitable therefore costs hardly more than with the serial engine alone.
     subroutine retire(spells)
-      integer(int64), intent(in) :: spells(2)      !! the shortest and the longest [events per disk]
+      integer(int64), intent(in) :: spells(2)      !! shortest and longest period [events per disk]
 
       if (sim%tally%events - self%plain_until > self%spell*sim%n_disks()) self%spell = 0
       self%spell = min(max(2*self%spell, spells(1)), spells(2))
@@ -205,7 +207,7 @@ contains
       plainly = .true.
     end subroutine retire
 
-    !> Lets the plain engine go on for a while: where domains are to be tried again, to the end of its spell.
+    !> Advances the serial engine, at most to the end of its period.
     subroutine advance_plainly()
       type(limits_t) :: goal
       integer(int64) :: events

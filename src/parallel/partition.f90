@@ -1,6 +1,6 @@
-!> A simulation cut into domains, which move on together by windows of time. The events predicted are theirs; the
-!> simulation itself stays as it was until their states are written back. If a window does not hold, they are worth nothing
-!> any more and have to be filled again.
+!> A simulation that is divided into domains, which advance together by time windows. The predicted events belong to the domains;
+!> the simulation itself keeps its old state until the states of the domains are written back. After an invalid window the
+!> domains are useless and have to be loaded again.
 module partition
   use kinds, only: int16, int32, int64, real64
   use cell_faces, only: patch_t
@@ -18,38 +18,39 @@ module partition
   private
   public :: partition_t
 
-  real(real64), parameter :: longest_visit = 1.0_real64        !! until the caller can look at signals and clocks [s]
-  real(real64), parameter :: of_late = 0.1_real64              !! [s]
-  real(real64), parameter :: few_events = 20.0_real64          !! before a limit, to be taken moment by moment
+  real(real64), parameter :: longest_visit = 1.0_real64        !! time after which the caller can check signals and clocks [s]
+  real(real64), parameter :: of_late = 0.1_real64              !! averaging time for the number of active cores [s]
+  real(real64), parameter :: few_events = 20.0_real64  !! number of events before a limit below which domains advance event by event
 
-  !> What all threads do next: one of them decides while the others wait.
+  !> The next step of all threads. One thread decides on it while the others wait.
   type :: plan_t
     logical :: goes_on = .true.
-    integer :: windows = 0                         !! begun
-    real(real64) :: until = 0.0_real64             !! by the clock, for another to begin [s]
-    real(real64) :: t_begin = 0.0_real64, t_end = 0.0_real64   !! of the window, since the epoch [time]
-    integer(int64) :: events = 0                   !! in the domains when it began
-    logical :: begins = .false.                    !! domains take over what came of the window before
-    real(real64) :: t = 0.0_real64                 !! to which domains go on, since the epoch [time]
-    integer(int64) :: turns = 0                    !! of an engine, at most, on the way
-    logical :: compares = .false.                  !! domains are where the window ends
-    logical :: good = .true.                       !! the window holds
+    integer :: windows = 0                         !! number of windows begun
+    real(real64) :: until = 0.0_real64             !! wall-clock time after which no further window begins [s]
+    real(real64) :: t_begin = 0.0_real64, t_end = 0.0_real64   !! beginning and end of the window, since the epoch [time]
+    integer(int64) :: events = 0                   !! number of events in the domains at its beginning
+    logical :: begins = .false.                    !! domains apply the corrections of the previous window first
+    real(real64) :: t = 0.0_real64                 !! time up to which domains advance, since the epoch [time]
+    integer(int64) :: turns = 0                    !! largest number of iterations of an engine in this step
+    logical :: compares = .false.                  !! domains are compared, because the window has ended
+    logical :: good = .true.                       !! the window is valid
   end type plan_t
 
   type :: partition_t
     integer(int32) :: threads = 1
-    integer(int32) :: wanted = 1                   !! domains
-    real(real64) :: window = 0.5_real64            !! collisions per disk in a window
-    integer(int32) :: halo = 6                     !! columns and rows of copies around a domain
-    real(real64) :: overload = 4.0_real64          !! turns of an engine in a window, over what all should need together
-    type(patch_t) :: whole                         !! the cells of the box; they follow from what does not change in a run
+    integer(int32) :: wanted = 1                   !! number of domains
+    real(real64) :: window = 0.5_real64            !! length of a window [collisions per disk]
+    integer(int32) :: halo = 6                     !! width of the halo around a domain [cells]
+    real(real64) :: overload = 4.0_real64  !! limit of the iterations of one engine in a step, relative to the number expected in
+                                           !! all domains
+    type(patch_t) :: whole                         !! the cells of the box, which are constant during a run
     type(domain_cuts_t) :: cuts
     type(domain_t), allocatable :: domain(:)
-    real(real64) :: pace = 0.0_real64              !! events per time; 0: not known yet [1/time]
-    real(real64) :: turns_per_event = 10.0_real64  !! of engines
-    real(real64) :: shortening = 1.0_real64        !! of windows, after failures
-    integer(int32) :: widening = 0                 !! of the halo, after failures
-    real(real64) :: cores = 0.0_real64             !! that have been at work of late, on average; 0: not known yet
+    real(real64) :: pace = 0.0_real64              !! event rate; 0: not known yet [1/time]
+    real(real64) :: turns_per_event = 10.0_real64  !! iterations of an engine per event
+    real(real64) :: shortening = 1.0_real64        !! factor by which windows are shortened after failures
+    integer(int32) :: widening = 0                 !! widening of the halo after failures [cells]
+    real(real64) :: cores = 0.0_real64             !! number of cores used recently, on average; 0: not known yet
   contains
     procedure :: fill
     procedure :: run_windows
@@ -60,11 +61,11 @@ module partition
 
 contains
 
-  !> Cuts a simulation and fills the domains. `cut`: it could be cut into several.
+  !> Divides a simulation and loads the domains. `cut` is .false. if it cannot be divided into at least two.
   subroutine fill(self, sim, listing, cut)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    logical, intent(in) :: listing                 !! collisions are to be listed
+    logical, intent(in) :: listing                 !! collisions are logged
     logical, intent(out) :: cut
     integer(int16), allocatable :: cell(:, :)
     integer(int32) :: i, k
@@ -100,7 +101,7 @@ contains
     !$omp end parallel do
   end subroutine fill
 
-  !> Learns how fast things happen, from which the length of windows follows, from what has happened in a time.
+  !> Updates the event rate and the iterations per event, which determine the length of windows, from a measurement.
   pure subroutine learn(self, events, turns, time)
     class(partition_t), intent(inout) :: self
     integer(int64), intent(in) :: events, turns
@@ -111,7 +112,7 @@ contains
     self%turns_per_event = max(turns/real(events, real64), 1.0_real64)
   end subroutine learn
 
-  !> What collisions have gathered, those in the domains since they were filled included.
+  !> The sums and counters of all collisions, including those in the domains since they were loaded.
   pure function tally_now(self, sim) result(so_far)
     class(partition_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -124,18 +125,18 @@ contains
     end do
   end function tally_now
 
-  !> Runs windows in all domains, one after the other, for as long as they hold, until a limit is reached or the caller has
-  !> waited long enough. A window ends early at the limit of a count. `good`: all of them hold.
+  !> Runs successive windows in all domains while they are valid, until a limit is reached or the caller has waited long
+  !> enough. A window ends early at the limit of a count. `good` is .true. if all windows are valid.
   !>
-  !> A thread waits for the others twice in each window: before it compares what they hold, and before it changes what
-  !> they compare.
+  !> The threads synchronise twice in each window: before the domains are compared, and before the states used in the comparison
+  !> are changed.
   subroutine run_windows(self, sim, limits, most, t, windows, good)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(limits_t), intent(in) :: limits
-    integer, intent(in) :: most                    !! windows
-    real(real64), intent(out) :: t                 !! where they end, since the epoch [time]
-    integer, intent(out) :: windows                !! begun
+    integer, intent(in) :: most                    !! largest number of windows
+    real(real64), intent(out) :: t                 !! end of the last window, since the epoch [time]
+    integer, intent(out) :: windows                !! number of windows begun
     logical, intent(out) :: good
     type(plan_t) :: plan
     type(barrier_t) :: barrier
@@ -188,12 +189,12 @@ contains
     good = plan%good
   contains
 
-    !> Plans the window that begins now.
+    !> Sets up the next window.
     subroutine begin_window()
       real(real64) :: length
 
       length = self%window*self%shortening*sim%n_disks()/(2*self%pace)
-      if (self%wanted > self%threads) length = 2*length      ! a cache takes in each domain once in a window
+      if (self%wanted > self%threads) length = 2*length      ! each window loads each domain into the cache once
       plan%windows = plan%windows + 1
       plan%t_begin = plan%t
       plan%t_end = plan%t + length
@@ -204,13 +205,14 @@ contains
       call aim()
     end subroutine begin_window
 
-    !> Where all domains go next: to the end of the window unless a count would pass its limit, then most of the way there,
-    !> and at last to the next event of any of them. However wrong the guess of the pace, no engine takes more than some turns.
+    !> Chooses the time up to which all domains advance next. This is the end of the window, unless a count would exceed its limit.
+    !> In that case it is most of the way to the limit and finally the next event of any domain. The number of iterations of each
+    !> engine is bounded, however wrong the estimated event rate is.
     subroutine aim()
       real(real64) :: expected, sure, next
       integer(int32) :: k
 
-      expected = 1.2_real64*(plan%t_end - plan%t)*self%pace + 100      ! generously
+      expected = 1.2_real64*(plan%t_end - plan%t)*self%pace + 100      ! overestimated
       plan%turns = int(min(self%overload*self%turns_per_event*expected, 1.0e15_real64), int64)
       sure = left()
       next = plan%t_end
@@ -227,9 +229,10 @@ contains
       plan%t = min(next, plan%t_end)
     end subroutine aim
 
-    !> Whether the window that has been compared holds, and whether another one begins.
+    !> Decides after the comparison whether the window is valid, and whether another one begins.
     subroutine end_window()
-      plan%good = all(self%domain%done) .and. all(self%domain%good) .and. left() >= 0    ! else several at the last moment
+      ! With left() < 0 simultaneous events have exceeded the limit.
+      plan%good = all(self%domain%done) .and. all(self%domain%good) .and. left() >= 0
       if (plan%good) then
         call self%learn(sum(self%domain%sim%tally%events) - plan%events, sum(self%domain%turns), plan%t - plan%t_begin)
       else
@@ -240,7 +243,7 @@ contains
       if (plan%goes_on) call begin_window()
     end subroutine end_window
 
-    !> Events that may still come before a count is at its limit.
+    !> Number of events before a count reaches its limit.
     pure function left() result(events)
       real(real64) :: events
 
@@ -249,7 +252,7 @@ contains
     end function left
   end subroutine run_windows
 
-  !> Brings the whole simulation to the present; the domains go on from there.
+  !> Copies the present states of the domains to the whole simulation; the domains can continue from there.
   subroutine write_back_all(self, sim, now)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
