@@ -1,7 +1,7 @@
-!> Dense random packings: disks start small, move as an elastic gas, and grow to their full size (the idea of Lubachevsky
-!> and Stillinger, J. Stat. Phys. 60, 561 (1990)). Here they grow in jumps between short runs, each disk into the gap
-!> around it at that moment, so that the event-driven dynamics serves unchanged. They may also start from given places, as
-!> large as these allow.
+!> Dense random packings by compression: disks start small, move as an elastic gas, and grow to their full size (after
+!> Lubachevsky and Stillinger, J. Stat. Phys. 60, 561 (1990)). The original algorithm grows the disks continuously. Here they grow
+!> in steps between short runs at constant size, each disk into the gap around it, so that the ordinary event-driven dynamics can
+!> be used. The disks can also start at given positions, with the largest size that these allow.
 module dense_growth
   use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t, obstacle_gap
@@ -21,25 +21,27 @@ module dense_growth
   private
   public :: grow_disks, smallest_scale
 
-  real(real64), parameter :: loose = 0.4_real64         !! packing at which the disks are scattered
-  real(real64), parameter :: lead = 1.02_real64         !! of any disk over the smallest, at most
-  real(real64), parameter :: caution = 0.9_real64       !! part of the gap to take
-  real(real64), parameter :: smallest_scale = 1.0e-3_real64       !! to begin with
-  integer, parameter :: approaches = 6                  !! to this scale: each leaves a tenth of the gap
-  integer, parameter :: run_length = 2                  !! collisions per disk between jumps
+  real(real64), parameter :: loose = 0.4_real64         !! packing fraction at which the disks are inserted
+  real(real64), parameter :: lead = 1.02_real64  !! largest factor by which a disk may be ahead of the smallest one, relative to
+                                                 !! their full sizes
+  real(real64), parameter :: caution = 0.9_real64       !! fraction of the gap by which a disk grows
+  real(real64), parameter :: smallest_scale = 1.0e-3_real64       !! smallest initial size, relative to the full size
+  integer, parameter :: approaches = 6                  !! growth steps at given positions; each leaves a tenth of the gap
+  integer, parameter :: run_length = 2                  !! collisions per disk between growth steps
   integer, parameter :: mixing_length = 10              !! collisions per disk at full size
-  integer, parameter :: jumps_per_check = 50            !! in which a tenth of what is lacking must be gained
+  integer, parameter :: jumps_per_check = 50            !! number of steps in which the missing size must decrease by a tenth
 
 contains
 
-  !> Places disks of several species, side by side, in a box.
+  !> Finds positions for all disks of several species in a box.
   subroutine grow_disks(box, species, full, stream, line, x, error)
-    type(box_t), intent(in) :: box                      !! with its obstacles; gravity is not felt
+    type(box_t), intent(in) :: box                      !! box with its obstacles; its gravity and shear are ignored
     type(species_t), intent(in) :: species(:)
-    real(real64), intent(in) :: full(:)                 !! (n) radii to reach, species by species [length]
+    real(real64), intent(in) :: full(:)                 !! (n) radii to be reached, in the order of species [length]
     type(random_stream_t), intent(inout) :: stream
-    class(status_line_t), intent(inout) :: line         !! shows how far it is
-    real(real64), allocatable, intent(inout) :: x(:, :) !! (2,n) species by species; in: where to start, or none [length]
+    class(status_line_t), intent(inout) :: line         !! shows the progress
+    real(real64), allocatable, intent(inout) :: x(:, :) !! (2,n) positions in the order of species; in: where to start, or (2,0) for
+                                                        !! random positions [length]
     type(error_t), allocatable, intent(out) :: error
     type(simulation_t) :: sim                           ! elastic disks
     type(event_driven_t), allocatable :: evolution
@@ -84,7 +86,7 @@ contains
 
   contains
 
-    !> Reports the packing that was reached.
+    !> Reports the packing fraction that was reached.
     subroutine fail_to_grow()
       real(real64) :: reached, wanted
       character(len=:), allocatable :: advice
@@ -97,7 +99,7 @@ contains
         //"; "//advice)
     end subroutine fail_to_grow
 
-    !> Starts at given places, all disks at the largest scale for which there is room, with random velocities.
+    !> Starts at given positions with random velocities. All disks have the largest common relative size that fits.
     subroutine begin_at_places()
       real(real64) :: scale
       integer :: k
@@ -115,7 +117,7 @@ contains
       if (scale <= smallest_scale) call fail_to_grow()
     end subroutine begin_at_places
 
-    !> Starts with small disks at random places, with random velocities.
+    !> Starts with small disks at random positions, with random velocities.
     subroutine scatter()
       type(packing_t) :: packing
       real(real64) :: scale, wanted
@@ -125,7 +127,7 @@ contains
       wanted = 0
       do k = 1, size(species)
         associate (own => full(disks_before(species, k) + 1:disks_before(species, k + 1)))
-          wanted = wanted + own(1)**2*sum((own/own(1))**2)      ! of equal disks their number, exactly
+          wanted = wanted + own(1)**2*sum((own/own(1))**2)      ! exactly the number of disks if all radii are equal
         end associate
       end do
       wanted = pi*wanted/product(sim%box%edges())
@@ -146,10 +148,10 @@ contains
       end do
     end subroutine scatter
 
-    !> Inserts all disks at random places, the largest first.
+    !> Inserts all disks at random positions, the largest first.
     subroutine fill(packing, radius, complete)
       type(packing_t), intent(out) :: packing
-      real(real64), intent(in) :: radius(:)             !! (n) of each disk [length]
+      real(real64), intent(in) :: radius(:)             !! (n) radius of each disk [length]
       logical, intent(out) :: complete
       logical :: waiting(size(species))
       real(real64) :: inset(2), largest(size(species))
@@ -171,29 +173,29 @@ contains
       end do
     end subroutine fill
 
-    !> Moves the disks for some collisions per disk and brings all of them to the present.
+    !> Advances all disks by some collisions per disk and brings their positions to the present time.
     subroutine move(length)
       integer, intent(in) :: length                     !! collisions per disk
       type(limits_t) :: limits
-      integer(int64) :: to_come                         ! collisions per disk, times disks
+      integer(int64) :: to_come                         ! collisions per disk, times the number of disks
 
       call evolution%start(sim)
       to_come = int(length, int64)*sim%n_disks()
       limits%collisions = sim%tally%collisions + (to_come + 1)/2
-      limits%events = sim%tally%events + 4*to_come            ! one may rattle in a hole between obstacles
-      limits%time = sim%time() + maxval(sim%box%edges())      ! few disks may never collide
+      limits%events = sim%tally%events + 4*to_come            ! in case a disk is trapped in a gap between obstacles
+      limits%time = sim%time() + maxval(sim%box%edges())      ! in case the disks never collide
       call advance(evolution, sim, limits, error)
       do i = 1, sim%n_disks()
         sim%disk(i)%x = sim%position(i)
         sim%disk(i)%clock = sim%now
-        sim%tag(i)%met = 0                              ! neighbours grow towards each other
+        sim%tag(i)%met = 0                              ! the gap to the last partner may have closed by growth
       end do
     end subroutine move
 
-    !> Grows every disk into the gap around it, up to the scale `cap`. Neighbours share a gap so that both reach the same
-    !> scale, unless one is larger already.
+    !> Grows each disk into the gap around it, up to the relative size `cap`. Two neighbours share the gap between them in
+    !> proportion to their full sizes, unless one of them is already larger than that.
     subroutine grow(cap)
-      real(real64), intent(in) :: cap                   !! part of the full size
+      real(real64), intent(in) :: cap                   !! largest size relative to the full size
       type(packing_t) :: packing
       real(real64), allocatable :: scale(:)
       real(real64) :: room, distance, shared
@@ -234,7 +236,7 @@ contains
     end subroutine grow
   end subroutine grow_disks
 
-  !> Distance from a point to the nearest wall or obstacle, `never` if there is none.
+  !> Distance from a point to the nearest side or obstacle; `never` if there is none.
   pure function wall_distance(box, x) result(distance)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: x(2)                    !! [length]

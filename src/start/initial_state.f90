@@ -1,4 +1,4 @@
-!> The state at the start: the system of the input, with every disk placed and its velocity drawn.
+!> The initial state: creates the simulation of an input with all disks at their initial positions and velocities.
 module initial_state
   use kinds, only: int32, real64
   use drive, only: active
@@ -16,15 +16,15 @@ module initial_state
   private
   public :: check_speeds, create_simulation, describe_system
 
-  real(real64), parameter :: most = 1.0e130_real64          !! of what is squared later: 1e308 is the limit of numbers
-  real(real64), parameter :: widest = 1.0e30_real64*(1 + 1.0e-12_real64)   !! ratio of masses
+  real(real64), parameter :: most = 1.0e130_real64          !! largest number that may be squared later; reals end at 1e308
+  real(real64), parameter :: widest = 1.0e30_real64*(1 + 1.0e-12_real64)   !! largest ratio of masses
 
 contains
 
-  !> Builds the simulation that the input describes. What files had of the disks is gone afterwards.
+  !> Builds the simulation that the input describes. Tables of disks that were read from files are deallocated.
   subroutine create_simulation(input, line, sim, error)
     type(run_input_t), intent(inout) :: input
-    class(status_line_t), intent(inout) :: line             !! shows how far the placement is
+    class(status_line_t), intent(inout) :: line             !! shows the progress of the placement
     type(simulation_t), intent(out) :: sim
     type(error_t), allocatable, intent(out) :: error
     type(problem_list_t) :: problems
@@ -43,8 +43,8 @@ contains
     call problems%report(input%path, error, input%overrides)
   end subroutine create_simulation
 
-  !> Refuses a simulation in which a product of lengths, speeds and masses, of those that decide when and how disks collide,
-  !> cannot be represented: disks would fly through each other.
+  !> Refuses a simulation in which a product of lengths, speeds and masses that enters the prediction or execution of collisions
+  !> would overflow or underflow, because collisions would then be missed.
   subroutine check_speeds(sim, problems)
     type(simulation_t), intent(in) :: sim
     type(problem_list_t), intent(inout) :: problems
@@ -73,7 +73,7 @@ contains
     end if
   end subroutine check_speeds
 
-  !> All but the disks.
+  !> Sets everything except the disks.
   subroutine describe_system(settings, sim)
     type(settings_t), intent(in) :: settings
     type(simulation_t), intent(inout) :: sim

@@ -1,5 +1,5 @@
-!> Whether the system of an input fits together: obstacles and regions in the box, and disks in their regions. What is wrong
-!> is reported with the line of the input.
+!> Checks whether the system of an input fits together: obstacles and regions inside the box, and disks inside their regions.
+!> Problems are reported with the line of the input.
 module input_fit
   use kinds, only: int32, int64, pi, real64
   use box_geometry, only: box_t
@@ -23,19 +23,19 @@ module input_fit
   private
   public :: check_fit, complain_of_file, complete_settings
 
-  real(real64), parameter, public :: rounding = 1.0e-12_real64        !! relative, of disks that touch
-  real(real64), parameter :: random_limit = 0.547_real64      !! random sequential addition jams
+  real(real64), parameter, public :: rounding = 1.0e-12_real64        !! relative tolerance for disks that touch
+  real(real64), parameter :: random_limit = 0.547_real64      !! saturation of random sequential addition
   real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! triangular lattice
 
 contains
 
-  !> Completes the settings with what the input leaves to starting files and to drawn radii, and chooses the features of
+  !> Completes the settings with values from starting files and with drawn radii, and selects the features of
   !> the run.
   subroutine complete_settings(settings, groups, problems, complete)
     type(settings_t), intent(inout) :: settings
     type(group_t), intent(inout) :: groups(:)
-    type(problem_list_t), intent(inout) :: problems           !! files that cannot be read, too little memory
-    logical, intent(out) :: complete                          !! .false.: the disks are too many, or the box is none
+    type(problem_list_t), intent(inout) :: problems           !! unreadable files and lack of memory are added
+    logical, intent(out) :: complete                          !! .false. if there are too many disks, or if the box is invalid
     integer :: s(2), k, before
 
     complete = .false.
@@ -45,7 +45,7 @@ contains
       call survey_file(settings%species, k, settings%box, groups(s(1) + k - 1), problems)
     end do
     call settings%choose_features()
-    if (settings%n_disks() > most_disks) return               ! told already
+    if (settings%n_disks() > most_disks) return               ! reported elsewhere
     before = problems%count
     call check_memory(settings, problems)
     if (problems%count > before) return
@@ -55,21 +55,21 @@ contains
     complete = .true.
   end subroutine complete_settings
 
-  !> Checks complete settings: obstacles in the box, and every species that is known well enough; the others have been
-  !> reported already.
+  !> Checks completed settings: obstacles in the box, and all species whose number and size are known. Problems of other
+  !> species have been reported before.
   subroutine check_fit(settings, groups, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
-    character(len=:), allocatable :: misfit                   ! variable: what
+    character(len=:), allocatable :: misfit                   ! name of the variable and problem, separated by ": "
     real(real64) :: beyond(2, 2)
     integer :: o(2), s(2), k
 
     o = range_of(groups, obstacle_groups)
     s = range_of(groups, ["species"])
     associate (box => settings%box, species => settings%species)
-      beyond = box%reach()                                    ! of sides that move
-      do k = 1, box%n_obstacles()                             ! obstacles say themselves what is wrong with their places
+      beyond = box%reach()                                    ! range beyond the box that moving sides reach
+      do k = 1, box%n_obstacles()                             ! each shape checks its own position
         misfit = box%obstacle(k)%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
         if (misfit /= "") call complain_of_obstacle(box, k, groups(o(1) + box%obstacle(k)%surface - n_sides - 1), misfit, &
           problems)
@@ -82,17 +82,17 @@ contains
     end associate
   end subroutine check_fit
 
-  !> Reports what is wrong with the place of an obstacle: of those of a file the line, of a polyline the part.
+  !> Reports an invalid position of an obstacle, with the line of its file or the point of its polyline.
   subroutine complain_of_obstacle(box, m, group, misfit, problems)
     type(box_t), intent(in) :: box
-    integer(int32), intent(in) :: m                           !! its number
+    integer(int32), intent(in) :: m                           !! index of the obstacle
     type(group_t), intent(in) :: group
-    character(len=*), intent(in) :: misfit                    !! variable: what
+    character(len=*), intent(in) :: misfit                    !! name of the variable and problem, separated by ": "
     type(problem_list_t), intent(inout) :: problems
     integer :: colon, number
 
     colon = index(misfit, ": ")
-    number = count(box%obstacle(:m)%surface == box%obstacle(m)%surface)          ! in its group
+    number = count(box%obstacle(:m)%surface == box%obstacle(m)%surface)          ! index in its group
     if (has_many(group) .and. .not. any(group%values%name == "points" .and. group%values%given)) then
       call group%complain("file", origin_of_row(group%text_of("file"), number)//": "//misfit, problems)
     else if (has_many(group)) then
@@ -103,11 +103,11 @@ contains
     end if
   end subroutine complain_of_obstacle
 
-  !> Reports sides that would crush the disks: these would fill more than the box when a side has come to its end. Where
-  !> disks push one side, they may make room.
+  !> Reports sides that would crush the disks: at the end of the motion of a side, the disks would have more area than the box. A
+  !> piston may make room for them; boxes with a piston are not checked.
   subroutine check_strokes(box, disks, groups, problems)
     type(box_t), intent(in) :: box
-    real(real64), intent(in) :: disks                         !! their area [length**2]
+    real(real64), intent(in) :: disks                         !! total area of the disks [length**2]
     type(group_t), intent(in) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
     real(real64) :: low(2), high(2), last
@@ -133,12 +133,12 @@ contains
     end do
   end subroutine check_strokes
 
-  !> Takes from its file whether disks turn, how many disks a species has, and how large they are, where the input leaves
-  !> that to the file. Of a file from which neither number nor sizes are taken it is told later that it cannot be read, when
-  !> the disks are placed: a run that goes on needs it no more.
+  !> Takes from a starting file the number of disks of a species, their sizes, and whether they rotate, where the input leaves
+  !> these to the file. If neither number nor sizes are needed, an unreadable file is reported only when the disks are placed,
+  !> because a resumed run does not need the file.
   subroutine survey_file(species, k, box, group, problems)
     type(species_settings_t), intent(inout) :: species(:)
-    integer, intent(in) :: k                                  !! number of the species
+    integer, intent(in) :: k                                  !! index of the species
     type(box_t), intent(in) :: box
     type(group_t), intent(inout) :: group
     type(problem_list_t), intent(inout) :: problems
@@ -169,11 +169,11 @@ contains
     end associate
   end subroutine survey_file
 
-  !> Finds the largest of the radii that will be drawn, and how much room they fill.
+  !> Determines the largest of the radii that will be drawn, and the packing fraction.
   subroutine survey_spread(s, k, seed, group)
     type(species_settings_t), intent(inout) :: s
-    integer, intent(in) :: k                                  !! its number
-    integer(int64), intent(in) :: seed                        !! of the run
+    integer, intent(in) :: k                                  !! index of the species
+    integer(int64), intent(in) :: seed                        !! seed of the run
     type(group_t), intent(inout) :: group
     real(real64), allocatable :: radius(:)                    ! [length]
 
@@ -184,7 +184,7 @@ contains
       call group%put_reals("packing_fraction", [pi*sum(radius**2)/product(s%region([2, 4]) - s%region([1, 3]))])
   end subroutine survey_spread
 
-  !> Reports why the disks of a file cannot be had.
+  !> Reports why the disks of a file cannot be used.
   subroutine complain_of_file(s, group, problems)
     type(species_settings_t), intent(in) :: s
     type(group_t), intent(in) :: group
@@ -194,12 +194,12 @@ contains
     if (s%in_file%error%code == exit_files) problems%unreadable = problems%unreadable + 1
   end subroutine complain_of_file
 
-  !> A species must have room: in its region, in a period, and in every container.
+  !> Checks that a disk of a species fits into its region, into a period, and into every enclosing obstacle.
   subroutine check_species(group, s, box, alone, problems)
     type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
     type(box_t), intent(in) :: box
-    logical, intent(in) :: alone                              !! there is one disk in all
+    logical, intent(in) :: alone                              !! the species has the only disk of the run
     type(problem_list_t), intent(inout) :: problems
     logical :: sound
     integer :: axis, k
@@ -219,8 +219,8 @@ contains
 
   contains
 
-    !> Along the axis the region must lie in the box and hold a disk; a period must be longer than two, so that no disk
-    !> touches two images of another at once.
+    !> Checks one axis. The region must lie in the box and be wide enough for a disk. A period must exceed two diameters, so that no
+    !> disk touches two images of another one at the same time.
     subroutine check_axis()
       logical :: endless(2)
       real(real64) :: lower, upper, room, farthest, least, low(2), high(2)
@@ -230,7 +230,7 @@ contains
       endless = spans(s%region, box)
       lower = s%region(2*axis - 1)
       upper = s%region(2*axis)
-      room = min(upper, high(axis)) - max(lower, low(axis))   ! less what sides out of their places take
+      room = min(upper, high(axis)) - max(lower, low(axis))   ! without the part that is covered by displaced sides
       farthest = max(abs(box%lower(axis)), abs(box%upper(axis)))
       least = merge(2*s%radius, 4*s%radius + rounding*farthest, alone)
       if (lower >= upper) then
@@ -249,14 +249,14 @@ contains
       end if
     end subroutine check_axis
 
-    !> Reports the axis, too.
+    !> Adds the axis to the report.
     subroutine complain(variable, what)
       character(len=*), intent(in) :: variable, what
 
       call group%complain(variable, what//", along "//merge("x", "y", axis == 1), problems)
     end subroutine complain
 
-    !> No placement of equal disks can exceed its densest packing.
+    !> Checks that the packing fraction does not exceed that of the densest possible packing.
     subroutine check_fraction()
       real(real64) :: packing
       character(len=:), allocatable :: variable, filled

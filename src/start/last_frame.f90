@@ -1,4 +1,4 @@
-!> Disks from the last complete frame of a run, finished or not.
+!> Reads disks from the last complete frame of a run, finished or not.
 submodule(starting_disks) last_frame
   use h5md_layout, only: box_group, disk_species, frame_counter, species_names
   use hdf5_objects, only: hdf5_file_t
@@ -22,7 +22,7 @@ contains
     integer(int64), allocatable :: species(:)
     integer(int64) :: frames(1)
     real(real64) :: lower(2), edges(2)
-    integer :: n, k, row                                    ! n: disks in the file
+    integer :: n, k, row                                    ! n: number of disks in the file
 
     call file%open(path, .false.)
     if (max(file%length(disk_species), file%length(species_names)) > most_disks) &
@@ -62,11 +62,11 @@ contains
 
   contains
 
-    !> Reads some rows of the table: of all disks, from the last frame if it has them.
+    !> Reads some rows of the table for all disks. Values that are not in frames are read from constant datasets.
     subroutine read_rows(first, last)
       integer, intent(in) :: first, last
       type(series_t) :: series
-      real(real64), allocatable :: values(:, :)             ! (rows,n)
+      real(real64), allocatable :: values(:, :)             ! (number of rows, n)
       integer :: width
 
       width = last - first + 1

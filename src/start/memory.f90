@@ -1,5 +1,6 @@
-!> Whether a run fits into the memory that the machine, or a batch system, has for it: one that does not is refused before it
-!> starts, and one that is short of it goes without domains. On Linux; elsewhere no limit is known.
+!> Checks whether a run fits into the memory that is available on the machine or granted by a batch system. A run that does not
+!> fit is refused before it starts; one for which domains do not fit uses the serial engine. The check works on Linux; on other
+!> systems no limit is known.
 module memory
   use kinds, only: int64
   use input_problems, only: problem_list_t
@@ -10,14 +11,16 @@ module memory
   private
   public :: check_memory, free_memory, room_for_domains
 
-  ! Measured with 100 000 to a million disks. [bytes]
+  ! Memory per disk with the serial engine, per disk with domains, and independent of disks, measured with 100 000 to a
+  ! million
+  ! disks. [bytes]
   integer(int64), parameter :: per_disk = 410, per_shared_disk = 540, besides = 25000000
-  integer(int64), parameter :: per_list = 270    !! of the neighbours of a disk, where sizes differ
+  integer(int64), parameter :: per_list = 270    !! neighbour list of a disk, used where sizes differ
   integer(int64), parameter :: per_obstacle = 560
 
 contains
 
-  !> Refuses more disks than fit in memory.
+  !> Refuses more disks than fit into the memory.
   subroutine check_memory(settings, problems)
     type(settings_t), intent(in) :: settings
     type(problem_list_t), intent(inout) :: problems
@@ -33,7 +36,7 @@ contains
       //size_text(needed)//" of memory, and "//size_text(free)//" are free; use fewer disks")
   end subroutine check_memory
 
-  !> Whether there is memory to cut the box into domains.
+  !> Whether the memory suffices for dividing the box into domains.
   function room_for_domains(settings) result(yes)
     type(settings_t), intent(in) :: settings
     logical :: yes
@@ -41,7 +44,7 @@ contains
     yes = settings%n_disks()*(per_shared_disk + merge(per_list, 0_int64, sizes_differ(settings))) + besides <= free_memory("")
   end function room_for_domains
 
-  !> Whether disks may have so many sizes that they are in neighbour lists.
+  !> Whether the disks may have so many different sizes that neighbour lists are used.
   pure function sizes_differ(settings) result(yes)
     type(settings_t), intent(in) :: settings
     logical :: yes
@@ -50,12 +53,12 @@ contains
       .or. maxval(settings%species%radius) > minval(settings%species%radius)
   end function sizes_differ
 
-  !> What the machine can give, or the limit of the control group if that is less: a batch job would be killed without a
-  !> word. Huge if nobody says. [bytes]
+  !> Memory available on the machine, or the limit of the control group if that is less, because a batch job that exceeds it is
+  !> killed without a message. Huge if neither is known. [bytes]
   function free_memory(root) result(bytes)
-    character(len=*), intent(in) :: root                  !! of the file system; empty but for tests
+    character(len=*), intent(in) :: root                  !! root of the file system; empty except in tests
     integer(int64) :: bytes
-    character(len=:), allocatable :: groups, line         ! number:controllers:group; version 2 has no controllers
+    character(len=:), allocatable :: groups, line         ! number:controllers:group; in version 2 without controllers
     character(len=:), allocatable :: folder, unread
     integer :: top, at, colon
 
@@ -72,7 +75,7 @@ contains
       top = len(folder)
       if (index(line(:colon), "memory") + index(line, "::") == 0) cycle
       folder = folder//line(colon + 1:)
-      do while (len(folder) >= top)                       ! the group, and those around it
+      do while (len(folder) >= top)                       ! the control group, and those that contain it
         bytes = min(bytes, number_after("", folder//"/memory.max"), number_after("", folder//"/memory.limit_in_bytes"))
         folder = folder(:index(folder, "/", back=.true.) - 1)
       end do

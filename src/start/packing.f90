@@ -1,5 +1,5 @@
-!> Disks being placed, and whether another one fits. Each species has its own grid of cells: its disks have much the
-!> same radius, so a search costs the same whatever the sizes of the others.
+!> A set of placed disks, with a test whether another disk fits. Each species has its own grid of cells. Because its disks
+!> have similar radii, the cost of a search does not depend on the sizes of other species.
 module packing
   use images, only: images_t
   use kinds, only: int32, real64
@@ -9,28 +9,28 @@ module packing
   private
   public :: packing_t
 
-  !> The cells of one species.
+  !> The grid of cells of one species.
   type :: layer_t
-    real(real64) :: radius = 0.0_real64             !! of the largest of its disks [length]
-    integer(int32) :: count = 0                     !! number of disks to come
-    real(real64) :: lower(2) = 0.0_real64           !! all its centres lie between these [length]
+    real(real64) :: radius = 0.0_real64             !! largest radius of its disks [length]
+    integer(int32) :: count = 0                     !! number of disks to be placed
+    real(real64) :: lower(2) = 0.0_real64           !! corners of a rectangle that contains all centres [length]
     real(real64) :: upper(2) = 0.0_real64
     real(real64) :: density(2) = 0.0_real64         !! cells per length [1/length]
-    integer(int32), allocatable :: head(:, :)       !! first disk in the cell, 0: none
+    integer(int32), allocatable :: head(:, :)       !! first disk in each cell; 0: none
   end type layer_t
 
-  !> A placed disk; one record, because disks close in space are far apart in memory.
+  !> A placed disk. Its data form one record, because disks that are close in space are far apart in memory.
   type :: placed_t
     real(real64) :: x(2) = 0.0_real64               !! centre [length]
     real(real64) :: radius = 0.0_real64             !! [length]
     integer(int32) :: species = 0                   !! 0: not placed yet
-    integer(int32) :: next = 0                      !! another disk in the same cell, 0: no more
+    integer(int32) :: next = 0                      !! next disk in the same cell; 0: none
   end type placed_t
 
   type :: packing_t
     type(box_t) :: box
     type(placed_t), allocatable :: disk(:)          !! (n)
-    type(layer_t), allocatable :: layer(:)          !! (s)
+    type(layer_t), allocatable :: layer(:)          !! (number of species)
   contains
     procedure :: open_species
     procedure :: add
@@ -46,7 +46,7 @@ module packing
 
 contains
 
-  !> A packing without disks, with room for some.
+  !> A packing without disks, with space for `n_disks`.
   function empty_packing(box, n_disks, n_species) result(packing)
     type(box_t), intent(in) :: box
     integer, intent(in) :: n_disks, n_species
@@ -56,13 +56,13 @@ contains
     allocate (packing%disk(n_disks), packing%layer(n_species))
   end function empty_packing
 
-  !> Prepares the cells of a species: their side is the diameter, or more where disks are few.
+  !> Sets up the cells of a species. The side of a cell is the diameter, or larger where there are few disks.
   pure subroutine open_species(self, s, radius, count, lower, upper)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: s
-    real(real64), intent(in) :: radius              !! of the largest of its disks [length]
-    integer, intent(in) :: count                    !! number of disks to come
-    real(real64), intent(in) :: lower(2), upper(2)  !! corners that hold all their centres [length]
+    real(real64), intent(in) :: radius              !! largest radius of its disks [length]
+    integer, intent(in) :: count                    !! number of disks to be placed
+    real(real64), intent(in) :: lower(2), upper(2)  !! corners of a rectangle that contains all their centres [length]
     real(real64) :: side, extent(2), few
     integer :: n(2)
 
@@ -82,7 +82,7 @@ contains
     end associate
   end subroutine open_species
 
-  !> Adds disk k of species s at the point p, without checking whether it fits.
+  !> Adds disk k of species s at the point p, without a test for overlaps.
   pure subroutine add(self, k, s, p, radius)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: k, s
@@ -98,8 +98,9 @@ contains
     self%layer(s)%head(c(1), c(2)) = k
   end subroutine add
 
-  !> What keeps disks of this radius out of the whole rectangle `centre` +- `half`: a disk (its number), an obstacle
-  !> (its code: see `partners`), or nothing (0). With half = 0: whether a disk fits there.
+  !> Finds a disk or an obstacle that excludes disks of this radius from the whole rectangle `centre` +- `half`. `blocker` is
+  !> the index of the disk or the code of the obstacle (see `partners`), or 0 if there is none. With half = 0 this is the test
+  !> whether a disk fits.
   pure subroutine find_blocker(self, centre, half, radius, blocker)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: centre(2), half(2)  !! [length]
@@ -125,8 +126,8 @@ contains
     end do
   end subroutine find_blocker
 
-  !> A disk of species s that keeps disks of this radius from every point of the rectangle p +- half; 0: none. The
-  !> cell in the middle comes first: there it is most likely.
+  !> Finds a disk of species s that excludes disks of this radius from every point of the rectangle p +- half; 0: none. The
+  !> cell in the middle is searched first, because it contains the blocker most often.
   pure subroutine search_layer(packing, s, p, half, radius, blocker)
     type(packing_t), intent(in) :: packing
     integer, intent(in) :: s
@@ -153,7 +154,7 @@ contains
     end associate
   end subroutine search_layer
 
-  !> The same among the disks of one cell.
+  !> The same for the disks of one cell.
   pure function blocker_in(packing, head, p, half, radius) result(blocker)
     type(packing_t), intent(in) :: packing
     integer(int32), intent(in) :: head
@@ -169,12 +170,12 @@ contains
     end do
   end function blocker_in
 
-  !> All disks whose rim comes within `reach` of a point, and some others from the same cells.
+  !> Lists all disks whose boundary comes within `reach` of a point, and some others from the same cells.
   subroutine list_neighbours(self, p, reach, list, n)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: p(2), reach         !! [length]
-    integer(int32), allocatable, intent(inout) :: list(:)   !! grows when needed
-    integer(int32), intent(out) :: n                !! how many of its elements are meant
+    integer(int32), allocatable, intent(inout) :: list(:)   !! enlarged if necessary
+    integer(int32), intent(out) :: n                !! number of valid elements of the list
     integer :: s, kx, ky, first(2), last(2)
 
     n = 0
@@ -190,7 +191,7 @@ contains
 
   contains
 
-    !> Appends the disks of species s in the cells within rho of a point.
+    !> Appends the disks of species s that are in cells within the distance rho of a point.
     subroutine append_cells(p, rho)
       real(real64), intent(in) :: p(2), rho
       integer :: low(2), high(2), i, j
@@ -215,11 +216,11 @@ contains
     end subroutine append_cells
   end subroutine list_neighbours
 
-  !> Whether one disk, or one obstacle, keeps disks of this radius out of the whole rectangle
+  !> Whether a single disk or obstacle excludes disks of this radius from the whole rectangle
   !> `centre` +- `half`.
   pure function covers(self, by, centre, half, radius) result(yes)
     class(packing_t), intent(in) :: self
-    integer(int32), intent(in) :: by                !! a disk (> 0), or the code of an obstacle
+    integer(int32), intent(in) :: by                !! index of a disk (> 0), or code of an obstacle
     real(real64), intent(in) :: centre(2), half(2)  !! [length]
     real(real64), intent(in) :: radius              !! [length]
     real(real64) :: corner(2)
@@ -235,7 +236,7 @@ contains
     end if
   end function covers
 
-  !> From a to the nearest image of b.
+  !> The vector from a to the nearest periodic image of b.
   pure function separation(self, a, b) result(d)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: a(2), b(2)          !! [length]
@@ -247,7 +248,7 @@ contains
     d = d + images%shift(images%nearest_image(d))
   end function separation
 
-  !> The cell of a point, or the nearest one if the point is outside.
+  !> The cell that contains a point, or the nearest cell if the point is outside the grid.
   pure function cell(layer, p) result(c)
     type(layer_t), intent(in) :: layer
     real(real64), intent(in) :: p(2)
@@ -258,7 +259,7 @@ contains
     c = 1 + int(min(column_row, shape(layer%head) - 1.0_real64))
   end function cell
 
-  !> Which images of a point, in periods, have disks of the box within rho.
+  !> Range of periodic images of a point, in periods, that have disks of the box within the distance rho.
   pure subroutine range_images(box, p, rho, first, last)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: p(2), rho

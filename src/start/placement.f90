@@ -1,8 +1,8 @@
-!> Finds a place for every disk.
+!> Placement of all disks.
 !>
-!> First come those that are fixed ('explicit', 'file', 'grid', 'lattice') in the order of the
-!> input; then 'random', the species with the largest disks first; then 'dense' and 'grown', where species
-!> with the same region grow together around the disks that are there already.
+!> Species with fixed positions ('explicit', 'file', 'grid', 'lattice') come first, in the order of the
+!> input. Then follow 'random' species, the largest disks first, and finally 'dense' and 'grown' species. Species
+!> with the same region grow together, around the disks that have been placed before.
 module placement
   use images, only: images_t
   use kinds, only: int32, int64, pi, real64
@@ -31,26 +31,26 @@ module placement
   private
   public :: place_disks
 
-  integer, parameter :: purpose = 1                         !! of this module's random streams
-  integer(int32), parameter :: many_trials = 500000         !! disks placed in all trials of 'random'
-  integer(int32), parameter :: few = 5                      !! disks, the same where there are few of them
-  real(real64), parameter :: nearly = 1.25_real64           !! so many times more may fit at another trial
-  real(real64), parameter :: denser = 1.5_real64            !! 'dense' packs so much more than 'random'
-  integer, parameter :: most_reports = 5                    !! of a kind, for one species
+  integer, parameter :: purpose = 1                         !! identifies the random streams of this module
+  integer(int32), parameter :: many_trials = 500000         !! number of disks placed in all attempts of 'random' together
+  integer(int32), parameter :: few = 5                      !! tolerance, in disks, that applies where there are few disks
+  real(real64), parameter :: nearly = 1.25_real64  !! factor by which the number of disks that fit may be larger in another attempt
+  real(real64), parameter :: denser = 1.5_real64  !! factor by which 'dense' packings are denser than 'random' ones, at least
+  integer, parameter :: most_reports = 5                    !! largest number of reports of one kind for one species
 
 contains
 
-  !> Gives the disks their positions and sizes; with them come the velocities that a file holds.
+  !> Sets the positions and radii of all disks, and their velocities where a file contains them.
   subroutine place_disks(species, groups, seed, line, sim, problems)
-    type(species_settings_t), intent(inout) :: species(:)   !! what files had of them is gone afterwards
-    type(group_t), intent(in) :: groups(:)                  !! of the species
+    type(species_settings_t), intent(inout) :: species(:)   !! tables of disks that were read from files are deallocated
+    type(group_t), intent(in) :: groups(:)                  !! groups of the species
     integer(int64), intent(in) :: seed
-    class(status_line_t), intent(inout) :: line             !! shows how far it is
-    type(simulation_t), intent(inout) :: sim                !! with its box, and disks in the order of the input
+    class(status_line_t), intent(inout) :: line             !! shows the progress
+    type(simulation_t), intent(inout) :: sim                !! in: with its box, and with the disks in the order of the input
     type(problem_list_t), intent(inout) :: problems
     type(packing_t) :: packing
     type(random_stream_t) :: stream
-    real(real64), allocatable :: x(:, :), radius(:)         ! (2,count), (count) of a species [length]
+    real(real64), allocatable :: x(:, :), radius(:)         ! (2,count), (count) positions and radii of a species [length]
     logical, dimension(size(species)) :: random, dense, together
     integer :: s, k
 
@@ -92,8 +92,8 @@ contains
 
   contains
 
-    !> The places of a species that are known, directly, by a rule, or from a file. Masses, orientations, and velocities if
-    !> they are wanted, go from the file into the simulation.
+    !> Determines the positions of a species for which they are given directly, by a rule, or by a file. Masses, orientations and,
+    !> if requested, velocities are copied from the file to the simulation.
     subroutine find_places(s)
       integer, intent(in) :: s
       integer :: first, last, k
@@ -129,7 +129,7 @@ contains
       end associate
     end subroutine find_places
 
-    !> Adds a species at known places. Disks that overlap others, and those that are not wholly in their region, are problems.
+    !> Adds a species with known positions. Reports disks that overlap others, and disks that are not completely in their region.
     subroutine add_known(packing, s, x, radius)
       type(packing_t), intent(inout) :: packing
       integer, intent(in) :: s
@@ -137,7 +137,7 @@ contains
       real(real64), intent(in) :: radius(:)                 !! (count) [length]
       real(real64) :: lower(2), upper(2), slack
       integer(int32) :: k, blocker
-      integer :: outside, overlapping                       ! disks
+      integer :: outside, overlapping                       ! numbers of disks with a problem
       character(len=:), allocatable :: taken
 
       outside = 0
@@ -172,11 +172,11 @@ contains
       end do
     end subroutine add_known
 
-    !> Reports disk k of species s at the point p.
+    !> Reports a problem of disk k of species s, which is at the point p.
     subroutine report(s, k, p, count, what)
       integer, intent(in) :: s, k
       real(real64), intent(in) :: p(2)                      !! [length]
-      integer, intent(inout) :: count                       !! of such reports
+      integer, intent(inout) :: count                       !! number of such reports so far
       character(len=*), intent(in) :: what
       character(len=:), allocatable :: variable, from
 
@@ -194,7 +194,7 @@ contains
     subroutine place_at_random(s)
       integer, intent(in) :: s
       real(real64) :: lower(2), upper(2)
-      real(real64), allocatable :: part(:)                  ! of the region that disks fill, in the order of their placement
+      real(real64), allocatable :: part(:)  ! fraction of the region that each disk covers, in the order of placement
       character(len=:), allocatable :: advice
       integer(int32) :: placed, trial
 
@@ -202,12 +202,12 @@ contains
       associate (me => species(s))
         call stream%seed(seed, [s, purpose])
         call centre_range(me%region, packing%box, me%radius, lower, upper)
-        ! The fewer the disks, the more the number that fits varies from trial to trial.
+        ! The number of disks that fit varies between attempts, the more the fewer disks there are.
         do trial = 1, merge(1, max(1, many_trials/me%count), me%polydispersity > 0)
           call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
           call insert_at_random(packing, int(s, int32), 1 + disks_before(species, s), radius, stream, line, placed)
           if (placed == me%count) return
-          if (placed == 0 .or. me%count > nearly*placed + few) exit  ! without room for one, no trial has any
+          if (placed == 0 .or. me%count > nearly*placed + few) exit  ! if not a single disk fits, further attempts are useless
         end do
         part = pi*radius(largest_first(radius))**2/product(me%region([2, 4]) - me%region([1, 3]))
         advice = "use fewer or smaller disks"
@@ -218,11 +218,12 @@ contains
       end associate
     end subroutine place_at_random
 
-    !> Grows species that share a region, in a box of its shape; 'grown' ones from where a file has them.
+    !> Places species that share a region by compression, in a box with the shape of the region. 'grown' species start at the
+    !> positions from a file.
     subroutine place_densely(members)
-      integer, intent(in) :: members(:)                     !! their numbers
-      type(packing_t) :: small                              ! the same with the disks as they begin to grow
-      real(real64), allocatable :: places(:, :), full(:)    ! of all [length]
+      integer, intent(in) :: members(:)                     !! indices of the species
+      type(packing_t) :: small                              ! copy of the packing with the small disks at the start of the growth
+      real(real64), allocatable :: places(:, :), full(:)    ! positions and radii of the disks of all these species [length]
       type(error_t), allocatable :: error
       logical :: grown
       integer :: k, last
@@ -257,7 +258,8 @@ contains
     end subroutine place_densely
   end subroutine place_disks
 
-  !> The region, as far as sides leave it, as a box, in which the disks that reach into it are obstacles, as are their images.
+  !> The region, without parts covered by displaced sides, as a box. Placed disks that reach into it are its obstacles,
+  !> periodic images included.
   function growth_box(packing, region) result(box)
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: region(4)
@@ -272,7 +274,7 @@ contains
     box%upper = min(region([2, 4]), box%upper)
     box%periodic = spans(region, packing%box)
     images = packing%box%images()
-    do pass = 1, 2                                          ! count, then fill
+    do pass = 1, 2                                          ! count in the first pass, fill in the second
       n = packing%box%n_obstacles()
       do k = 1, size(packing%disk)
         if (packing%disk(k)%species == 0) cycle
@@ -286,7 +288,7 @@ contains
         end do
       end do
       if (pass == 1) call box%add_obstacles(["obstacles", "disks    "], &
-        [packing%box%n_obstacles(), n - packing%box%n_obstacles()])                  ! elastic
+        [packing%box%n_obstacles(), n - packing%box%n_obstacles()])                  ! elastic obstacles
     end do
     do k = 1, packing%box%n_obstacles()
       allocate (box%obstacle(k)%shape, source=packing%box%obstacle(k)%shape)

@@ -1,5 +1,5 @@
-!> Disks from a text file: a line `x y` or `x y vx vy` for each. A first line of names says which columns there are if
-!> there are others, in small letters or capitals. Empty lines, and text from a # to the end of its line, are comments.
+!> Reads disks from a text file with one line `x y` or `x y vx vy` per disk. Other columns are possible if the first line holds
+!> the names of the columns, in lower or upper case. Empty lines, and text from a # to the end of its line, are ignored.
 module position_file
   use kinds, only: int64, real64
   use errors, only: exit_files, exit_usage, fail
@@ -12,7 +12,7 @@ module position_file
   private
   public :: angle_row, column_names, mass_row, radius_row, read_positions, spin_row
 
-  !> What is known of a disk, in the order of the rows of a table. Radius and mass are the last: they are checked together.
+  !> Names of the columns, in the order of the rows of a table. Radius and mass are last, because they are checked together.
   character(len=*), parameter :: column_names(*) = [character(len=7) :: "x", "y", "vx", "vy", "omega", "angle", "radius", "mass"]
   integer, parameter :: spin_row = 5, angle_row = 6, radius_row = 7, mass_row = 8
   character(len=*), parameter :: known_names(*) = [character(len=7) :: column_names, "species"]
@@ -21,19 +21,19 @@ module position_file
 
 contains
 
-  !> Reads the disks of one species: all if no column says of which species they are.
+  !> Reads the disks of one species, or all disks if there is no column for the species.
   subroutine read_positions(path, names, s, disks)
     character(len=*), intent(in) :: path
-    character(len=*), intent(in) :: names(:)                !! of all species
-    integer, intent(in) :: s                                !! number of the species
+    character(len=*), intent(in) :: names(:)                !! names of all species
+    integer, intent(in) :: s                                !! index of the species
     type(disks_in_file_t), intent(inout) :: disks
     character(len=longest_line) :: line
     character(len=:), allocatable :: text, problem
-    real(real64), allocatable :: table(:, :)                ! (column_names,n)
-    integer, allocatable :: lines(:)                        ! (n) in which the disks stand
-    integer, allocatable :: column(:)                       ! of the file, as places in `known_names`; none: not known yet
-    integer :: first(longest_line), last(longest_line)      ! of each word of the line
-    integer(int64) :: begin, past                           ! of a line, in the text
+    real(real64), allocatable :: table(:, :)                ! (column_names,n) values of the disks
+    integer, allocatable :: lines(:)                        ! (n) line number of each disk
+    integer, allocatable :: column(:)  ! index in `known_names` of each column of the file; empty while they are unknown
+    integer :: first(longest_line), last(longest_line)      ! position of each word in the line
+    integer(int64) :: begin, past                           ! beginning and end of a line in the text
     integer :: number, n, n_words
 
     allocate (table(size(column_names), 64), lines(64), column(0))
@@ -48,7 +48,7 @@ contains
     do while (past <= len(text, int64))
       begin = past
       past = begin + index(text(begin:), eol, kind=int64)
-      if (past == begin) past = len(text, int64) + 2        ! the last line needs no end
+      if (past == begin) past = len(text, int64) + 2        ! the last line may lack a line end
       line = text(begin:past - 2)
       number = number + 1
       if (number == 1 .and. index(line, byte_order_mark) == 1) line = line(len(byte_order_mark) + 1:)
@@ -67,8 +67,8 @@ contains
 
   contains
 
-    !> Takes in a line: the names of the columns, which the first numbers stand for if nobody has named them, or a disk,
-    !> which goes into the table if it is of the species.
+    !> Reads a line: the names of the columns or, if the first line contains numbers, their default meaning, or a disk, which is
+    !> added to the table if it belongs to the species.
     subroutine read_line()
       real(real64) :: value(size(column_names))
       integer :: k, its_species
@@ -111,7 +111,7 @@ contains
       table(:, n) = value
     end subroutine read_line
 
-    !> Whether the words of the line name columns: one of them is the name of a column, or none is a number.
+    !> Whether the line holds names of columns: at least one word is a known name, or no word is a number.
     function are_names() result(yes)
       logical :: yes, some_number
       character(len=:), allocatable :: what
@@ -157,7 +157,7 @@ contains
       end if
     end subroutine read_names
 
-    !> The number of the species that a word says: its number or name; 0 if there is none.
+    !> The species that a word denotes by its name or number; 0 if there is none.
     function species_named(word) result(s)
       character(len=*), intent(in) :: word
       integer :: s

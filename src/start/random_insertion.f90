@@ -1,10 +1,10 @@
-!> Random sequential insertion: each disk at a point uniform among all those where it fits beside
-!> the disks placed before. Attempts are drawn only from the voxels (small rectangles) of the region
-!> that no single disk covers, and voxels are halved when attempts fail too often; the points that
-!> are left out would be rejected anyway, so the distribution is that of plain insertion, up to
+!> Random sequential insertion: each disk is inserted at a point that is uniform among all points where it fits between
+!> the previous disks. Attempts are drawn only from voxels (small rectangles) of the region
+!> that no single disk covers completely, and voxels are halved when attempts fail too often. Attempts outside of these voxels
+!> would always be rejected, so that the distribution is that of simple insertion, up to
 !> saturation (Zhang and Torquato, Phys. Rev. E 88, 053312 (2013)).
-!> Where radii differ, the largest come first, and what has no room for one may have it for the next:
-!> no point is left out, and a disk that finds none in many attempts has no room.
+!> If radii differ, the largest disks come first. A voxel without space for one disk may have space for a smaller one:
+!> voxels are then not eliminated, and insertion ends when a disk does not fit in many attempts.
 module random_insertion
   use kinds, only: int32, real64
   use packing, only: packing_t
@@ -15,28 +15,28 @@ module random_insertion
   private
   public :: insert_at_random, largest_first
 
-  integer(int32), parameter :: disks_per_look = 1024    !! at the clock
-  integer(int32), parameter :: most_attempts = 300000   !! for one disk, where radii differ
+  integer(int32), parameter :: disks_per_look = 1024    !! number of disks between two updates of the progress line
+  integer(int32), parameter :: most_attempts = 300000   !! largest number of attempts for one disk, if radii differ
 
-  !> Where a centre may still fit.
+  !> The voxels in which a centre may still be possible.
   type :: voxels_t
     real(real64) :: origin(2) = 0.0_real64          !! [length]
     real(real64) :: side(2) = 0.0_real64            !! [length]
-    integer(int32) :: n = 0                         !! how many are left
-    integer(int32), allocatable :: column_row(:, :) !! (2,n) counted from 0
+    integer(int32) :: n = 0                         !! number of voxels left
+    integer(int32), allocatable :: column_row(:, :) !! (2,n) column and row of each voxel, counted from 0
   end type voxels_t
 
 contains
 
-  !> Inserts the disks of a species, numbered from `first`, until all are placed or no room is left.
+  !> Inserts the disks of a species, from index `first` on, until all are placed or no space is left.
   subroutine insert_at_random(packing, s, first, size_of, stream, line, placed)
     type(packing_t), intent(inout) :: packing
-    integer(int32), intent(in) :: s                 !! a species that is open
+    integer(int32), intent(in) :: s                 !! index of a species for which `open_species` was called
     integer(int32), intent(in) :: first
     real(real64), intent(in) :: size_of(:)          !! (count) radii of the disks [length]
     type(random_stream_t), intent(inout) :: stream
-    class(status_line_t), intent(inout) :: line     !! shows how far it is
-    integer(int32), intent(out) :: placed           !! how many
+    class(status_line_t), intent(inout) :: line     !! shows the progress
+    integer(int32), intent(out) :: placed           !! number of disks inserted
     type(voxels_t) :: voxels
     integer(int32) :: i, j, k, n(2), blocker, failures, count, order(size(size_of))
     real(real64) :: p(2), radius, lower(2), upper(2)
@@ -78,10 +78,10 @@ contains
       if (failures == most_attempts .and. .not. equal) exit
       if (.not. equal) cycle
       if (packing%covers(blocker, middle(voxels, k), 0.5_real64*voxels%side, radius)) then
-        voxels%column_row(:, k) = voxels%column_row(:, voxels%n)       ! the last one takes its number
+        voxels%column_row(:, k) = voxels%column_row(:, voxels%n)       ! the last voxel takes its place
         voxels%n = voxels%n - 1
       end if
-      ! Halving costs four searches per voxel; it pays when half as many attempts have failed.
+      ! Halving a voxel costs four searches. It pays when the number of failed attempts is twice the number of voxels.
       if (failures > 2*voxels%n) then
         call halve(voxels, packing, radius)
         call line%show_share("placing disks", real(placed, real64)/count)
@@ -90,7 +90,8 @@ contains
     end do
   end subroutine insert_at_random
 
-  !> The order of disks by their radius, to a thousandth of how much they differ; where they do not, as it is.
+  !> Order of disks by decreasing radius, with a resolution of a thousandth of the range of radii. Equal disks keep their
+  !> order.
   pure function largest_first(radius) result(order)
     real(real64), intent(in) :: radius(:)           !! [length]
     integer(int32), parameter :: classes = 1000
@@ -111,7 +112,7 @@ contains
     p = voxels%origin + (voxels%column_row(:, k) + 0.5_real64)*voxels%side
   end function middle
 
-  !> Cuts every voxel in four and keeps the quarters that nothing covers.
+  !> Divides each voxel into four and keeps the quarters that are not covered.
   pure subroutine halve(voxels, packing, radius)
     type(voxels_t), intent(inout) :: voxels
     type(packing_t), intent(in) :: packing
@@ -121,7 +122,7 @@ contains
 
     n = voxels%n
     if (maxval(voxels%column_row(:, :n)) >= ishft(huge(n), -1)) then
-      voxels%n = 0                                  ! too small to hold a point of their own
+      voxels%n = 0                                  ! too small for integers to distinguish them
       return
     end if
     call move_alloc(voxels%column_row, parent)

@@ -1,4 +1,4 @@
-!> Regular places for disks in a region: a grid, and a triangular lattice.
+!> Regular positions in a region: a rectangular grid, or a triangular lattice.
 module regular_places
   use kinds, only: real64
   use box_geometry, only: box_t
@@ -14,7 +14,7 @@ module regular_places
 
 contains
 
-  !> Whether the region spans a periodic axis, so that disks may stick out of it.
+  !> Whether the region spans the whole period along each axis. Disks may then extend beyond the region.
   pure function spans(region, box) result(yes)
     real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box
@@ -23,8 +23,8 @@ contains
     yes = box%periodic .and. region([1, 3]) <= box%lower .and. region([2, 4]) >= box%upper
   end function spans
 
-  !> Corners of the rectangle in which the centres of disks lie that are wholly inside the region, and clear of sides that
-  !> start out of their places.
+  !> Corners of the rectangle of possible centres: disks there are completely inside the region, and clear of sides that
+  !> start away from their mean position.
   pure subroutine centre_range(region, box, radius, lower, upper)
     real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box
@@ -35,10 +35,10 @@ contains
     call bounds(box, 0.0_real64, low, high)
     inset = merge(0.0_real64, radius, spans(region, box))
     lower = max(region([1, 3]), low) + inset
-    upper = max(min(region([2, 4]), high) - inset, lower)    ! a disk may fill its region but for rounding
+    upper = max(min(region([2, 4]), high) - inset, lower)    ! tolerates rounding if a disk fills its region
   end subroutine centre_range
 
-  !> A disk in the middle of each of nx x ny equal cells of the region, row by row from the bottom.
+  !> Positions at the centres of nx x ny equal cells of the region, row by row from the bottom.
   subroutine grid_positions(species, group, x, problems)
     type(species_settings_t), intent(in) :: species
     type(group_t), intent(in) :: group
@@ -58,9 +58,9 @@ contains
     end associate
   end subroutine grid_positions
 
-  !> Places on a triangular lattice that fills the region, stretched to its shape, row by row from the bottom. Of all
-  !> numbers of rows it takes the one that keeps neighbours farthest apart. The last places stay empty if the rows hold more
-  !> than `count`.
+  !> Positions on a triangular lattice that fills the region and is stretched to its shape, row by row from the bottom. The
+  !> number of rows is the one with the largest distance between neighbours. If there are more positions than disks, the last
+  !> ones stay empty.
   subroutine lattice_positions(species, group, box, x, problems)
     type(species_settings_t), intent(in) :: species
     type(group_t), intent(in) :: group
@@ -85,7 +85,7 @@ contains
     found = distance
     fits = 0
     more = species%count
-    do while (more - fits > 1)                              ! the more disks, the closer they are
+    do while (more - fits > 1)                              ! bisection: the distance decreases with the number of disks
       call choose_lattice(fits + (more - fits)/2)
       if (distance < closest) more = fits + (more - fits)/2
       if (distance >= closest) fits = fits + (more - fits)/2
@@ -95,7 +95,7 @@ contains
 
   contains
 
-    !> Finds the lattice for n disks that keeps neighbours farthest apart.
+    !> Finds the lattice for n disks with the largest distance between neighbours.
     subroutine choose_lattice(n)
       integer, intent(in) :: n
       real(real64) :: its_step(2), its_distance
@@ -103,9 +103,10 @@ contains
 
       distance = -1
       do rows = 1, n
-        if (periodic(2) .and. modulo(rows, 2) == 1 .and. rows > 1) cycle   ! rows are shifted in turn
+        ! Alternate rows are shifted, so that a periodic lattice has an even number.
+        if (periodic(2) .and. modulo(rows, 2) == 1 .and. rows > 1) cycle
         call measure_lattice(1 + (n - 1)/rows, rows, its_step, its_distance)
-        if (rows > 2 .and. 2*its_step(2) <= distance) exit                 ! more rows are only closer
+        if (rows > 2 .and. 2*its_step(2) <= distance) exit                 ! more rows can only decrease the distance
         if (its_distance <= distance) cycle
         distance = its_distance
         columns = 1 + (n - 1)/rows
@@ -113,14 +114,14 @@ contains
       end do
     end subroutine choose_lattice
 
-    !> Steps of a lattice from column to column and from row to row, and its shortest distance.
+    !> Lattice spacings from column to column and from row to row, and the shortest distance between neighbours.
     subroutine measure_lattice(columns, rows, step, distance)
       integer, intent(in) :: columns, rows
       real(real64), intent(out) :: step(2), distance        !! [length]
       real(real64) :: gaps(2)
 
       gaps = [columns - 1, rows - 1]
-      if (rows > 1) gaps(1) = gaps(1) + 0.5_real64          ! every other row begins half a step later
+      if (rows > 1) gaps(1) = gaps(1) + 0.5_real64          ! every other row is shifted by half a spacing
       gaps = merge(real([columns, rows], real64), gaps, periodic)
       distance = huge(distance)
       step = upper - lower

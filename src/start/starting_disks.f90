@@ -1,5 +1,5 @@
-!> The disks of a species as its file has them, whatever its kind: checked number by number, and joined with what the input
-!> says.
+!> The disks of a species from its starting file, whatever its format: each number is checked, and the table is completed with
+!> values from the input.
 module starting_disks
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds, only: int64, real64
@@ -15,19 +15,19 @@ module starting_disks
   private
   public :: origin, read_disks, resolution
 
-  real(real64), parameter :: resolution = 1.0e-10_real64      !! of a radius at its coordinates, in double
-  !> Where each of `position_file: column_names` is in the file of a run; what stands before the radius is in frames.
+  real(real64), parameter :: resolution = 1.0e-10_real64      !! smallest radius relative to the coordinates, in double precision
+  !> Datasets of a file of a run that correspond to `position_file: column_names`. Those before the radius are in frames.
   character(len=48), parameter :: datasets(*) = [character(len=48) :: position//value_of, position//value_of, &
     velocity//value_of, velocity//value_of, angular_velocity//value_of, orientation//value_of, disk_radius, disk_mass]
 
   interface
-    !> Reads the disks of the species with this name from the last frame of a run. The submodule `last_frame` does that,
-    !> `last_frame_without_hdf5` refuses: the linker gets one of them.
+    !> Reads the disks of one species from the last frame of a run. The submodule `last_frame` implements this;
+    !> `last_frame_without_hdf5` refuses it. The linker selects one of them.
     module subroutine read_last_frame(path, name, disks, box)
       character(len=*), intent(in) :: path
-      character(len=*), intent(in) :: name                    !! of the species
+      character(len=*), intent(in) :: name                    !! name of the species
       type(disks_in_file_t), intent(inout) :: disks
-      type(box_t), intent(in), optional :: box                !! to which the positions are stretched
+      type(box_t), intent(in), optional :: box                !! the positions are scaled to this box, if it is present
     end subroutine read_last_frame
   end interface
 
@@ -41,12 +41,12 @@ contains
     yes = index(path//"|", ".h5|") > 0 .or. index(path//"|", ".h5.part|") > 0
   end function is_run
 
-  !> Reads the disks of species s. Radii and masses are those of the input where it has them.
+  !> Reads the disks of species s. Radii and masses from the input take precedence.
   subroutine read_disks(species, s, box)
     type(species_settings_t), intent(inout) :: species(:)
     integer, intent(in) :: s
     type(box_t), intent(in) :: box
-    type(box_t), allocatable :: new_box                       ! to which positions are stretched
+    type(box_t), allocatable :: new_box                       ! the positions are scaled to this box
     character(len=:), allocatable :: of_species
 
     associate (me => species(s))
@@ -70,7 +70,7 @@ contains
     end associate
   end subroutine read_disks
 
-  !> Says why the disks cannot be had; the first reason counts.
+  !> Records why the disks cannot be used. Only the first reason is kept.
   subroutine refuse(me, why)
     type(species_settings_t), intent(inout) :: me
     character(len=*), intent(in) :: why
@@ -78,7 +78,8 @@ contains
     if (.not. allocated(me%in_file%error)) call fail(me%in_file%error, exit_usage, why)
   end subroutine refuse
 
-  !> Takes from the input what it has, and refuses what both have, or none; of a run the input may say otherwise.
+  !> Fills in values from the input. Reports values that both or neither of file and input contain; for files of runs, the
+  !> input may override values.
   subroutine join(me)
     type(species_settings_t), intent(inout) :: me
     logical :: wanted(radius_row:mass_row)
@@ -103,7 +104,7 @@ contains
 
   contains
 
-    !> Refuses a column of a text whose numbers the input has as well.
+    !> Refuses a column of a text file if the input contains the same quantity.
     subroutine refuse_both(row, variable)
       integer, intent(in) :: row
       character(len=*), intent(in) :: variable
@@ -113,17 +114,17 @@ contains
     end subroutine refuse_both
   end subroutine join
 
-  !> Refuses numbers that the input could not have either.
+  !> Refuses numbers that would be invalid in the input as well.
   subroutine check_numbers(me, farthest)
     type(species_settings_t), intent(inout) :: me
-    real(real64), intent(in) :: farthest                      !! coordinate of the box [length]
+    real(real64), intent(in) :: farthest                      !! largest coordinate in the box [length]
     logical :: wrong
     integer :: k, row
 
     do k = 1, size(me%in_file%rows)
       do row = 1, mass_row
         associate (number => me%in_file%table(row, k))
-          wrong = .not. ieee_is_finite(number)                ! comparing a NaN is trapped by debug builds
+          wrong = .not. ieee_is_finite(number)                ! comparisons with NaN are trapped in debug builds
           if (.not. wrong) wrong = number > largest .or. number < merge(smallest, -largest, row >= radius_row)
           if (.not. wrong) cycle
         end associate
@@ -139,7 +140,7 @@ contains
 
   contains
 
-    !> Refuses the number.
+    !> Reports the number as invalid.
     subroutine object(what)
       character(len=*), intent(in) :: what
 
@@ -147,11 +148,11 @@ contains
     end subroutine object
   end subroutine check_numbers
 
-  !> Where the values of a disk come from, for messages: a line of a text file, or a row of a dataset.
+  !> The origin of the values of a disk, for messages: a line of a text file, or a row of a dataset.
   pure function origin(me, k, column) result(text)
     type(species_settings_t), intent(in) :: me
-    integer, intent(in) :: k                                  !! number of the disk in its species
-    integer, intent(in) :: column                             !! of `column_names`
+    integer, intent(in) :: k                                  !! index of the disk in its species
+    integer, intent(in) :: column                             !! index in `column_names`
     character(len=:), allocatable :: text
 
     if (is_run(me%file)) then

@@ -1,5 +1,5 @@
-!> How disks start to move, by the rules of their species. Each species has random streams of its own, so that a change of
-!> one does not change what the others draw.
+!> Initial velocities of the disks, by the rules of their species. Each species has its own random streams, so that changes to
+!> one species do not affect the random numbers of others.
 module starting_velocities
   use kinds, only: int32, real64
   use disks, only: disks_before
@@ -12,15 +12,15 @@ module starting_velocities
   private
   public :: set_in_motion
 
-  integer, parameter :: purpose = 2, purpose_of_spins = 6   !! of this module's random streams
+  integer, parameter :: purpose = 2, purpose_of_spins = 6   !! identify the random streams of this module
 
 contains
 
-  !> Gives the disks their velocities. Where nothing takes up momentum, the total is zero. In a sheared box rules and
-  !> temperatures are relative to its velocity profile; given velocities are not.
+  !> Sets the velocities of all disks. Where no boundary or force can change the total momentum, it is made zero. In a sheared box
+  !> the rules and temperatures are relative to the velocity profile; given velocities are absolute.
   subroutine set_in_motion(settings, groups, sim, problems)
     type(settings_t), intent(in) :: settings
-    type(group_t), intent(in) :: groups(:)                  !! of the species
+    type(group_t), intent(in) :: groups(:)                  !! groups of the species
     type(simulation_t), intent(inout) :: sim
     type(problem_list_t), intent(inout) :: problems
     type(random_stream_t) :: stream
@@ -52,14 +52,15 @@ contains
 
   contains
 
-    !> The first and the last disk of species s.
+    !> Finds the first and the last disk of species s.
     subroutine find_disks()
       first = disks_before(settings%species, s) + 1
       last = disks_before(settings%species, s + 1)
     end subroutine find_disks
 
-    !> Gives the disks of one species their velocities. Where the total momentum is to be zero, equal speeds come in opposite
-    !> pairs (and one star of three if the number is odd), so that they stay equal; the other rules leave it to `remove_drift`.
+    !> Draws the velocities of one species. If the total momentum is to be zero, equal speeds are drawn in opposite pairs (with
+    !> one triple at 120 degrees if the number is odd), so that they stay equal; for the other rules `remove_drift` shifts the
+    !> velocities.
     subroutine draw_velocities()
       associate (species => settings%species(s), disk => sim%disk)
         select case (species%velocities)
@@ -81,14 +82,14 @@ contains
           end do
         case ("explicit")
           do i = first, last
-            disk(i)%v = species%velocity(:, min(i - first + 1, size(species%velocity, 2)))   ! one holds for all
+            disk(i)%v = species%velocity(:, min(i - first + 1, size(species%velocity, 2)))  ! a single velocity applies to all disks
           end do
-        case default                                        ! 'rest'; 'file': they came with the positions
+        case default                                        ! 'rest'; with 'file' they were set together with the positions
         end select
       end associate
     end subroutine draw_velocities
 
-    !> Unit vectors. In opposite pairs, the partner is half the list away, not a neighbour on a grid.
+    !> Draws unit vectors. The partner in an opposite pair is half the list away, so that it is not a neighbour on a grid.
     subroutine draw_directions(in_pairs)
       logical, intent(in) :: in_pairs
       real(real64), parameter :: turn = 0.5_real64*sqrt(3.0_real64)     ! sine of 120 degrees
@@ -111,8 +112,8 @@ contains
       end associate
     end subroutine draw_directions
 
-    !> Makes the total momentum of all velocities that a rule has generated zero. What is shifted are those of 'uniform' and
-    !> 'maxwell'; equal speeds are balanced among themselves, a single one excepted.
+    !> Makes the total momentum of all generated velocities zero by shifting the velocities of 'uniform' and
+    !> 'maxwell'. Equal speeds are balanced among themselves, except that of a single disk.
     subroutine remove_drift()
       logical, dimension(size(settings%species)) :: shifted, generated
       real(real64) :: momentum(2), total
@@ -133,7 +134,7 @@ contains
       end do
     end subroutine remove_drift
 
-    !> Angular velocities; 'file' has brought them with the places.
+    !> Sets the angular velocities. Those of 'file' were set together with the positions.
     subroutine draw_spins()
       real(real64) :: normals(2)
 
@@ -150,9 +151,9 @@ contains
       end do
     end subroutine draw_spins
 
-    !> Scales the velocities of one species, relative to their mean, to an exact temperature: the momentum stays.
+    !> Scales the velocities of one species relative to their mean to an exact temperature. The momentum does not change.
     subroutine scale_to_temperature(wanted)
-      real(real64), intent(in) :: wanted                    !! kT [energy]
+      real(real64), intent(in) :: wanted                    !! kT of translation [energy]
       real(real64) :: mean(2), temperature
       integer :: axis
 
@@ -176,9 +177,9 @@ contains
       end associate
     end subroutine scale_to_temperature
 
-    !> Adds the velocity profile of a sheared box, or takes it away.
+    !> Adds or subtracts the velocity profile of a sheared box.
     subroutine add_stream(factor)
-      real(real64), intent(in) :: factor                    !! 1 or -1
+      real(real64), intent(in) :: factor                    !! 1 to add, -1 to subtract
 
       if (.not. sim%box%is_sheared()) return
       do i = first, last
