@@ -1,6 +1,5 @@
-!> The container: its surfaces, which are four sides, walls or periodic by axis, and fixed obstacles; and the acceleration
-!> in it.
-!> Times of contact are pure functions of a disk's own state, counted from the epoch like its clock.
+!> The container: four sides, which are walls or periodic along each axis, fixed obstacles, and gravity.
+!> Contact times are pure functions of the state of a disk. They count from the epoch, like its clock.
 module box_geometry
   use collisions, only: wall_law_t
   use disks, only: disk_t
@@ -14,29 +13,29 @@ module box_geometry
   public :: box_t, surface_t
   public :: meet_image, next_obstacle, obstacle_gap, strike_velocity, surface_velocity, wall_normal, free_area
 
-  !> A side of the box, or a group of obstacles: its law holds for all of them, and its sums are over all of them.
+  !> A side of the box, or a group of obstacles. All obstacles of a group share one contact law, and sums over their collisions.
   type :: surface_t
     character(len=:), allocatable :: name
     type(wall_law_t) :: law
-    type(side_motion_t) :: motion               !! of a side
+    type(side_motion_t) :: motion               !! prescribed or free motion of a side
   end type surface_t
 
   type :: obstacle_t
     class(shape_t), allocatable :: shape
-    integer(int32) :: surface = 0               !! number of that of its group
+    integer(int32) :: surface = 0               !! index of the surface of its group
   end type obstacle_t
 
   type :: box_t
     real(real64) :: lower(2) = 0.0_real64       !! [length]
     real(real64) :: upper(2) = 1.0_real64       !! [length]
-    logical :: periodic(2) = .false.            !! by axis
+    logical :: periodic(2) = .false.            !! periodic boundary along each axis
     real(real64) :: gravity(2) = 0.0_real64     !! [length/time**2]
-    real(real64) :: shear_rate = 0.0_real64     !! of a sheared box [1/time]
-    !> Left, right, bottom, top, which count where they are walls; then the groups of obstacles.
+    real(real64) :: shear_rate = 0.0_real64     !! shear rate of a box with Lees-Edwards boundary conditions [1/time]
+    !> Left, right, bottom, top (only walls are used), then the groups of obstacles.
     type(surface_t), allocatable :: surface(:)
-    type(obstacle_t), allocatable :: obstacle(:)   !! those of one group side by side: see `partners` for their codes
-    ! State, beside that of the disks. The input gives the state of sides at the start.
-    real(real64) :: epoch = 0.0_real64          !! the moment from which all clocks count, since the start of the run [time]
+    type(obstacle_t), allocatable :: obstacle(:)   !! obstacles of a group are adjacent; see `partners` for their codes
+    ! Variable state besides that of the disks. The input determines the initial state of the sides.
+    real(real64) :: epoch = 0.0_real64          !! origin of all clocks, since the start of the run [time]
     type(side_state_t) :: side(n_sides)
   contains
     procedure :: edges
@@ -79,11 +78,11 @@ contains
     end do
   end function new_box
 
-  !> Adds groups of obstacles, whose shapes are to follow.
+  !> Adds groups of obstacles. Their shapes are set later.
   subroutine add_obstacles(self, name, n)
     class(box_t), intent(inout) :: self
-    character(len=*), intent(in) :: name(:)     !! of each group
-    integer, intent(in) :: n(:)                 !! of its obstacles
+    character(len=*), intent(in) :: name(:)     !! name of each group
+    integer, intent(in) :: n(:)                 !! number of obstacles in each group
     type(surface_t), allocatable :: surface(:)
     type(obstacle_t), allocatable :: obstacle(:)
     integer :: k, m
@@ -106,7 +105,7 @@ contains
     call move_alloc(obstacle, self%obstacle)
   end subroutine add_obstacles
 
-  !> Lengths of the sides.
+  !> Lengths of the edges.
   pure function edges(self) result(lengths)
     class(box_t), intent(in) :: self
     real(real64) :: lengths(2)
@@ -114,7 +113,7 @@ contains
     lengths = self%upper - self%lower
   end function edges
 
-  !> The same, but `never` where the sides are walls.
+  !> Lengths of the periods; `never` along axes with walls.
   pure function periods(self) result(lengths)
     class(box_t), intent(in) :: self
     real(real64) :: lengths(2)
@@ -122,7 +121,7 @@ contains
     lengths = merge(self%upper - self%lower, never, self%periodic)
   end function periods
 
-  !> The images of the box, for clocks that count from `epoch`; without it as they are at the start.
+  !> The periodic images of the box, for clocks that count from `epoch`. Without `epoch` the images are those at the start.
   pure function images_of(self, epoch) result(images)
     class(box_t), intent(in) :: self
     real(real64), intent(in), optional :: epoch    !! [time]
@@ -133,7 +132,7 @@ contains
       images = sliding_images(self%periods(), self%slip(), epoch)
   end function images_of
 
-  !> Whether disks fly on parabolas.
+  !> Whether there is gravity, so that disks move on parabolas.
   pure function falling(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -141,7 +140,7 @@ contains
     yes = any(abs(self%gravity) > 0)
   end function falling
 
-  !> Whether the image above moves along x (Lees and Edwards).
+  !> Whether the box is sheared (Lees and Edwards, J. Phys. C 5, 1921 (1972)): the image above moves along x.
   pure function is_sheared(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -149,7 +148,7 @@ contains
     yes = abs(self%shear_rate) > 0
   end function is_sheared
 
-  !> The velocity along x of the image above.
+  !> Velocity of the image above along x.
   pure function slip(self) result(v)
     class(box_t), intent(in) :: self
     real(real64) :: v                           !! [length/time]
@@ -157,7 +156,7 @@ contains
     v = self%shear_rate*(self%upper(2) - self%lower(2))
   end function slip
 
-  !> The velocity profile that the shear imposes, at x: what is relative to it is alike everywhere.
+  !> Velocity profile imposed by the shear at x. Properties relative to this profile are uniform.
   pure function stream(self, x) result(v)
     class(box_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
@@ -166,7 +165,7 @@ contains
     v = [self%shear_rate*(x(2) - 0.5_real64*(self%lower(2) + self%upper(2))), 0.0_real64]
   end function stream
 
-  !> Whether there is more than the sides.
+  !> Whether the box has obstacles.
   pure function has_obstacles(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -174,7 +173,7 @@ contains
     yes = self%n_obstacles() > 0
   end function has_obstacles
 
-  !> The number of obstacles.
+  !> Number of obstacles.
   pure function n_obstacles(self) result(n)
     class(box_t), intent(in) :: self
     integer(int32) :: n
@@ -183,7 +182,7 @@ contains
     if (allocated(self%obstacle)) n = size(self%obstacle, kind=int32)
   end function n_obstacles
 
-  !> The number of the surface of a side or obstacle with this code.
+  !> Index of the surface of a side or obstacle, from its code.
   elemental function surface_of(self, code) result(k)
     class(box_t), intent(in) :: self
     integer(int32), intent(in) :: code
@@ -193,7 +192,7 @@ contains
     if (.not. is_side(code)) k = self%obstacle(obstacle_number(code))%surface
   end function surface_of
 
-  !> Whether disks bounce off surface k.
+  !> Whether surface k is a wall, from which disks rebound.
   pure function is_wall(self, k) result(yes)
     class(box_t), intent(in) :: self
     integer, intent(in) :: k
@@ -203,7 +202,7 @@ contains
     if (.not. yes) yes = .not. self%periodic((k + 1)/2)
   end function is_wall
 
-  !> Whether any wall takes energy.
+  !> Whether any wall dissipates energy.
   pure function has_lossy_walls(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -213,7 +212,7 @@ contains
       any([(self%is_wall(k), k=1, size(self%surface))] .and. self%surface%law%restitution < 1)
   end function has_lossy_walls
 
-  !> Whether any wall can make disks turn.
+  !> Whether any wall can exert a torque on disks.
   pure function has_rough_walls(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -222,7 +221,7 @@ contains
     yes = any([(self%is_wall(k), k=1, size(self%surface))] .and. self%surface%law%grip%is_rough())
   end function has_rough_walls
 
-  !> The highest temperature of a wall.
+  !> Highest temperature of a thermal wall.
   pure function highest_temperature(self) result(highest)
     class(box_t), intent(in) :: self
     real(real64) :: highest                     !! [energy]
@@ -230,7 +229,7 @@ contains
     highest = maxval(self%surface%law%temperature)
   end function highest_temperature
 
-  !> The highest speed of a surface, along the wall or of a side that moves; or of the image above in a sheared box.
+  !> Highest speed of a surface along itself, of a moving side, or of the image above in a sheared box.
   pure function highest_speed(self) result(highest)
     class(box_t), intent(in) :: self
     real(real64) :: highest                     !! [length/time]
@@ -238,7 +237,7 @@ contains
     highest = max(maxval(abs(self%surface%law%speed)), maxval(self%surface%motion%top_speed()), abs(self%slip()))
   end function highest_speed
 
-  !> Whether surfaces can do work on disks: they slide or move, disks push them, or the box is sheared.
+  !> Whether boundaries can do work on disks: by tangential or normal motion, as a piston, or by shear.
   pure function does_work(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -246,7 +245,7 @@ contains
     yes = self%highest_speed() > 0 .or. any(self%surface%motion%kind == piston)
   end function does_work
 
-  !> Whether disks can get energy from a wall, or from shear.
+  !> Whether disks can gain energy from a wall or from shear.
   pure function gives_energy(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -254,7 +253,7 @@ contains
     yes = self%highest_temperature() > 0 .or. self%does_work()
   end function gives_energy
 
-  !> How far sides may be from their places, and disks beyond: left and bottom, right and top.
+  !> Largest distances of moving sides from their mean positions, outwards, where disks can be as well.
   pure function reach(self) result(length)
     class(box_t), intent(in) :: self
     real(real64) :: length(2, 2)                !! (axis, lower or upper) [length]
@@ -262,7 +261,7 @@ contains
     length = transpose(reshape(self%surface(:n_sides)%motion%amplitude, [2, 2]))
   end function reach
 
-  !> How far side k is inwards of its own place at a time.
+  !> Displacement of side k at a time, inwards from its mean position.
   pure function side_position(self, k, t) result(x)
     class(box_t), intent(in) :: self
     integer, intent(in) :: k
@@ -274,7 +273,7 @@ contains
     end associate
   end function side_position
 
-  !> Its velocity inwards then.
+  !> Velocity of side k at a time, inwards.
   pure function side_velocity(self, k, t) result(v)
     class(box_t), intent(in) :: self
     integer, intent(in) :: k
@@ -286,14 +285,14 @@ contains
     end associate
   end function side_velocity
 
-  !> The earlier of a known event and the contacts with the obstacles listed. A disk stays in the box until it
-  !> passes a periodic side, so the images of an obstacle one period away are enough; an obstacle that encloses the disks
-  !> has none.
+  !> Finds the first contact of a disk with the listed obstacles, if it is earlier than a known event. A disk stays in the box
+  !> until it passes a periodic side; images of an obstacle at a distance of one period are therefore sufficient. An obstacle
+  !> that encloses the disks has no images.
   pure subroutine next_obstacle(box, disk, last, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    integer(int32), intent(in) :: last          !! code of the obstacle that it left last, if nothing has happened since
-    integer(int32), intent(in) :: list(:)       !! codes of the obstacles in question, descending
+    integer(int32), intent(in) :: last          !! code of the obstacle that the disk left last, if it has had no event since
+    integer(int32), intent(in) :: list(:)       !! codes of the obstacles to be tested, in descending order
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     type(images_t) :: images
@@ -307,14 +306,15 @@ contains
     end do
   end subroutine next_obstacle
 
-  !> The earlier of a known event and the contact with one image of an obstacle. An obstacle that disks meet from outside is
-  !> convex: a disk that leaves it on a straight line does not return, whatever rounding says.
+  !> Finds the contact of a disk with one image of an obstacle, if it is earlier than a known event. Obstacles that disks touch
+  !> from outside are convex: a disk that leaves one on a straight line cannot return, and contacts predicted from rounding errors
+  !> are skipped.
   pure subroutine meet_image(box, disk, last, obstacle, shift, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    integer(int32), intent(in) :: last          !! code of the obstacle that it left last, if nothing has happened since
-    integer(int32), intent(in) :: obstacle      !! its code
-    real(real64), intent(in) :: shift(2)        !! from the obstacle to its image [length]
+    integer(int32), intent(in) :: last          !! code of the obstacle that the disk left last, if it has had no event since
+    integer(int32), intent(in) :: obstacle      !! code of the obstacle
+    real(real64), intent(in) :: shift(2)        !! shift from the obstacle to its image [length]
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     real(real64) :: t_image, d(2)
@@ -334,20 +334,20 @@ contains
     code = obstacle
   end subroutine meet_image
 
-  !> Whether a point that falls for a while remains outside of a rectangle around the origin; no, if in doubt. The rectangle
-  !> around the path is a rough bound, but takes few operations; the roots of a quartic are many.
+  !> Whether a point that falls for some time surely stays outside of a rectangle around the origin; .false. if in doubt. The
+  !> rectangle around the path is a rough but cheap bound compared with the roots of a quartic.
   pure function passes_by(d, v, g, s, half) result(yes)
-    real(real64), intent(in) :: d(2)            !! [length]
+    real(real64), intent(in) :: d(2)            !! initial position [length]
     real(real64), intent(in) :: v(2)            !! [length/time]
     real(real64), intent(in) :: g(2)            !! [length/time**2]
-    real(real64), intent(in) :: s               !! [time]
-    real(real64), intent(in) :: half(2)         !! half its sides [length]
+    real(real64), intent(in) :: s               !! duration [time]
+    real(real64), intent(in) :: half(2)         !! half the edges of the rectangle [length]
     logical :: yes
     real(real64) :: low, high, slack
     integer :: axis
 
     yes = .false.
-    if (s > sqrt(never)) return                 ! the path may be too long for a number
+    if (s > sqrt(never)) return                 ! the path may overflow
     do axis = 1, 2
       low = s*min(v(axis), v(axis) + g(axis)*s, 0.0_real64)
       high = s*max(v(axis), v(axis) + g(axis)*s, 0.0_real64)
@@ -356,7 +356,7 @@ contains
     end do
   end function passes_by
 
-  !> Distance between the m-th obstacle and the rim of a disk at x; negative if they overlap.
+  !> Distance between the m-th obstacle and the boundary of a disk at x; negative if they overlap.
   pure function obstacle_gap(box, m, x, radius) result(length)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: m
@@ -368,11 +368,11 @@ contains
     end associate
   end function obstacle_gap
 
-  !> Velocity of a surface along itself where the normal is this one.
+  !> Tangential velocity of a surface at a point where it has this normal.
   pure function surface_velocity(box, code, normal) result(u)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
-    real(real64), intent(in) :: normal(2)       !! from the surface to a disk
+    real(real64), intent(in) :: normal(2)       !! unit vector from the surface to a disk
     real(real64) :: u(2)                        !! [length/time]
 
     u = 0
@@ -385,11 +385,11 @@ contains
     end associate
   end function surface_velocity
 
-  !> Velocity of a surface along its normal: only sides move.
+  !> Normal velocity of a surface; zero for obstacles, which do not move.
   pure function strike_velocity(box, code, normal, t) result(u)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
-    real(real64), intent(in) :: normal(2)       !! from the surface to a disk
+    real(real64), intent(in) :: normal(2)       !! unit vector from the surface to a disk
     real(real64), intent(in) :: t               !! since the epoch [time]
     real(real64) :: u(2)                        !! [length/time]
 
@@ -398,7 +398,7 @@ contains
     if (box%surface(1 - code)%motion%kind /= still) u = box%side_velocity(1 - code, t)*normal
   end function strike_velocity
 
-  !> Unit vector from a surface to a disk at x that hits it with the velocity v.
+  !> Unit vector from a surface to a disk that touches it at x with the velocity v.
   pure function wall_normal(box, code, x, v) result(normal)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
@@ -417,7 +417,7 @@ contains
     end if
   end function wall_normal
 
-  !> Where disks can be: the box less the obstacles, or the smallest outline that encloses them.
+  !> Accessible area: the box, or the smallest obstacle that encloses disks, without the other obstacles.
   pure function free_area(box) result(area)
     type(box_t), intent(in) :: box
     real(real64) :: area                        !! [length**2]

@@ -1,5 +1,5 @@
-!> The sides of the box: where they are, and when a disk meets them, as a pure function of the disk's own state, counted
-!> from the epoch like its clock.
+!> The sides of the box: their positions, and the times at which disks reach them. These times are pure functions of the state
+!> of a disk and count from the epoch, like its clock.
 module box_sides
   use box_geometry, only: box_t
   use disks, only: disk_t
@@ -11,15 +11,16 @@ module box_sides
   private
   public :: bounds, keep_off_sides, next_side, side_time
 
-  real(real64), parameter :: rounding = 16*epsilon(1.0_real64)     !! relative, of a gap to a side that moves
+  real(real64), parameter :: rounding = 16*epsilon(1.0_real64)  !! rounding error of the gap to a moving side, relative to the
+                                                                !! coordinates
 
 contains
 
-  !> Where the sides are at a time.
+  !> Positions of the sides at a time.
   pure subroutine bounds(box, t, lower, upper)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: t               !! since the epoch [time]
-    real(real64), intent(out) :: lower(2), upper(2)     !! left and bottom, right and top [length]
+    real(real64), intent(out) :: lower(2), upper(2)     !! positions of left and bottom, of right and top sides [length]
     real(real64) :: inwards(n_sides)
     integer :: k
 
@@ -31,9 +32,9 @@ contains
     upper = box%upper - inwards([2, 4])
   end subroutine bounds
 
-  !> When the disk's rim meets a wall, or its centre a periodic side. A gap that rounding made negative
-  !> counts as zero: a disk that has arrived and moves on outwards turns now and never leaks. At a side that moves, so
-  !> does one that is as small: bounces that become ever faster would never come to an end.
+  !> Time when the boundary of a disk touches a wall, or its centre reaches a periodic side. A gap that is negative by
+  !> rounding counts as zero: a disk at a wall that still moves outwards is reflected now and cannot leave the box. At a moving
+  !> side, gaps within the rounding error also count as zero, because otherwise ever faster bounces would never end.
   pure function side_time(box, disk, side) result(t)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -53,7 +54,7 @@ contains
       if (motion%travels()) then
         since = disk%clock
         v = -sense*disk%v(axis)
-        if (motion%kind == piston) then             ! what flies was not hit before both clocks
+        if (motion%kind == piston) then             ! neither clock is later than the contact
           since = max(since, state%clock)
           after = since - disk%clock
           gap = gap + flight(0.0_real64, v, -sense*box%gravity(axis), after)
@@ -69,7 +70,7 @@ contains
     end associate
   end function side_time
 
-  !> The side met first; of two at the same moment the one named first.
+  !> The first side that a disk reaches. Of simultaneous ones the first in the order of sides is chosen.
   pure subroutine next_side(box, disk, t, side)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -89,9 +90,9 @@ contains
     end do
   end subroutine next_side
 
-  !> Moves a disk whose clock got another origin off the sides that it would meet before `now`: with its clock the place and
-  !> the velocity of a side that moves are rounded, and a disk that was all but in contact then would hit it once more, in
-  !> the past. It is moved by what counts as no gap, or little more.
+  !> Moves a disk away from the sides that it would touch before `now`, after a change of the origin of its clock. The change
+  !> also rounds the position and velocity of a moving side, so that a disk almost in contact could collide in the past. The
+  !> displacement is of the order of the rounding error.
   pure subroutine keep_off_sides(box, disk, now)
     type(box_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk
@@ -111,7 +112,7 @@ contains
     end do
   end subroutine keep_off_sides
 
-  !> What is no more than the rounding of a gap between a disk and a side that moves.
+  !> Rounding error of the gap between a disk and a moving side.
   pure function no_gap(disk, axis, motion) result(gap)
     type(disk_t), intent(in) :: disk
     integer, intent(in) :: axis

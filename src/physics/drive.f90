@@ -1,24 +1,26 @@
-!> What drives the disks from outside: kicks at multiples of an interval. What a kick does is in `kicks`.
+!> Driving of the disks at regular intervals: white noise, Andersen thermostat, Brownian or active motion. The velocity changes
+!> are carried out by `kicks`.
 module drive
   use kinds, only: int64, never, real64
   implicit none
   private
   public :: drive_kinds, drive_t
 
-  !> The kinds of kicks by their names in the input; a kind is its number in this list.
+  !> Names of the kinds of driving in the input. A kind is represented by its position in this list.
   character(len=*), parameter :: drive_kinds = "none noise andersen brownian active"
   integer, parameter, public :: no_kicks = 1, noise = 2, andersen = 3, brownian = 4, active = 5
 
   type :: drive_t
-    integer :: kind = no_kicks                       !! in `drive_kinds`
-    real(real64) :: interval = never                 !! [time]
-    real(real64) :: strength = 0.0_real64            !! of noise: growth of the variance of each component [velocity**2/time]
-    logical :: keep_momentum = .false.               !! of noise
-    real(real64) :: fraction = 1.0_real64            !! of the disks that a kick of 'andersen' reaches, on average
-    real(real64) :: temperature = 0.0_real64         !! kT of the velocities that the others give [energy]
-    real(real64) :: speed = 0.0_real64               !! of active disks along their orientation [length/time]
-    real(real64) :: rotational_diffusion = 0.0_real64   !! of their orientation [1/time]
-    integer :: species = 0                           !! number of the only one that is kicked; 0: all are
+    integer :: kind = no_kicks                       !! position in `drive_kinds`
+    real(real64) :: interval = never                 !! time between kicks [time]
+    real(real64) :: strength = 0.0_real64  !! noise strength: growth rate of the variance of each velocity component
+                                           !! [velocity**2/time]
+    logical :: keep_momentum = .false.               !! the noise conserves the total momentum
+    real(real64) :: fraction = 1.0_real64            !! fraction of the disks that a kick of 'andersen' affects, on average
+    real(real64) :: temperature = 0.0_real64         !! kT of the velocities drawn by 'andersen', 'brownian' and 'active' [energy]
+    real(real64) :: speed = 0.0_real64               !! self-propulsion speed of active disks [length/time]
+    real(real64) :: rotational_diffusion = 0.0_real64   !! rotational diffusion coefficient of active disks [1/time]
+    integer :: species = 0                           !! index of the only driven species; 0: all are driven
   contains
     procedure :: is_on
     procedure :: reaches
@@ -29,7 +31,7 @@ module drive
 
 contains
 
-  !> Whether there are kicks.
+  !> Whether there is driving.
   pure function is_on(self) result(yes)
     class(drive_t), intent(in) :: self
     logical :: yes
@@ -37,10 +39,10 @@ contains
     yes = self%kind /= no_kicks
   end function is_on
 
-  !> Whether kicks are for disks of a species.
+  !> Whether the driving acts on a species.
   elemental function reaches(self, species) result(yes)
     class(drive_t), intent(in) :: self
-    integer, intent(in) :: species                   !! its number
+    integer, intent(in) :: species                   !! index of the species
     logical :: yes
 
     yes = self%is_on() .and. (self%species == 0 .or. self%species == species)
@@ -54,7 +56,7 @@ contains
     yes = self%is_on() .and. self%species == 0 .and. .not. (self%kind == andersen .and. self%fraction < 1)
   end function reaches_all
 
-  !> When kick k comes: a product, not a sum, so that it does not drift.
+  !> Time of kick k. It is computed as a product, because a sum would accumulate rounding errors.
   pure function time_of(self, k) result(t)
     class(drive_t), intent(in) :: self
     integer(int64), intent(in) :: k
@@ -64,10 +66,10 @@ contains
     if (self%is_on()) t = k*self%interval
   end function time_of
 
-  !> Mean square of the velocity that a kick gives, or adds, to disks of a species and a mass; 0 if none reaches them.
+  !> Mean square of the velocity that a kick sets or adds, for disks of a species and a mass; 0 if they are not driven.
   elemental function speed2(self, species, mass)
     class(drive_t), intent(in) :: self
-    integer, intent(in) :: species                   !! its number
+    integer, intent(in) :: species                   !! index of the species
     real(real64), intent(in) :: mass                 !! [mass]
     real(real64) :: speed2
 

@@ -1,5 +1,5 @@
-!> What changes in the state when two disks, a disk and a wall, or a disk and a periodic side meet, with all counts
-!> and sums. Both dynamics use it.
+!> Executes events: applies the contact law when two disks or a disk and a wall collide, moves disks through periodic sides,
+!> and updates counters and sums. Used by the event-driven and the time-stepped dynamics.
 module encounters
   use kinds, only: int32, int64, real64
   use collisions, only: pair_impulse, tangential_impulse
@@ -17,25 +17,28 @@ module encounters
   private
   public :: collide, collide_pair, encounter_text, pass_side, passes
 
-  !> Collisions that disks may have at one moment in any series, and then in a collapse, where approaches are no more than
-  !> rounding errors: by their ratio to the velocities, per loss of speed in a collision, or, where walls slow all disks down, by
-  !> their size, far below the velocities that an input may have [length/time].
+  !> Limits for the detection of an inelastic collapse: the number of simultaneous collisions of a pair that any series may have,
+  !> and the approach velocity below which further collisions only result from rounding errors. The latter is relative to the
+  !> velocities and to the loss per collision. Where walls slow all disks down it is an absolute value, far below all velocities
+  !> that an input may contain [length/time].
   integer(int32), parameter :: most_visible = most_repeats - 3
   real(real64), parameter :: rounded = 1.0e-12_real64, slowest = 1.0e-120_real64
 
-  real(real64), parameter :: far_heavier = 2.0_real64**20    !! ratio of masses
+  real(real64), parameter :: far_heavier = 2.0_real64**20  !! ratio of masses above which the velocity change of the heavy disk
+                                                           !! loses digits
 
 contains
 
-  !> Collides disk i at the time t with what `code` names, unless they are together already, with all that is rare: disks
-  !> turn and rub, and the collision is booked, and logged if there is a log: the same entry whichever of two disks expected
-  !> it.
+  !> Executes the collision of disk i at the time t with the partner `code`: another disk, a side or an obstacle. This is the
+  !> general version, which handles rotation, friction, velocity-dependent restitution, the virial tensor and the event log;
+  !> `collide_pair` is the fast one. The log entry does not depend on which of the two disks predicted the event. Two disks that
+  !> are still in contact are skipped.
   subroutine collide(sim, i, code, t, counts, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: code           !! a disk (> 0), a side or an obstacle: see `partners`
+    integer(int32), intent(in) :: code           !! index of a disk (> 0), or code of a side or obstacle: see `partners`
     real(real64), intent(in) :: t
-    logical, value :: counts                     !! in the tally and the log
+    logical, value :: counts                     !! the collision is included in the tally and the log
     type(event_log_t), intent(inout), optional :: log
     real(real64) :: v(2), w(2), change(2), restitution
     integer(int32) :: first, second, ids(2), n_repeats
@@ -77,13 +80,13 @@ contains
     call log%append([sim%box%epoch + t, real(ids, real64), impulse_between(sim, first, second, v, w), change])
   end subroutine collide
 
-  !> Collides the disks i and j at the time t. Which of them is i changes no bit.
+  !> Executes the collision of disks i and j at the time t. The result is bit-identical if i and j are exchanged.
   subroutine collide_pair(sim, i, j, t, counts, restitution)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
-    logical, value :: counts                     !! in the tally
-    real(real64), value :: restitution           !! but for the TC model
+    logical, value :: counts                     !! the collision is included in the tally
+    real(real64), value :: restitution           !! coefficient of restitution, unless the TC model makes the collision elastic
     real(real64) :: dx(2), dv(2), b, distance2, q, mass_i, mass_j
     integer(int32) :: si, sj
     logical :: elastic
@@ -101,7 +104,7 @@ contains
     dx = sim%disk(j)%x - sim%disk(i)%x
     dv = sim%disk(j)%v - sim%disk(i)%v
     if (any(sim%box%periodic)) then
-      if (any(abs(dx) >= 0.5_real64*sim%box%edges())) call see_nearest(sim, t, dx, dv)    ! seldom
+      if (any(abs(dx) >= 0.5_real64*sim%box%edges())) call see_nearest(sim, t, dx, dv)    ! rarely needed
     end if
     b = dx(1)*dv(1) + dx(2)*dv(2)
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
@@ -112,10 +115,10 @@ contains
       mass_j = sim%own_mass(j)
     end if
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
-    sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx          ! a reciprocal would round the same way each time
+    sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx  ! multiplication by a reciprocal would be rounded in the same direction each time
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     dv = sim%disk(j)%v - sim%disk(i)%v
-    if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call keep_apart(sim, i, j)    ! by rounding
+    if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call keep_apart(sim, i, j)    ! the pair still approaches, by rounding
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(j)%collisions = sim%tag(j)%collisions + 1
     sim%tag(i)%met = sim%tag(j)%id
@@ -127,7 +130,7 @@ contains
     if (restitution < 1) call sim%tally%sum(dissipated)%add(0.5_real64*(1 - restitution)*q*b)
   end subroutine collide_pair
 
-  !> Speed along the normal with which the disks i and j meet at the time t.
+  !> Normal impact velocity of disks i and j at the time t.
   pure function approach(sim, i, j, t) result(g)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
@@ -145,15 +148,15 @@ contains
     g = abs(dot_product(dx, dv))/magnitude(dx)
   end function approach
 
-  !> Looks at a collision of two disks that have both had one at this very time. In contacts of more than two disks that is
-  !> common, and the series of such collisions mostly ends. A collapse is a series without end: the same disks collide again
-  !> and again, until the speed at which they approach is no more than the rounding error of their velocities. Elastic
-  !> disks cannot collapse, nor do disks with a contact time.
+  !> Counts a lossy collision of two disks both of which have already collided at exactly this time. This is common when more than
+  !> two disks are in contact, and the series usually ends. An inelastic collapse is an infinite series: the same disks collide
+  !> again and again until their approach velocity is no more than the rounding error of their velocities. Elastic disks and
+  !> disks with a contact duration (TC model) cannot collapse.
   pure subroutine note_stuck(sim, i, j, t, counts, n)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
-    logical, intent(in) :: counts                !! in the tally
+    logical, intent(in) :: counts                !! the collision is included in the tally
     integer(int32), intent(out) :: n             !! length of the series so far, see `partners: most_repeats`
     real(real64) :: restitution, fastest
     integer(int32) :: met(2)
@@ -162,7 +165,8 @@ contains
     restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(j)%species)
     if (sim%law%contact_time > 0 .or. .not. restitution < 1) return
     met = sim%tag([i, j])%met
-    n = minval(merge(repeats(met), most_repeats, met > 0)) + 1        ! where one has hit a wall in between, its partner counts
+    n = minval(merge(repeats(met), most_repeats, met > 0)) + 1  ! if one of them has hit a wall in between, its partner's count is
+                                                                ! used
     fastest = max(magnitude(sim%disk(i)%v), magnitude(sim%disk(j)%v))
     if (approach(sim, i, j, t) > max(rounded*(1 - restitution)*fastest, slowest)) n = min(n, most_visible)
     n = min(n, most_repeats)
@@ -171,19 +175,19 @@ contains
     if (n == most_repeats) sim%tally%collapse = min(sim%tally%collapse, sim%box%epoch + t)
   end subroutine note_stuck
 
-  !> The tangential part of a collision of the rough disks i and j, whose velocities along the normal have changed already.
+  !> Applies the tangential impulse in a collision of the rough disks i and j, after the normal impulse.
   subroutine rub(sim, i, j, normal_impulse, counts)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: normal_impulse   !! [mass length/time]
-    logical, value :: counts                     !! in the tally
+    logical, value :: counts                     !! the collision is included in the tally
     real(real64) :: along(2), dv(2), slip, impulse, mass_i, mass_j, reduced
 
     associate (p => sim%disk(i), q => sim%disk(j), law => sim%law)
       along = q%x - p%x
       dv = q%v - p%v
       call see_nearest(sim, p%clock, along, dv)
-      along = [along(2), -along(1)]/magnitude(along)             ! z x n, n from j to i
+      along = [along(2), -along(1)]/magnitude(along)             ! z x n, with n from j to i
       dv = -dv
       slip = dot_product(dv, along) - (p%radius*sim%spin(i) + q%radius*sim%spin(j))
       mass_i = sim%mass_of(i)
@@ -200,13 +204,13 @@ contains
     call keep_apart(sim, i, j)
   end subroutine rub
 
-  !> The momentum that disk i has gained, from a surface or from disk j. The velocity of a disk that is far heavier than its
-  !> partner hardly changes, and rounds: then it is that which the partner has lost.
+  !> Change of the momentum of disk i in a collision with a surface or with disk j. If disk i is far heavier than its partner, its
+  !> velocity change is dominated by rounding, and the momentum lost by the partner is used.
   pure function momentum_change(sim, i, j, v, w) result(change)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: j              !! not positive: there is no partner
-    real(real64), intent(in) :: v(2), w(2)       !! their velocities before [length/time]
+    integer(int32), intent(in) :: j              !! index of the partner; not positive if there is none
+    real(real64), intent(in) :: v(2), w(2)       !! velocities before the collision [length/time]
     real(real64) :: change(2)                    !! [mass length/time]
 
     if (is_far_heavier(sim, i, j)) then
@@ -216,12 +220,12 @@ contains
     end if
   end function momentum_change
 
-  !> The size of that.
+  !> Magnitude of this change.
   pure function impulse_between(sim, i, j, v, w) result(impulse)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: j              !! not positive: there is no partner
-    real(real64), intent(in) :: v(2), w(2)       !! their velocities before [length/time]
+    integer(int32), intent(in) :: j              !! index of the partner; not positive if there is none
+    real(real64), intent(in) :: v(2), w(2)       !! velocities before the collision [length/time]
     real(real64) :: impulse                      !! [mass length/time]
 
     if (is_far_heavier(sim, i, j)) then
@@ -231,7 +235,7 @@ contains
     end if
   end function impulse_between
 
-  !> Whether disk i is so much heavier than disk j that its own change of velocity has lost digits.
+  !> Whether disk i is so much heavier than disk j that its velocity change has lost significant digits.
   pure function is_far_heavier(sim, i, j) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
@@ -241,11 +245,11 @@ contains
     if (yes) yes = sim%mass_of(i) > far_heavier*sim%mass_of(j)
   end function is_far_heavier
 
-  !> The energy of translation that disk i has gained from disk j, as the mean of the gain of one and the loss of the other.
+  !> Translational energy transferred from disk j to disk i: the mean of the energy gained by i and the energy lost by j.
   pure function handed(sim, i, j, v, w) result(energy)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
-    real(real64), intent(in) :: v(2), w(2)       !! their velocities before [length/time]
+    real(real64), intent(in) :: v(2), w(2)       !! velocities before the collision [length/time]
     real(real64) :: energy
 
     if (is_far_heavier(sim, i, j) .or. is_far_heavier(sim, j, i)) then
@@ -255,24 +259,23 @@ contains
     end if
   end function handed
 
-  !> The energy of translation that disk i has gained.
+  !> Change of the translational kinetic energy of disk i.
   pure function gain(sim, i, before)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
-    real(real64), intent(in) :: before(2)        !! its velocity [length/time]
+    real(real64), intent(in) :: before(2)        !! velocity before the collision [length/time]
     real(real64) :: gain                         !! [energy]
 
     gain = 0.5_real64*sim%mass_of(i)*dot_product(sim%disk(i)%v - before, sim%disk(i)%v + before)
   end function gain
 
-  !> Books a collision of the disks i and j, whose momentum changes by `change` and its negative: the change, and the energy
-  !> that one hands to the other, times their distance; and what the shear has done, which is nothing but if they met through
-  !> the bottom or the top.
+  !> Adds a collision of disks i and j to the virial tensor, to the collisional heat flux, and to the work of the shear. The
+  !> latter is zero unless the disks collide across the lower or upper boundary.
   subroutine book_pair(sim, i, j, change, handed)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
-    real(real64), intent(in) :: change(2)        !! [mass length/time]
-    real(real64), intent(in) :: handed           !! to disk i [energy]
+    real(real64), intent(in) :: change(2)        !! momentum change of disk i [mass length/time]
+    real(real64), intent(in) :: handed           !! energy transferred to disk i [energy]
     real(real64) :: r(2), slip(2)
     integer :: a, b
 
@@ -290,7 +293,7 @@ contains
     call keep_apart(sim, i, j)
   end subroutine book_pair
 
-  !> Turns the separation of two disks at the time t, and its rate, into those of the nearest image of the second.
+  !> Replaces the separation and relative velocity of two disks at the time t by those to the nearest image of the second disk.
   pure subroutine see_nearest(sim, t, dx, dv)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: t
@@ -299,15 +302,15 @@ contains
     type(images_t) :: images
     type(image_t) :: image
 
-    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! nearly always
+    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! true for nearly all pairs
     images = sim%images()
     image = images%image(images%nearest_image(dx, t))
     dx = dx + [image%shift(1) + image%slip*t, image%shift(2)]
     dv(1) = dv(1) + image%slip
   end subroutine see_nearest
 
-  !> Whether the disks i and j, which touch at the time t, hit each other last and through the same image. No force acts
-  !> between them: only rounding can have made them approach again, when one of them passed a periodic side.
+  !> True if disks i and j, which touch at the time t, are still in contact after their last collision, through the same
+  !> periodic image. Without forces between them, an approach is then a rounding error, from the shift of one disk by a period.
   pure function are_together(sim, i, j, t) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
@@ -327,8 +330,8 @@ contains
     end associate
   end function are_together
 
-  !> Takes from two disks of the same clock, which have collided, the approach that rounding may have left, in the very
-  !> expression by which a contact is predicted: then none is. This is no collision, and the clocks stay.
+  !> Removes the approach velocity that rounding can leave after a collision. The test uses the same expression as the prediction
+  !> of contacts, so that the pair is not predicted to collide again. No event is counted, and the clocks do not change.
   pure subroutine keep_apart(sim, i, j)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
@@ -354,7 +357,7 @@ contains
     end associate
   end subroutine keep_apart
 
-  !> Whether the code names a periodic side.
+  !> Whether a code is that of a periodic side.
   pure function passes(sim, code) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: code
@@ -364,7 +367,7 @@ contains
     if (is_side(code)) yes = sim%box%periodic(axis_of(code))
   end function passes
 
-  !> Moves disk i by one period through a periodic side at the time t. Its clock stays.
+  !> Moves disk i by one period when it passes a periodic side at the time t. Its clock does not change.
   subroutine pass_side(sim, i, code, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -384,12 +387,12 @@ contains
     end associate
   end subroutine pass_side
 
-  !> Moves disk i through the bottom or the top of a sheared box. What is inside is displaced, and as fast as the box is
-  !> when seen from there: no force acts.
+  !> Moves disk i across the lower or upper boundary of a sheared box (Lees-Edwards): its position is shifted by the
+  !> displacement of the image, and its velocity by the velocity of the image. No force acts on the disk.
   subroutine pass_seam(sim, i, rows, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    integer, intent(in) :: rows                  !! 1 through the top, -1 through the bottom
+    integer, intent(in) :: rows                  !! 1 across the upper boundary, -1 across the lower one
     real(real64), intent(in) :: t
     type(images_t) :: images
     real(real64) :: v, columns
@@ -406,7 +409,7 @@ contains
     end associate
   end subroutine pass_seam
 
-  !> Disk i, its partner and the time, for messages.
+  !> Disk i, its partner and the time, as a text for messages.
   pure function encounter_text(sim, i, code) result(text)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code           !! as in `partners`
@@ -424,7 +427,7 @@ contains
 
   contains
 
-    !> A disk by its number and species.
+    !> The number and species of a disk.
     pure function disk_text(k) result(words)
       integer(int32), intent(in) :: k
       character(len=:), allocatable :: words

@@ -1,4 +1,4 @@
-!> Collisions that have not been written yet: the dynamics appends them, its caller takes them.
+!> Event log: collisions that have not been written yet. The dynamics appends them, and the caller empties the list.
 module event_log
   use kinds, only: real64
   implicit none
@@ -8,10 +8,10 @@ module event_log
   integer, parameter :: record_length = 6, first_room = 1024
 
   type :: event_log_t
-    integer :: most = huge(0)                     !! the dynamics pauses when there are so many
-    integer :: n = 0                              !! collisions in the list
-    !> (6,n, and room for more) Time since the start of the run, ids i and j in the order of the input, and the change of
-    !> momentum of i: its size and its components [mass length/time]. Instead of j the code of a surface: see `partners`.
+    integer :: most = huge(0)                     !! number of entries at which the dynamics returns to the caller
+    integer :: n = 0                              !! number of entries
+    !> (6, at least n) Time since the start of the run, ids i and j in the order of the input, and the momentum change of disk
+    !> i: magnitude and two components [mass length/time]. For a wall, j is the code of the surface: see `partners`.
     real(real64), allocatable :: record(:, :)
   contains
     procedure :: append
@@ -19,7 +19,7 @@ module event_log
 
 contains
 
-  !> Whether there is a log that should be emptied.
+  !> Whether there is a log that has to be emptied.
   pure function is_full(log) result(yes)
     type(event_log_t), intent(in), optional :: log
     logical :: yes
@@ -28,7 +28,7 @@ contains
     if (present(log)) yes = log%n >= log%most
   end function is_full
 
-  !> Lists a collision.
+  !> Appends a collision.
   pure subroutine append(self, record)
     class(event_log_t), intent(inout) :: self
     real(real64), intent(in) :: record(record_length)

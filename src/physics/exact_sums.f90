@@ -1,4 +1,4 @@
-!> Sums that come out the same to the last bit in whatever order their terms are added: fixed-point numbers.
+!> Sums whose value does not depend, to the last bit, on the order of their terms. They are fixed-point numbers.
 module exact_sums
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use kinds, only: int64, int128, real64
@@ -6,15 +6,15 @@ module exact_sums
   private
   public :: exact_sum_t
 
-  integer, parameter :: digits_of_bound = 62             !! binary ones, of a term at the bound
-  integer, parameter :: digits_of_rare = 90              !! and of terms that are counted apart
+  integer, parameter :: digits_of_bound = 62             !! binary digits of a term at the bound
+  integer, parameter :: digits_of_rare = 90              !! binary digits of the unit of very large terms
   real(real64), parameter :: most_units = 2.0_real64**digits_of_bound
   real(real64), parameter :: rare_unit = 2.0_real64**digits_of_rare
   integer, parameter :: digits_of_most = 125
-  integer(int128), parameter :: most = 2_int128**digits_of_most    !! of either number: beyond it the sum is lost
+  integer(int128), parameter :: most = 2_int128**digits_of_most    !! limit of both numbers; the sum is lost beyond it
 
-  !> Terms may exceed the bound that `choose_unit` was given: then adding them takes a little longer. 2**35 terms of any size
-  !> below 2**90 units cannot overflow; the multiples of 2**90 units in larger ones are counted apart.
+  !> A fixed-point sum. Terms may exceed the bound that was passed to `choose_unit`; adding them takes slightly longer. 2**35
+  !> terms of any size below 2**90 units cannot overflow; multiples of 2**90 units in larger terms are counted separately.
   type :: exact_sum_t
     integer(int128) :: units = 0
     integer(int128) :: rare = 0                          !! multiples of 2**90 units
@@ -30,12 +30,12 @@ module exact_sums
 
 contains
 
-  !> Makes a sum, empty or restored, fine enough for terms up to a bound; one at work keeps its value.
+  !> Chooses a unit that is fine enough for terms up to a bound. A sum that already has terms keeps its value.
   elemental subroutine choose_unit(self, bound)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: bound
     real(real64) :: before
-    integer :: finer                                     ! [binary digits]
+    integer :: finer                                     ! number of additional binary digits
 
     before = self%per_one
     self%per_one = 1
@@ -49,7 +49,7 @@ contains
   !> Divides the unit by a power of two.
   elemental subroutine make_finer(self, digits)
     class(exact_sum_t), intent(inout) :: self
-    integer, intent(in) :: digits                        !! binary
+    integer, intent(in) :: digits                        !! number of binary digits
     integer(int128) :: moved
 
     if (self%units == 0 .and. self%rare == 0) return
@@ -67,7 +67,7 @@ contains
   !> Multiplies the unit by a power of two.
   elemental subroutine make_coarser(self, digits)
     class(exact_sum_t), intent(inout) :: self
-    integer, intent(in) :: digits                        !! binary
+    integer, intent(in) :: digits                        !! number of binary digits
     integer(int128) :: left
 
     left = self%rare/2_int128**digits
@@ -76,7 +76,7 @@ contains
     self%rare = left
   end subroutine make_coarser
 
-  !> Adds a term, less what is below a unit.
+  !> Adds a term; the part below one unit is cut off.
   elemental subroutine add(self, term)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: term
@@ -92,7 +92,7 @@ contains
     end if
   end subroutine add
 
-  !> Adds a term in two parts, which are exact: a double has fewer digits than either.
+  !> Adds a very large term in two parts. Both are exact, because a double has fewer digits than either number.
   elemental subroutine add_rare(self, units)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: units
@@ -107,7 +107,7 @@ contains
     end if
   end subroutine add_rare
 
-  !> Adds the terms of another sum in the same units.
+  !> Adds the terms of another sum that has the same unit.
   elemental subroutine include(self, other)
     class(exact_sum_t), intent(inout) :: self
     type(exact_sum_t), intent(in) :: other
@@ -117,7 +117,7 @@ contains
     if (max(abs(self%rare), abs(other%rare)) >= most) self%rare = most
   end subroutine include
 
-  !> Takes all terms away.
+  !> Removes all terms.
   elemental subroutine clear(self)
     class(exact_sum_t), intent(inout) :: self
 
@@ -125,7 +125,7 @@ contains
     self%rare = 0
   end subroutine clear
 
-  !> The sum so far; not a number if it has become too large.
+  !> The value of the sum; NaN if it has become too large.
   elemental function value(self)
     class(exact_sum_t), intent(in) :: self
     real(real64) :: value

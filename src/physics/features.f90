@@ -1,23 +1,23 @@
-!> Features of a run beyond free flight and collisions that change two velocities. They decide which arrays the disks have,
-!> which observables exist, which version of a collision is executed, and which inputs are refused.
+!> Features of a run beyond free flight and collisions that change only two velocities. They determine the arrays of the
+!> disks, the observables, the version of the collision procedure, and the inputs that are refused.
 module features
   implicit none
   private
   public :: features_t
 
   type :: features_t
-    logical :: own_sizes = .false.      !! masses and radii are not those of the species
-    logical :: rotation = .false.       !! disks can turn
-    logical :: orientation = .false.    !! disks have a direction, as all have that can turn
-    logical :: stress = .false.         !! the changes of momentum are summed, and logged
-    logical :: helfand = .false.        !! and what disks carry is summed over time
+    logical :: own_sizes = .false.      !! disks have individual masses and radii
+    logical :: rotation = .false.       !! disks can rotate
+    logical :: orientation = .false.    !! disks have an orientation; true for all disks that can rotate
+    logical :: stress = .false.         !! momentum changes in collisions are summed and logged
+    logical :: helfand = .false.        !! the Helfand moments are accumulated as well
   contains
     procedure :: are_rare
   end type features_t
 
 contains
 
-  !> Whether collisions take more than the usual path.
+  !> Whether collisions need the general procedure instead of the fast one.
   pure function are_rare(self) result(yes)
     class(features_t), intent(in) :: self
     logical :: yes

@@ -1,4 +1,4 @@
-!> A frame and a sample of the observables of this moment: their values one after the other.
+!> Values of a frame and of a sample of the observables at the present time, as flat arrays.
 module moments
   use kinds, only: int32, int64, real64
   use observables, only: observable_list_t, observed
@@ -8,24 +8,24 @@ module moments
   private
   public :: frame_column_t, frame_columns, frame_sample, observable_sample
 
-  !> What a frame has of each disk.
+  !> A quantity that frames contain for each disk.
   type :: frame_column_t
     character(len=16) :: name
     integer :: width = 1
     logical :: is_count = .false.
   end type frame_column_t
 
-  !> The columns of a frame: those that every disk has, then those that only some runs have.
+  !> Columns of a frame: first those of all runs, then those of some runs only.
   type(frame_column_t), parameter :: columns(*) = [frame_column_t("position", 2), frame_column_t("velocity", 2), &
     frame_column_t("event_count", is_count=.true.), frame_column_t("image", 2, is_count=.true.), &
     frame_column_t("angular_velocity"), frame_column_t("orientation")]
 
 contains
 
-  !> The columns of a frame: of those that there are the positions, and the wanted ones [all].
+  !> Columns of the frames of a simulation: the positions, and those of the others that are wanted [all].
   pure function frame_columns(sim, wanted) result(list)
     type(simulation_t), intent(in) :: sim
-    character(len=*), intent(in), optional :: wanted(:)   !! their names
+    character(len=*), intent(in), optional :: wanted(:)   !! names of the wanted columns
     type(frame_column_t), allocatable :: list(:)
     integer :: k
 
@@ -33,17 +33,17 @@ contains
     if (present(wanted)) list = pack(list, [.true., (any(wanted == list(k)%name), k=2, size(list))])
   end function frame_columns
 
-  !> The frame of this moment, disks in the order of the input.
+  !> The frame of the present time, with disks in the order of the input.
   function frame_sample(sim, step, list) result(sample)
     type(simulation_t), intent(in) :: sim
-    integer(int64), intent(in) :: step            !! number of the frame, from 0
-    type(frame_column_t), intent(in) :: list(:)   !! the columns
+    integer(int64), intent(in) :: step            !! number of the frame, counted from 0
+    type(frame_column_t), intent(in) :: list(:)   !! columns of the frame
     real(real64), allocatable :: sample(:, :)     !! (width,1)
     logical :: shared
     real(real64) :: x(2), v(2), image(2)
     integer(int32) :: i, k, n
     integer :: c, first
-    integer :: at(size(columns))                  ! where they begin; 0: they are not wanted
+    integer :: at(size(columns))                  ! first element of each column in the sample; 0: not wanted
 
     n = sim%n_disks()
     allocate (sample(2 + n*sum(list%width), 1))
@@ -75,13 +75,13 @@ contains
     !$omp end parallel do
   end function frame_sample
 
-  !> Moves a disk by whole periods into the box, which holds its lower sides only, and counts them. The rows come first: in
-  !> a sheared box they change the column.
+  !> Moves a disk by whole periods into the box, which includes only its lower sides, and counts the periods. Rows come first,
+  !> because in a sheared box they change the column.
   pure subroutine wrap(sim, x, v, image)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(inout) :: x(2)           !! [length]
     real(real64), intent(inout) :: v(2)           !! [length/time]
-    real(real64), intent(inout) :: image(2)       !! periods travelled
+    real(real64), intent(inout) :: image(2)       !! number of periods travelled
     real(real64) :: periods
     integer :: axis
 
@@ -96,15 +96,15 @@ contains
           x(1) = x(1) - periods*(upper - lower)
           image(1) = image(1) + periods
         end if
-        x(axis) = max(x(axis), lower)             ! by rounding only
+        x(axis) = max(x(axis), lower)             ! outside only by rounding
       end associate
     end do
   end subroutine wrap
 
-  !> The observables of this moment.
+  !> The observables at the present time.
   pure function observable_sample(sim, step) result(sample)
     type(simulation_t), intent(in) :: sim
-    integer(int64), intent(in) :: step            !! number of the sample, from 0
+    integer(int64), intent(in) :: step            !! number of the sample, counted from 0
     real(real64), allocatable :: sample(:, :)     !! (width,1)
     type(observable_list_t) :: list
 

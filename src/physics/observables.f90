@@ -1,5 +1,5 @@
-!> What is measured of a simulation besides the frames: means over the disks, totals, and the counts and sums
-!> that the collisions have gathered.
+!> Observables other than frames: averages over disks, totals, and the counters and sums over
+!> collisions.
 module observables
   use kinds, only: int32, real64
   use box_geometry, only: box_t, free_area
@@ -14,41 +14,42 @@ module observables
 
   integer, parameter :: most_components = 4
 
-  !> One observable, scalar or vector.
+  !> One observable, a scalar or a vector.
   type :: observable_t
-    character(len=64) :: name = ""                !! below /observables
+    character(len=64) :: name = ""                !! path below /observables
     integer :: width = 0                          !! number of components
-    logical :: is_count = .false.                 !! a whole number
-    real(real64) :: value(most_components) = 0.0_real64    !! now; counts are exact up to 2**53
+    logical :: is_count = .false.                 !! the value is an integer
+    real(real64) :: value(most_components) = 0.0_real64    !! present value; counts are exact up to 2**53
   end type observable_t
 
   type :: observable_list_t
     integer :: n = 0
-    type(observable_t), allocatable :: row(:)     !! the first n count
+    type(observable_t), allocatable :: row(:)     !! the observables; only the first n are used
   contains
     procedure :: add
     procedure :: values
   end type observable_list_t
 
-  !> Sums over the disks of a species, or of all, each by its number.
-  integer, parameter :: disks = 1, mass = 2, speed = 3, momentum = 4       !! and the next: of two components
+  !> Indices of sums over the disks of a species, or over all disks.
+  integer, parameter :: disks = 1, mass = 2, speed = 3, momentum = 4       !! momentum has two components
   integer, parameter :: kinetic = 6, potential = 7, rotational = 8         !! energies
-  integer, parameter :: own_kinetic = 9, own_momentum = 10                 !! relative to the profile of a sheared box; likewise
-  integer, parameter :: flow = 12               !! and the next four: see `tally: carried`; likewise
-  integer, parameter :: tensor(*) = flow + [0, 1, 1, 2]                    !! of momentum: xx, xy, yx, yy
-  !> The energy of all kinds, so exactly that it can be balanced, and what rounding has taken from it; unless `is_driven`: 0.
+  integer, parameter :: own_kinetic = 9, own_momentum = 10  !! relative to the velocity profile of a sheared box; momentum has two
+                                                            !! components
+  integer, parameter :: flow = 12               !! five components: see `tally: carried`; relative to the profile as well
+  integer, parameter :: tensor(*) = flow + [0, 1, 1, 2]                    !! components xx, xy, yx, yy of the momentum flux
+  !> Total energy and the rounding error of its sum, precise enough for an energy balance. Zero unless `is_driven`.
   integer, parameter :: energy = 17, lost = 18
 
 contains
 
-  !> All observables with their values now. A new one is one more line here.
+  !> All observables with their present values. A new observable needs one more line here.
   pure function observed(sim) result(list)
     type(simulation_t), intent(in) :: sim
     type(observable_list_t) :: list
-    real(real64) :: sums(lost, 0:size(sim%species))   ! by species; 0: all
+    real(real64) :: sums(lost, 0:size(sim%species))   ! by species; index 0: all disks
     character(len=:), allocatable :: path
-    real(real64) :: flown(5)                          ! [energy time], [energy length]
-    real(real64) :: at(2, 2)                          ! lower and upper sides [length]
+    real(real64) :: flown(5)                          ! time integrals of the fluxes [energy time], [energy length]
+    real(real64) :: at(2, 2)                          ! positions of the lower and upper sides [length]
     integer :: s, k
 
     call add_up(sim, sums)
@@ -93,7 +94,7 @@ contains
     end do
   end function observed
 
-  !> The energy of all kinds now, so exactly that it can be balanced.
+  !> The total energy at the present time, precise enough for an energy balance.
   pure function total_energy(sim) result(now)
     type(simulation_t), intent(in) :: sim
     real(real64) :: now                           !! [energy]
@@ -103,13 +104,13 @@ contains
     now = total(sim, sums(:, 0))
   end function total_energy
 
-  !> Means over a species, per disk. The temperature is kT in two dimensions: the kinetic energy relative to the
-  !> common motion, and to the velocity profile of a sheared box.
+  !> Adds averages per disk over a species. The temperature is kT in two dimensions, from the kinetic energy relative to the
+  !> mean motion and to the velocity profile of a sheared box.
   pure subroutine add_means(list, group, sums, rotation)
     type(observable_list_t), intent(inout) :: list
     character(len=*), intent(in) :: group         !! name of the species
     real(real64), intent(in) :: sums(:)
-    logical, intent(in) :: rotation               !! disks can turn
+    logical, intent(in) :: rotation               !! disks can rotate
     real(real64) :: n, drift
 
     n = max(sums(disks), 1.0_real64)
@@ -126,7 +127,7 @@ contains
     call list%add(group//"/rotational_temperature", [2*sums(rotational)/n])
   end subroutine add_means
 
-  !> Adds an observable, with one or more components.
+  !> Adds an observable with one or more components.
   pure subroutine add(self, name, value, is_count)
     class(observable_list_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -143,7 +144,7 @@ contains
     end associate
   end subroutine add
 
-  !> All components one after the other.
+  !> All components of all observables as a flat array.
   pure function values(self)
     class(observable_list_t), intent(in) :: self
     real(real64) :: values(sum(self%row(:self%n)%width))
@@ -158,7 +159,7 @@ contains
     end do
   end function values
 
-  !> Names below /observables that no species may have.
+  !> Names below /observables that a species must not have.
   function own_names() result(names)
     character(len=64), allocatable :: names(:)
     type(simulation_t) :: empty
@@ -170,13 +171,13 @@ contains
     empty%drive%kind = noise
     call empty%tally%make_room(n_sides)
     empty%box = box_t()
-    empty%box%surface%law%temperature = 1         ! but all that can be measured
+    empty%box%surface%law%temperature = 1         ! enables all observables
     empty%box%surface%law%speed = 1
     empty%with%stress = .true.
     empty%with%helfand = .true.
     list = observed(empty)
     allocate (names(list%n + 1))
-    names(list%n + 1) = "obstacles"                 ! it has none
+    names(list%n + 1) = "obstacles"                 ! the empty box has no obstacles
     do k = 1, list%n
       associate (name => list%row(k)%name)
         names(k) = name(:index(name//"/", "/") - 1)
@@ -184,17 +185,17 @@ contains
     end do
   end function own_names
 
-  !> Energy of all kinds, of all disks.
+  !> Energies of all disks.
   pure function energies(sim)
     type(simulation_t), intent(in) :: sim
-    real(real64) :: energies(3)                   !! of translation, of rotation, total [energy]
+    real(real64) :: energies(3)                   !! translational, rotational, total [energy]
     real(real64) :: sums(lost, 0:size(sim%species))
 
     call add_up(sim, sums)
     energies = [sums(kinetic, 0), sums(rotational, 0), total(sim, sums(:, 0))]
   end function energies
 
-  !> The same from the sums.
+  !> The total energy from the sums.
   pure function total(sim, sums)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: sums(:)
@@ -204,8 +205,8 @@ contains
     if (sim%is_driven()) total = sums(energy) + sums(lost)
   end function total
 
-  !> Adds to the energy (Neumaier, Z. Angew. Math. Mech. 54, 39 (1974)): what disks are given shows in the last digits of
-  !> a sum over many.
+  !> Adds a term to the energy with compensated summation (Neumaier, Z. Angew. Math. Mech. 54, 39 (1974)), because the energy
+  !> gained from driving is small compared with the sum over many disks.
   pure subroutine add_energy(sums, term)
     real(real64), intent(inout) :: sums(:)
     real(real64), intent(in) :: term
@@ -220,7 +221,7 @@ contains
     sums(energy) = new
   end subroutine add_energy
 
-  !> One pass over the disks. Heights count from the origin.
+  !> Computes the sums in one pass over the disks. The potential energy is zero at the origin.
   pure subroutine add_up(sim, sums)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(out) :: sums(:, 0:)
@@ -262,11 +263,11 @@ contains
     end do
   end subroutine add_up
 
-  !> Pressure in two dimensions by the virial theorem, P A = K + W/(2t): K and A now, W the sum of impulse times
-  !> distance over the pair collisions since the start.
+  !> Pressure in two dimensions by the virial theorem, P A = K + W/(2t), with the present values of K and A and the sum W of
+  !> impulse times distance over all collisions of disks since the start.
   pure function pressure(sim, kinetic)
     type(simulation_t), intent(in) :: sim
-    real(real64), intent(in) :: kinetic           !! of all disks, relative to the profile of a sheared box [energy]
+    real(real64), intent(in) :: kinetic           !! kinetic energy of all disks, relative to the profile of a sheared box [energy]
     real(real64) :: pressure
     type(box_t) :: box
 

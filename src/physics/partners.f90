@@ -1,6 +1,6 @@
-!> Whom or what a disk meets, as one number: another disk (> 0), a surface of the box (0, -1, -2, -3: the left, right,
-!> bottom, top side; -4, -5, ...: an obstacle), or the end of its cell (far below). The event log writes the same numbers.
-!> Side k of the box has the code 1 - k; the codes of obstacles follow.
+!> Partners of a disk in an event, each represented by an integer code: another disk (> 0), a surface of the box (0, -1, -2, -3:
+!> left, right, bottom and top side; -4, -5, ...: an obstacle), or the boundary of its cell (large negative codes). The event
+!> log contains the same codes for disks and surfaces. Side k of the box has the code 1 - k; the codes of obstacles follow.
 module partners
   use kinds, only: int32
   implicit none
@@ -11,16 +11,17 @@ module partners
 
   integer(int32), parameter :: n_sides = 4
   integer(int32), parameter :: first_crossing = -2000000000
-  !> The end of the region that was searched, within a cell; one less if it ends to the right or above.
+  !> Code of a repeated search: the disk leaves the region in which contacts were searched, inside its cell. One less if that
+  !> region ends to the right or above.
   integer(int32), parameter :: looks_again = first_crossing - n_sides
   integer(int32), parameter :: nothing = -huge(1_int32)
-  integer(int32), parameter :: most_repeats = 11           !! of collisions at one moment that are counted
+  integer(int32), parameter :: most_repeats = 11           !! largest number of simultaneous collisions of a series that is counted
   integer(int32), parameter :: per_repeat = 2_int32**27    !! larger than any id of a disk
   character(len=6), parameter :: side_name(n_sides) = ["left  ", "right ", "bottom", "top   "]
 
 contains
 
-  !> Whether the code, which is not a disk, is a side of the box.
+  !> Whether a code, which is not that of a disk, is a side of the box.
   elemental function is_side(code) result(yes)
     integer(int32), intent(in) :: code
     logical :: yes
@@ -28,7 +29,7 @@ contains
     yes = code > -n_sides
   end function is_side
 
-  !> Whether the code, which is not a disk, is a side or an obstacle: not the end of a cell.
+  !> Whether a code, which is not that of a disk, is a side or an obstacle, and not the boundary of a cell.
   elemental function is_wall(code) result(yes)
     integer(int32), intent(in) :: code
     logical :: yes
@@ -44,7 +45,7 @@ contains
     code = 1 - n_sides - m
   end function obstacle_code
 
-  !> The number of the obstacle with this code.
+  !> The index of the obstacle with this code.
   elemental function obstacle_number(code) result(m)
     integer(int32), intent(in) :: code
     integer(int32) :: m
@@ -52,7 +53,7 @@ contains
     m = 1 - n_sides - code
   end function obstacle_number
 
-  !> The axis across a side.
+  !> The axis normal to a side.
   elemental function axis_of(side) result(axis)
     integer(int32), intent(in) :: side
     integer(int32) :: axis
@@ -60,7 +61,7 @@ contains
     axis = 1 - side/2
   end function axis_of
 
-  !> Which way one leaves through a side: +1 right and top, -1 left and bottom.
+  !> Direction in which a side is passed outwards: +1 right and top, -1 left and bottom.
   elemental function sense_of(side) result(sense)
     integer(int32), intent(in) :: side
     integer(int32) :: sense
@@ -68,7 +69,7 @@ contains
     sense = 2*modulo(side, 2) - 1
   end function sense_of
 
-  !> The code of leaving a cell where side `side` would be.
+  !> The code for leaving a cell through the face that corresponds to a side of the box.
   elemental function crossing(side) result(code)
     integer(int32), intent(in) :: side
     integer(int32) :: code
@@ -76,7 +77,7 @@ contains
     code = first_crossing + side
   end function crossing
 
-  !> The side where a disk leaves its cell, from the code of the crossing.
+  !> The side that corresponds to the face of a cell, from the code of the crossing.
   elemental function side_crossed(code) result(side)
     integer(int32), intent(in) :: code
     integer(int32) :: side
@@ -84,17 +85,17 @@ contains
     side = code - first_crossing
   end function side_crossed
 
-  !> The last collision partner `met` of a disk that has hit it as the n-th in a series of collisions that take no time. Such
-  !> series are rare: every other collision writes the plain id of the partner.
+  !> The value of `met` for a disk that has collided with its partner as the n-th in a series of simultaneous collisions. Such
+  !> series are rare; all other collisions store the plain id of the partner.
   elemental function repeated(id, n) result(met)
-    integer(int32), intent(in) :: id               !! of the partner, a disk
-    integer(int32), intent(in) :: n                !! at most `most_repeats`
+    integer(int32), intent(in) :: id               !! id of the partner, a disk
+    integer(int32), intent(in) :: n                !! length of the series, at most `most_repeats`
     integer(int32) :: met
 
     met = id + n*per_repeat
   end function repeated
 
-  !> The id of the last collision partner, if it was a disk; else the code of an obstacle, or 0.
+  !> The id of the last partner, if it is a disk; otherwise the code of an obstacle, or 0.
   elemental function met_id(met) result(id)
     integer(int32), intent(in) :: met
     integer(int32) :: id
@@ -103,7 +104,7 @@ contains
     if (met > 0) id = modulo(met, per_repeat)
   end function met_id
 
-  !> The length of the series of collisions at one moment to which the last one belonged.
+  !> Length of the series of simultaneous collisions to which the last collision belonged.
   elemental function repeats(met) result(n)
     integer(int32), intent(in) :: met
     integer(int32) :: n

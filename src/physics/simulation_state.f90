@@ -1,5 +1,5 @@
-!> All that a simulation is. What the input gives is not in a checkpoint; what is marked as derived in `disks` is not
-!> either; all the rest is.
+!> The complete state of a simulation. Checkpoints contain everything except the values given by the input and the data that
+!> are marked as derived in `disks`.
 module simulation_state
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
@@ -14,47 +14,48 @@ module simulation_state
   private
   public :: given_t, simulation_t, system_t
 
-  !> How far terms of sums are commonly above the typical ones of the heaviest disks, and at most above those of the lightest.
+  !> Largest factor by which terms of sums usually exceed the typical terms of the heaviest disks, and largest factor for the
+  !> typical terms of the lightest disks.
   real(real64), parameter :: common = 2.0_real64**7, rare = 2.0_real64**22
-  !> Walls and kicks may give more than they commonly do, and nobody knows how much less until they act: units fine enough
-  !> for the energies before that.
+  !> Walls and kicks may do far less work than their parameters suggest, and none before they first act. The units are therefore
+  !> refined by this factor, so that they resolve the energies before that.
   real(real64), parameter :: finer = 2.0_real64**(-30)
 
-  !> What acts on disks.
+  !> Everything that acts on disks.
   type :: system_t
     type(box_t) :: box
     type(contact_law_t) :: law
     type(drive_t) :: drive
-    type(features_t) :: with                      !! what it does beside plain collisions
+    type(features_t) :: with                      !! optional features
   end type system_t
 
-  !> What the input gives, the same for all parts of a simulation.
+  !> Values given by the input, which are the same in all domains of a simulation.
   type, extends(system_t) :: given_t
     type(species_t), allocatable :: species(:)
-    integer(int64) :: seed = 1                    !! of random numbers drawn in the run
+    integer(int64) :: seed = 1                    !! seed of random numbers drawn during the run
   end type given_t
 
-  !> And what a checkpoint stores.
+  !> The values given by the input and the state that a checkpoint stores.
   type, extends(given_t) :: simulation_t
-    type(disk_t), allocatable :: disk(:)          !! (n) in the order of cells; `tag%id` is their number in the input
+    type(disk_t), allocatable :: disk(:)          !! (n) sorted by cells; `tag%id` is the number in the input
     type(tag_t), allocatable :: tag(:)            !! (n)
-    real(real64), allocatable :: own_mass(:)      !! (n) where those of a species differ [mass]
-    type(extra_t), allocatable :: extra(:)        !! (n) where `has_extra`
-    real(real64) :: now = 0.0_real64              !! since the epoch [time]
-    logical :: settled = .false.                  !! all that happens up to `now` is behind
-    real(real64) :: epoch_begin = 0.0_real64      !! since the epoch [time]
-    real(real64) :: epoch_end = 0.0_real64        !! when the epoch moves, since the epoch; 0: not known yet [time]
-    integer(int64) :: epoch_events = 0            !! events at the beginning of the epoch
-    ! A collapse is an endless series of events during which time does not advance.
-    real(real64) :: blink = 0.0_real64            !! in which nothing moves visibly; 0: not known yet [time]
-    real(real64) :: last_advance = 0.0_real64     !! when time had last advanced by more than that, since the epoch [time]
-    integer(int64) :: events_then = 0             !! events at that time
-    integer(int64) :: kicks = 0                   !! since the start of the run
-    integer(int64) :: changes = 0                 !! of what acts on disks, or of their velocities, since the start of the run
-    type(tally_t) :: tally                        !! counts and sums since the start of the run
+    real(real64), allocatable :: own_mass(:)      !! (n) individual masses, allocated if those of a species differ [mass]
+    type(extra_t), allocatable :: extra(:)        !! (n) allocated if `has_extra`
+    real(real64) :: now = 0.0_real64              !! present time, since the epoch [time]
+    logical :: settled = .false.                  !! all events up to and including `now` have been executed
+    real(real64) :: epoch_begin = 0.0_real64      !! beginning of the epoch on its own clock [time]
+    real(real64) :: epoch_end = 0.0_real64        !! end of the epoch, since the epoch; 0: not known yet [time]
+    integer(int64) :: epoch_events = 0            !! number of events at the beginning of the epoch
+    ! For the detection of a collapse, an infinite series of events during which time does not advance:
+    real(real64) :: blink = 0.0_real64            !! time in which no disk moves noticeably; 0: not known yet [time]
+    real(real64) :: last_advance = 0.0_real64     !! time of the last advance by more than that, since the epoch [time]
+    integer(int64) :: events_then = 0             !! number of events at that time
+    integer(int64) :: kicks = 0                   !! number of kicks since the start of the run
+    integer(int64) :: changes = 0                 !! number of changes to forces, laws or velocities since the start of the run
+    type(tally_t) :: tally                        !! counters and sums since the start of the run
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
-    real(real64) :: given_energy = 0.0_real64     !! kinetic energy when the velocities were last given, at the start or by a change
-    real(real64) :: typical_speed2 = 0.0_real64   !! mean square, the largest at the start and after changes [(length/time)**2]
+    real(real64) :: given_energy = 0.0_real64     !! kinetic energy when the velocities were last set, at the start or by a change
+    real(real64) :: typical_speed2 = 0.0_real64   !! largest mean square speed at the start and after changes [(length/time)**2]
   contains
     procedure :: time
     procedure :: has_reached
@@ -94,10 +95,10 @@ contains
     t = self%box%epoch + self%now
   end function time
 
-  !> Whether a moment has come, with all that happens then: in between, where the run may pause, it has not.
+  !> Whether a time has been reached and all events at this time have been executed. A run may stop between simultaneous events.
   pure function has_reached(self, t) result(yes)
     class(simulation_t), intent(in) :: self
-    real(real64), intent(in) :: t                 !! since the start of the run [time]
+    real(real64), intent(in) :: t                 !! time since the start of the run [time]
     logical :: yes
 
     yes = self%settled .and. self%time() >= t
@@ -111,9 +112,9 @@ contains
     n = size(self%disk, kind=int32)
   end function n_disks
 
-  !> Makes room for the disks of all species, in the order of the input; masses of their own are still to come.
+  !> Allocates the disks of all species in the order of the input. Individual masses are set later.
   pure subroutine list_disks(self)
-    class(simulation_t), intent(inout) :: self    !! with all that the input gives
+    class(simulation_t), intent(inout) :: self    !! in: with all values given by the input
     integer(int32) :: i
 
     call self%make_room(sum(self%species%count))
@@ -125,7 +126,7 @@ contains
     end do
   end subroutine list_disks
 
-  !> Whether disks have the numbers of `extra_t`.
+  !> Whether disks have the data of `extra_t`.
   pure function has_extra(self) result(yes)
     class(simulation_t), intent(in) :: self
     logical :: yes
@@ -133,11 +134,11 @@ contains
     yes = any(self%box%periodic) .or. self%law%contact_time > 0 .or. self%with%rotation .or. self%with%orientation
   end function has_extra
 
-  !> Makes room for n disks.
+  !> Allocates the arrays for n disks.
   pure subroutine make_room(self, n, like)
-    class(simulation_t), intent(inout) :: self    !! with all that the input gives
+    class(simulation_t), intent(inout) :: self    !! in: with all values given by the input
     integer(int32), intent(in) :: n
-    class(simulation_t), intent(in), optional :: like   !! of which these are a part
+    class(simulation_t), intent(in), optional :: like   !! whole simulation, if this one is a domain of it
     logical :: own_masses
 
     own_masses = self%with%own_sizes
@@ -147,7 +148,7 @@ contains
     if (own_masses) allocate (self%own_mass(n), source=0.0_real64)
   end subroutine make_room
 
-  !> All numbers of disk i.
+  !> All data of disk i.
   pure function whole_disk(self, i) result(whole)
     class(simulation_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -159,7 +160,7 @@ contains
     if (allocated(self%extra)) whole%extra = self%extra(i)
   end function whole_disk
 
-  !> Makes a disk, of this simulation or of another part of it, disk i.
+  !> Sets all data of disk i, from this simulation or from another domain.
   pure subroutine place_disk(self, i, whole)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -184,7 +185,7 @@ contains
     end if
   end function mass_of
 
-  !> Masses of all disks, in their order.
+  !> Masses of all disks, in the order of the arrays.
   pure function masses(self) result(mass)
     class(simulation_t), intent(in) :: self
     real(real64) :: mass(size(self%disk))         !! [mass]
@@ -193,7 +194,8 @@ contains
     mass = [(self%mass_of(i), i=1, self%n_disks())]
   end function masses
 
-  !> Gives each species the largest mass of its disks, and gives up the array of masses if those of each species are equal.
+  !> Sets the mass of each species to the largest mass of its disks. The array of individual masses is deallocated if the masses
+  !> are equal within each species.
   pure subroutine settle_masses(self)
     class(simulation_t), intent(inout) :: self
     logical :: equal
@@ -210,7 +212,7 @@ contains
     if (equal) deallocate (self%own_mass)
   end subroutine settle_masses
 
-  !> The images of the box, for the clocks of this epoch.
+  !> The periodic images of the box, for clocks of this epoch.
   pure function images_now(self) result(images)
     class(simulation_t), intent(in) :: self
     type(images_t) :: images
@@ -218,7 +220,7 @@ contains
     images = self%box%images(self%box%epoch)
   end function images_now
 
-  !> Where disk i is now. Its own state, at its clock, stays as it is.
+  !> Position of disk i at the present time. Its stored state is not changed.
   pure function position(self, i) result(x)
     class(simulation_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -229,7 +231,7 @@ contains
     end associate
   end function position
 
-  !> Velocity of disk i now.
+  !> Velocity of disk i at the present time.
   pure function velocity(self, i) result(v)
     class(simulation_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -259,7 +261,7 @@ contains
     self%extra(i)%spin = self%extra(i)%spin + change/self%inertia_of(i)
   end subroutine spin_up
 
-  !> Turns disk i as far as it is turned at the time t, before `disks: land` takes it there.
+  !> Rotates disk i to its orientation at the time t. Called before `disks: land` changes its clock.
   pure subroutine turn(self, i, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -268,12 +270,12 @@ contains
     if (self%with%rotation) self%extra(i)%angle = self%extra(i)%angle + self%extra(i)%spin*(t - self%disk(i)%clock)
   end subroutine turn
 
-  !> Disk i makes contact at the time t, which is elastic if its last contact is not over yet (TC model).
+  !> Registers a contact of disk i at the time t. `elastic` becomes .true. if its previous contact is not over yet (TC model).
   pure subroutine make_contact(self, i, t, elastic)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: t
-    logical, intent(inout) :: elastic             !! already, or for this reason
+    logical, intent(inout) :: elastic             !! in: already elastic for another reason
 
     associate (last => self%extra(i)%last_contact)
       elastic = elastic .or. (self%tag(i)%collisions > 0 .and. t - last < self%law%contact_time)
@@ -281,12 +283,12 @@ contains
     end associate
   end subroutine make_contact
 
-  !> Books that the velocity of disk i was another until the time t. The integral of what it carries is its present value
-  !> times the time, less each change times its moment: exact, whenever it is asked for.
+  !> Registers that disk i had another velocity until the time t. The time integral of a flux is its present value times the time,
+  !> minus the sum of its changes times the times at which they occurred. This is exact at every moment.
   pure subroutine note_change(self, i, before, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
-    real(real64), intent(in) :: before(2)         !! [length/time]
+    real(real64), intent(in) :: before(2)         !! velocity before the change [length/time]
     real(real64), intent(in) :: t                 !! since the epoch [time]
 
     if (.not. self%with%helfand) return
@@ -304,7 +306,7 @@ contains
     inertia = self%law%inertia*self%mass_of(i)*self%disk(i)%radius**2
   end function inertia_of
 
-  !> Kinetic energy of all disks now, of rotation too.
+  !> Kinetic energy of all disks at the present time, including rotation.
   pure function kinetic_energy(self) result(energy)
     class(simulation_t), intent(in) :: self
     real(real64) :: energy, v(2)
@@ -321,7 +323,7 @@ contains
     end do
   end function kinetic_energy
 
-  !> Whether disks are given energy, so that nothing limits their speed.
+  !> Whether disks can gain energy from walls or driving, so that their speeds are not bounded.
   pure function is_driven(self) result(yes)
     class(simulation_t), intent(in) :: self
     logical :: yes
@@ -329,7 +331,7 @@ contains
     yes = self%box%gives_energy() .or. self%drive%is_on()
   end function is_driven
 
-  !> Notes the energy of the start and chooses how fine the sums are, unless that has been done.
+  !> Records the initial energy and chooses the units of the sums, unless this has been done.
   pure subroutine start_sums(self)
     class(simulation_t), intent(inout) :: self
 
@@ -340,7 +342,7 @@ contains
     call self%choose_units()
   end subroutine start_sums
 
-  !> How fast kicks make disks, on average over those of the species that get fastest; 0 without kicks.
+  !> Root mean square speed that kicks produce in the fastest species; 0 without kicks.
   pure function fastest_drive(self) result(speed)
     class(simulation_t), intent(in) :: self
     real(real64) :: speed                         !! [length/time]
@@ -349,7 +351,7 @@ contains
     speed = sqrt(maxval([0.0_real64, self%drive%speed2([(s, s=1, size(self%species))], self%species%mass)]))
   end function fastest_drive
 
-  !> Mean square of the speeds now, and of those of the rims of disks that turn.
+  !> Mean square speed at the present time, including the surface speed of rotating disks.
   pure function mean_square_speed(self) result(speed2)
     class(simulation_t), intent(in) :: self
     real(real64) :: speed2                        !! [(length/time)**2]
@@ -361,9 +363,9 @@ contains
     end do
   end function mean_square_speed
 
-  !> The units of the sums, from the commonest terms: those of disks with the mean square speed, or that which walls and kicks
-  !> commonly give. Where masses differ widely, collisions of the lightest disks are still summed to 40 binary digits, and
-  !> rare terms of the heaviest exceed the bound of the type, which then takes a little longer.
+  !> Chooses the units of the sums from the most common terms: those of disks with the mean square speed, or those that walls and
+  !> kicks usually produce. If masses differ widely, terms of the lightest disks are still summed with 40 binary digits, and
+  !> rare terms of the heaviest disks exceed the bound of `exact_sum_t`, which then takes slightly longer.
   pure subroutine choose_units(self)
     class(simulation_t), intent(inout) :: self
     real(real64) :: mass(size(self%disk)), kicked(size(self%species))    ! [mass, (length/time)**2]

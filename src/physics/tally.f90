@@ -1,5 +1,5 @@
-!> What collisions have gathered since the start of the run. Sums are exact: they come out the same in whatever order, and
-!> in whatever parts of a simulation, they are gathered.
+!> Counters and sums over all collisions since the start of the run. The sums are exact: their values do not depend on the order
+!> of the terms or on the domains in which they were added.
 module tally
   use exact_sums, only: exact_sum_t
   use kinds, only: int64, never, real64
@@ -7,40 +7,41 @@ module tally
   private
   public :: carried, tally_t
 
-  !> What one term of a sum may amount to, and so how fine it must be: see `simulation_state: choose_units`.
+  !> Kinds of terms, by their physical dimension, which determine the units of sums: see `simulation_state: choose_units`.
   integer, parameter, public :: energies = 1, impulses = 2, moments = 3, transfers = 4, passages = 5
 
   type :: sum_t
     character(len=16) :: name
-    integer :: kind                                !! energies, ...
+    integer :: kind                                !! kind of its terms: energies, ...
   end type sum_t
 
-  !> The sums over collisions, each by its number. Units, checkpoints, domains and their merging go by this list.
+  !> Indices of the sums over collisions. Units, checkpoints and domains are all driven by the list `sums`.
   integer, parameter, public :: virial = 1, dissipated = 2, heat = 3, work = 4, drive_energy = 5, stress = 6
-  integer, parameter, public :: heat_virial = 10, flights = 12     ! after the four of the stress, the two of heat
+  integer, parameter, public :: heat_virial = 10, flights = 12     ! behind four components of the stress and two of the heat virial
   type(sum_t), parameter :: sums(*) = [ &
-    sum_t("virial", moments), &                    ! impulse times distance over pair collisions [energy]
-    sum_t("dissipated", energies), &               ! kinetic energy lost [energy]
-    sum_t("heat", energies), &                     ! given to disks by thermal walls [energy]
-    sum_t("work", energies), &                     ! done on disks by what moves them [energy]
-    sum_t("drive_energy", energies), &             ! given to disks by kicks [energy]
-    sum_t("stress_xx", moments), sum_t("stress_xy", moments), &   ! change of momentum times distance over pairs [energy]
+    sum_t("virial", moments), &                    ! impulse times distance, over collisions of disks [energy]
+    sum_t("dissipated", energies), &               ! kinetic energy dissipated [energy]
+    sum_t("heat", energies), &                     ! energy transferred to disks by thermal walls [energy]
+    sum_t("work", energies), &                     ! work done on disks by moving boundaries [energy]
+    sum_t("drive_energy", energies), &             ! energy transferred to disks by kicks [energy]
+    sum_t("stress_xx", moments), sum_t("stress_xy", moments), &  ! momentum change times distance, over collisions of disks [energy]
     sum_t("stress_yx", moments), sum_t("stress_yy", moments), &
-    sum_t("heat_virial_x", transfers), sum_t("heat_virial_y", transfers), &      ! energy times distance [energy length]
-    sum_t("flights_xx", passages), sum_t("flights_xy", passages), sum_t("flights_yy", passages), &   ! see `carried`
+    sum_t("heat_virial_x", transfers), sum_t("heat_virial_y", transfers), &      ! energy transfer times distance [energy length]
+    ! Changes of `carried` times time.
+    sum_t("flights_xx", passages), sum_t("flights_xy", passages), sum_t("flights_yy", passages), &
     sum_t("flights_x", transfers), sum_t("flights_y", transfers)]
 
-  !> And those at each surface of the box: the impulse given to it [mass length/time], and the energy that disks have gained.
+  !> Sums for each surface of the box: the impulse on the surface [mass length/time], and the energy gained by disks.
   integer, parameter, public :: impulse = 1, gain = 3
 
   type :: tally_t
-    integer(int64) :: events = 0                   !! collisions of any kind
-    integer(int64) :: collisions = 0               !! of pairs
-    integer(int64) :: stuck = 0                    !! of these, see `encounters: note_stuck`
-    real(real64) :: collapse = never               !! the first moment of a collapse, since the start of the run [time]
+    integer(int64) :: events = 0                   !! number of events
+    integer(int64) :: collisions = 0               !! number of collisions of disks
+    integer(int64) :: stuck = 0                    !! number of simultaneous lossy ones, see `encounters: note_stuck`
+    real(real64) :: collapse = never               !! time of the first collapse, since the start of the run [time]
     type(exact_sum_t) :: sum(size(sums))
-    integer(int64), allocatable :: hits(:)         !! (surfaces) collisions at each
-    type(exact_sum_t), allocatable :: at_surface(:, :)     !! (3,surfaces) impulse along x, y; gain
+    integer(int64), allocatable :: hits(:)         !! (surfaces) number of collisions with each
+    type(exact_sum_t), allocatable :: at_surface(:, :)     !! (3,surfaces) impulse along x and y; energy gained by disks
   contains
     procedure :: make_room
     procedure :: choose_units
@@ -51,7 +52,7 @@ module tally
 
 contains
 
-  !> Makes room for what happens at n surfaces, unless there is.
+  !> Allocates the sums for n surfaces, unless they are allocated.
   pure subroutine make_room(self, n)
     class(tally_t), intent(inout) :: self
     integer, intent(in) :: n
@@ -61,18 +62,18 @@ contains
     allocate (self%at_surface(gain, n))
   end subroutine make_room
 
-  !> Makes the sums fine enough for terms up to these bounds.
+  !> Chooses units that are fine enough for terms up to these bounds.
   pure subroutine choose_units(self, bound)
     class(tally_t), intent(inout) :: self
-    real(real64), intent(in) :: bound(:)           !! by kind
+    real(real64), intent(in) :: bound(:)           !! bound for each kind of terms
 
     call self%sum%choose_unit(bound(sums%kind))
     call self%at_surface(:gain - 1, :)%choose_unit(bound(impulses))
     call self%at_surface(gain, :)%choose_unit(bound(energies))
   end subroutine choose_units
 
-  !> What a disk carries per time while it flies: momentum, xx, xy and yy [energy]; kinetic energy along x and y [energy
-  !> length/time]. Over time that is the part of Helfand's moments (Phys. Rev. 119, 1 (1960)) which collisions do not hand on.
+  !> Fluxes of a disk in free flight: momentum, xx, xy and yy [energy]; kinetic energy along x and y [energy
+  !> length/time]. Their time integrals are the kinetic parts of the Helfand moments (Phys. Rev. 119, 1 (1960)).
   pure function carried(mass, v)
     real(real64), intent(in) :: mass
     real(real64), intent(in) :: v(2)               !! [length/time]
@@ -81,16 +82,16 @@ contains
     carried = mass*[v(1)*v(1), v(1)*v(2), v(2)*v(2), 0.5_real64*dot_product(v, v)*v]
   end function carried
 
-  !> A sum so far.
+  !> The value of a sum.
   elemental function total(self, k)
     class(tally_t), intent(in) :: self
-    integer, intent(in) :: k                       !! number in `sums`
+    integer, intent(in) :: k                       !! index in `sums`
     real(real64) :: total
 
     total = self%sum(k)%value()
   end function total
 
-  !> Adds what has been gathered elsewhere, in the same units.
+  !> Adds the counters and sums of another tally with the same units.
   pure subroutine include(self, other)
     class(tally_t), intent(inout) :: self
     type(tally_t), intent(in) :: other
@@ -104,7 +105,7 @@ contains
     call self%at_surface%include(other%at_surface)
   end subroutine include
 
-  !> Begins anew in the same units.
+  !> Sets all counters and sums to zero; the units are kept.
   pure subroutine clear(self)
     class(tally_t), intent(inout) :: self
 

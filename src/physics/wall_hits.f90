@@ -1,4 +1,4 @@
-!> What changes in the state when a disk hits a surface of the box.
+!> Executes collisions of a disk with a side or an obstacle.
 module wall_hits
   use kinds, only: int32, never, real64
   use box_geometry, only: next_obstacle, strike_velocity, surface_velocity, wall_normal
@@ -14,16 +14,17 @@ module wall_hits
   private
   public :: collide_wall
 
-  real(real64), parameter :: while_parted = 0.4_real64    !! contact times for which a disk that rests on a surface leaves it
+  real(real64), parameter :: while_parted = 0.4_real64  !! a disk at rest on a surface stays away from it for at least this many
+                                                        !! contact durations
 
 contains
 
-  !> Collides disk i with a surface of the box at the time t.
+  !> Executes the collision of disk i with a surface of the box at the time t.
   subroutine collide_wall(sim, i, code, t, counts)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
     real(real64), intent(in) :: t
-    logical, value :: counts                     !! in the tally
+    logical, value :: counts                     !! the collision is included in the tally
     real(real64) :: normal(2), strike(2), u(2), v(2), omega
     type(wall_law_t) :: law
     logical :: elastic
@@ -44,10 +45,11 @@ contains
     else
       sim%disk(i)%v = wall_rebound(law, v - strike, normal, elastic)
       if (any(abs(strike) > 0)) then
-        sim%disk(i)%v = sim%disk(i)%v + strike         ! never behind the side: rounded sums keep order
+        sim%disk(i)%v = sim%disk(i)%v + strike         ! rounding is monotonic, so that the disk is not slower than the side
         if (law%restitution < 1 .and. .not. elastic) call settle(sim%disk(i)%v, v, strike, normal)
       end if
-      if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call part(sim, i, code, normal)    ! no time steps
+      ! Not in time-stepped dynamics.
+      if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call part(sim, i, code, normal)
       if (law%grip%is_rough()) call rub_wall(sim, i, law%grip, normal, u, v)
     end if
     if (sim%box%surface(k)%motion%kind == piston) call push(sim, i, code, normal, v, u, t)
@@ -56,25 +58,27 @@ contains
     if (counts) call count_hit(sim, i, k, law%temperature > 0, u, v, omega)
   end subroutine collide_wall
 
-  !> Ends the bouncing on a side that moves where a hit loses less than rounding can tell: it would go on for ever.
+  !> Ends a series of bounces on a moving side when a collision dissipates less than the rounding error. The series would
+  !> otherwise be infinite. The disk then moves with the side.
   pure subroutine settle(v, before, strike, normal)
-    real(real64), intent(inout) :: v(2)          !! of the disk after the hit [length/time]
-    real(real64), intent(in) :: before(2), strike(2)     !! of the disk before it, of the side [length/time]
-    real(real64), intent(in) :: normal(2)        !! inwards
+    real(real64), intent(inout) :: v(2)          !! velocity of the disk after the collision [length/time]
+    real(real64), intent(in) :: before(2), strike(2)  !! velocities of the disk before the collision and of the side [length/time]
+    real(real64), intent(in) :: normal(2)        !! unit vector inwards
     real(real64) :: left
 
     left = dot_product(v - strike, normal)
     if (left >= -dot_product(before - strike, normal)) v = v - left*normal
   end subroutine settle
 
-  !> Lets a disk push a piston that it has hit as if it were of infinite mass. Both get the share of that impulse which
-  !> their masses allow; for sums u becomes the mean of the velocities of the side, whose work the energy is.
+  !> Applies the momentum transfer between a disk and a piston. The disk has rebounded as from a piston of infinite mass; both
+  !> receive the fraction of this impulse that follows from their masses. On return u contains the mean velocity of the piston
+  !> before and after, with which its work is calculated.
   pure subroutine push(sim, i, code, normal, before, u, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
-    real(real64), intent(in) :: normal(2)        !! inwards
-    real(real64), intent(in) :: before(2)        !! velocity of the disk before the hit [length/time]
-    real(real64), intent(inout) :: u(2)          !! of the surface [length/time]
+    real(real64), intent(in) :: normal(2)        !! unit vector inwards
+    real(real64), intent(in) :: before(2)        !! velocity of the disk before the collision [length/time]
+    real(real64), intent(inout) :: u(2)          !! velocity of the surface [length/time]
     real(real64), intent(in) :: t                !! since the epoch [time]
     real(real64) :: mass, v, given
     integer :: axis
@@ -85,22 +89,23 @@ contains
       v = sim%box%side_velocity(1 - code, t)
       given = dot_product(disk%v - before, normal)*mass/(mass + motion%mass)
       disk%v = disk%v - given*normal
-      ! It touches, in the digits of `side_time`: else rounding lifts it off what rests.
+      ! The piston is placed at the disk, as computed in `side_time`; otherwise rounding would separate it from a disk at
+      ! rest.
       side%position = merge(disk%x(axis) - (sim%box%lower(axis) + disk%radius), &
         (sim%box%upper(axis) - disk%radius) - disk%x(axis), sense_of(code) < 0)
-      side%velocity = min(v - given, dot_product(disk%v, normal))       ! never ahead of it by rounding
+      side%velocity = min(v - given, dot_product(disk%v, normal))       ! not faster than the disk by rounding
       side%clock = t
       u = u + (0.5_real64*(side%velocity - v))*normal
     end associate
   end subroutine push
 
-  !> Gives disk i, at a thermal wall, a velocity as if it came out of a gas of that temperature: along the normal with the
-  !> density (m v/kT) exp(-m v**2/2kT), along the wall, and in rotation, with Maxwell's.
+  !> Draws the velocity of disk i after a collision with a thermal wall, as if it came from a gas of that temperature: the normal
+  !> component has the density (m v/kT) exp(-m v**2/2kT); the tangential component and the angular velocity are Gaussian.
   pure subroutine leave_thermally(sim, i, temperature, normal, u)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: temperature      !! kT [energy]
-    real(real64), intent(in) :: normal(2)        !! from the wall to the disk
+    real(real64), intent(in) :: normal(2)        !! unit vector from the wall to the disk
     real(real64), intent(in) :: u(2)             !! velocity of the surface [length/time]
     type(random_stream_t) :: stream
     real(real64) :: uniform, normals(2), thermal
@@ -113,12 +118,13 @@ contains
     if (sim%with%rotation) sim%extra(i)%spin = sqrt(temperature/sim%inertia_of(i))*normals(2)
   end subroutine leave_thermally
 
-  !> Parts disk i from a surface on which it rests: with restitution 0 nothing is left that the TC model could keep, and the
-  !> next hit would come at once, for ever. The disk gets the speed that keeps it away for a while, within a factor of two.
+  !> Separates disk i from a surface on which it rests. With restitution 0 the TC model cannot conserve a normal velocity,
+  !> and the next collision would follow at once, infinitely often. The disk gets a normal velocity with which its next contact
+  !> is 0.4 to 0.8 contact durations later.
   pure subroutine part(sim, i, code, normal)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
-    real(real64), intent(in) :: normal(2)        !! from the wall to the disk
+    real(real64), intent(in) :: normal(2)        !! unit vector from the wall to the disk
     real(real64) :: speed, t
     integer(int32) :: met
 
@@ -135,14 +141,14 @@ contains
     end associate
   end subroutine part
 
-  !> The tangential part of a hit of disk i on a rough wall; the velocity along the normal has changed already.
+  !> Applies the tangential impulse in a collision of disk i with a rough wall, after the normal impulse.
   pure subroutine rub_wall(sim, i, grip, normal, u, before)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     type(grip_t), intent(in) :: grip
-    real(real64), intent(in) :: normal(2)        !! from the wall to the disk
+    real(real64), intent(in) :: normal(2)        !! unit vector from the wall to the disk
     real(real64), intent(in) :: u(2)             !! velocity of the surface [length/time]
-    real(real64), intent(in) :: before(2)        !! velocity of the disk before the hit [length/time]
+    real(real64), intent(in) :: before(2)        !! velocity of the disk before the collision [length/time]
     real(real64) :: along(2), impulse
 
     along = [-normal(2), normal(1)]
@@ -154,15 +160,15 @@ contains
     end associate
   end subroutine rub_wall
 
-  !> Counts what a hit on a side or obstacle has changed: what the moving surface did is work, the rest heat of a thermal
-  !> wall or else lost.
+  !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk consists of the work of the
+  !> moving surface and of heat from a thermal wall or, at other walls, dissipation.
   pure subroutine count_hit(sim, i, k, heats, u, v, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    integer, intent(in) :: k                     !! the surface
-    logical, intent(in) :: heats                 !! it is a thermal wall
+    integer, intent(in) :: k                     !! index of the surface
+    logical, intent(in) :: heats                 !! the surface is a thermal wall
     real(real64), intent(in) :: u(2)             !! velocity of the surface [length/time]
-    real(real64), intent(in) :: v(2), omega      !! of the disk before [length/time, 1/time]
+    real(real64), intent(in) :: v(2), omega      !! velocities of the disk before the collision [length/time, 1/time]
     real(real64) :: mass, gained, done
 
     mass = sim%mass_of(i)
