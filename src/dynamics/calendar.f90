@@ -1,6 +1,6 @@
-!> The part of the event queue for later times: append-only buckets of one cache line, one for each of the next
-!> windows of time, and unordered lists for longer spans beyond. Appending touches few cache lines; nothing is ever
-!> searched or removed singly. All lists share one array, in chunks: what a span leaves is used by the next.
+!> The part of the event queue for later times. Each of the next time windows has a bucket of one cache line to which entries
+!> are only appended; longer spans beyond have unordered lists. Appending touches few cache lines, and single entries are never
+!> searched or removed. All lists share one array, in chunks that are reused when a span is done.
 module calendar
   use kinds, only: int32, real64
   use disks, only: tag_t
@@ -9,13 +9,15 @@ module calendar
   public :: bucket_capacity, bucket_t, calendar_t, events_per_window, filed_t, most_coming, stages, window_none
 
   integer(int32), parameter :: bucket_capacity = 15
-  !> Wanted. Fewer per window: more empty windows to open. More: buckets overflow into the heap.
+  !> Intended mean number of events in a window. With fewer events more empty windows are opened; with more events buckets
+  !> overflow into the heap more often.
   real(real64), parameter :: events_per_window = 4.0_real64
-  integer(int32), parameter :: few_disks = 5000    !! nearly all of their events may have buckets
-  integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]    !! to announce for prefetching, stage by stage
+  integer(int32), parameter :: few_disks = 5000    !! up to this number of disks nearly all events get a bucket
+  integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]    !! number of windows ahead that each stage of prefetching covers
   integer(int32), parameter :: stages = size(windows_ahead)
-  integer(int32), parameter :: most_coming = windows_ahead(1)*bucket_capacity  !! disks announced at once
-  integer(int32), parameter :: window_none = -1    !! as tag%window: not in the calendar
+  integer(int32), parameter :: most_coming = windows_ahead(1)*bucket_capacity
+    !! largest number of disks listed for prefetching at once
+  integer(int32), parameter :: window_none = -1    !! value of tag%window: the event is not in the calendar
 
   type :: bucket_t                                 ! one cache line
     integer(int32) :: n = 0
@@ -23,28 +25,29 @@ module calendar
   end type bucket_t
 
   integer(int32), parameter :: log_chunk = 7
-  integer(int32), parameter :: chunk = shiftl(1_int32, log_chunk)    !! of a list, its link among it: one KiB
+  integer(int32), parameter :: chunk = shiftl(1_int32, log_chunk)  !! length of a chunk of a list, of which one entry is a link: 1
+                                                                   !! KiB
   integer(int32), parameter :: none = -1
 
-  !> A disk and the window in which it expects its event. In the first place of a chunk `disk` is the number of another chunk.
+  !> A disk and the window of its event. In the first entry of a chunk `disk` is the number of the next chunk of the list.
   type :: filed_t
     integer(int32) :: disk
     integer(int32) :: window
   end type filed_t
 
   type :: calendar_t
-    type(bucket_t), allocatable :: bucket(:)       !! (0:) a ring, length a power of two
-    !> (0:) a ring as well: the place in `filed` behind the list of each span, 0 if it is empty. A span is half a turn of the
-    !> other ring; its list holds events of this turn or later.
+    type(bucket_t), allocatable :: bucket(:)       !! (0:last_bucket) buckets of windows, a circular buffer
+    !> (0:last_span) position in `filed` behind the end of the list of each span, 0 if the list is empty; a circular buffer as
+    !> well. A span is half the length of the buffer of buckets. A list may also hold events of later turns of the circular buffer.
     integer(int32), allocatable :: list_end(:)
-    type(filed_t), allocatable :: filed(:)         !! (0:) all lists, in chunks that link to those filled before
-    integer(int32) :: n_chunks = 0                 !! that have been in use
-    integer(int32) :: vacant = none                !! a chunk that is no longer in use, which links to others
-    integer(int32) :: last_bucket = 0              !! one less than a power of two: masks numbers of windows
-    integer(int32) :: last_span = 0                !! likewise, of spans
+    type(filed_t), allocatable :: filed(:)         !! (0:) all lists, in chunks that are linked to the chunks filled before
+    integer(int32) :: n_chunks = 0                 !! number of chunks that have been used
+    integer(int32) :: vacant = none                !! head of the list of free chunks
+    integer(int32) :: last_bucket = 0              !! a power of two minus 1, used as a bit mask for window numbers
+    integer(int32) :: last_span = 0                !! likewise for span numbers
     integer(int32) :: log_span = 0                 !! binary logarithm of the windows in a span
-    integer(int32) :: ring_end = 0                 !! the first window that has no bucket yet
-    integer(int32) :: announced(stages) = 0        !! the last window that was announced
+    integer(int32) :: ring_end = 0                 !! first window that has no bucket yet
+    integer(int32) :: announced(stages) = 0        !! last window covered by each stage
   contains
     procedure :: empty
     procedure :: begin
@@ -53,13 +56,14 @@ module calendar
     procedure :: span_begins
     procedure :: open_span
     procedure :: list_coming
-    procedure, private :: add_chunk                ! bound, so that it is not inlined into the hot path
+    procedure, private :: add_chunk                ! bound to the type, so that it is not inlined into the hot path
   end type calendar_t
 
 contains
 
-  !> Empty buckets and spans, enough to hold most events of n disks: twice as many. For many disks the buckets must
-  !> leave the cache to the disks; equal numbers of buckets and spans minimise the lines written.
+  !> Empties buckets and spans and chooses their numbers such that they cover twice the usual time until the events of n disks.
+  !> For many disks the buckets must leave space in the cache for the disks; equal numbers of buckets and spans minimise the
+  !> number of cache lines written.
   subroutine empty(self, n)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: n                !! number of disks
@@ -81,7 +85,8 @@ contains
     end if
     if (.not. allocated(self%bucket)) then
       allocate (self%bucket(0:self%last_bucket), self%list_end(0:self%last_span))
-      allocate (self%filed(0:chunk*(self%last_span + 1 + 2*n/chunk) - 1))      ! what is not used takes no memory
+      ! The operating system provides memory only for the part that is used.
+      allocate (self%filed(0:chunk*(self%last_span + 1 + 2*n/chunk) - 1))
     end if
     self%bucket%n = 0
     self%list_end = 0
@@ -89,7 +94,7 @@ contains
     self%vacant = none
   end subroutine empty
 
-  !> Begins with a window.
+  !> Starts the calendar at a window.
   subroutine begin(self, window)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: window
@@ -98,7 +103,7 @@ contains
     self%announced = window
   end subroutine begin
 
-  !> Into the bucket of a window before `ring_end`, which is not the current one, unless it is full.
+  !> Adds a disk to the bucket of a later window before `ring_end`, unless the bucket is full.
   subroutine put_near(self, i, window, full)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: i, window
@@ -114,7 +119,7 @@ contains
     end associate
   end subroutine put_near
 
-  !> Into the list of the span of a later window.
+  !> Adds a disk to the list of the span of a later window.
   subroutine put_far(self, i, window)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: i, window
@@ -128,10 +133,10 @@ contains
     self%list_end(s) = place + 1
   end subroutine put_far
 
-  !> Adds a chunk to the list that ends before `place`.
+  !> Appends a chunk to the list that ends before `place`.
   subroutine add_chunk(self, place)
     class(calendar_t), intent(inout) :: self
-    integer(int32), intent(inout) :: place         !! afterwards that of the first event in the chunk
+    integer(int32), intent(inout) :: place         !! in: end of the list; out: position of the first event in the new chunk
     type(filed_t), allocatable :: more(:)
     integer(int32) :: c
 
@@ -160,13 +165,13 @@ contains
     yes = iand(window, shiftl(1_int32, self%log_span) - 1) == 0
   end function span_begins
 
-  !> Moves the events of the next span into their buckets. Those of a later turn stay, if they are still what their
-  !> disks expect; those whose bucket is full are given back.
+  !> Moves the events of the next span into their buckets. Events of a later turn stay in the list if they are still valid.
+  !> Events whose bucket is full are returned.
   subroutine open_span(self, tag, n_surplus, surplus)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(out) :: n_surplus
-    integer(int32), allocatable, intent(inout) :: surplus(:)     !! (n_surplus) disks; grows as needed
+    integer(int32), allocatable, intent(inout) :: surplus(:)     !! (n_surplus) disks whose bucket is full; enlarged if necessary
     type(filed_t) :: filed
     integer(int32) :: s, c, k, list_end, before
     logical :: full
@@ -197,15 +202,15 @@ contains
     end do
   end subroutine open_span
 
-  !> Lists disks that probably have events in the next windows, each window once at each stage, the earlier the
-  !> lower. After the first stage only those whose entry is still valid.
+  !> Lists disks that probably have events in the next windows. Each stage lists each window once; later stages cover fewer
+  !> windows ahead. After the first stage only disks whose entry is still valid are listed.
   subroutine list_coming(self, tag, window, stage, n, disks)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
-    integer(int32), intent(in) :: window           !! the current one
+    integer(int32), intent(in) :: window           !! current window
     integer(int32), intent(in) :: stage
     integer(int32), intent(out) :: n
-    integer(int32), intent(out) :: disks(most_coming)    !! (n)
+    integer(int32), intent(out) :: disks(most_coming)    !! (n) the disks
     integer(int32) :: w, last, k
     logical :: valid
 

@@ -1,5 +1,5 @@
-!> What may change in a simulation at work: what acts on disks, and their velocities. Both happen now, to all disks at once,
-!> and what they do to the energy is work.
+!> Changes to a running simulation: of forces, laws and motions of sides, and of velocities. They act at the present time on all
+!> disks at once. Their effect on the energy is counted as work.
 module changes
   use box_sides, only: bounds
   use disks, only: land
@@ -16,13 +16,14 @@ module changes
 
 contains
 
-  !> Lets another box, law and drive act from now on, of an input that describes the same disks. Sides stay where they are.
+  !> Replaces box, contact law and drive from now on by those of an input with the same disks. Moving sides must not jump.
   subroutine change_system(sim, system, problem)
     type(simulation_t), intent(inout) :: sim
     type(system_t), intent(in) :: system
-    character(len=:), allocatable, intent(out) :: problem    !! why it cannot; empty if it could
+    character(len=:), allocatable, intent(out) :: problem    !! reason why this is impossible; empty if it succeeded
     type(simulation_t) :: other
-    real(real64) :: before, here(2, 2), there(2, 2), v       ! [energy], lower and upper sides [length], of a side [length/time]
+    real(real64) :: before, here(2, 2), there(2, 2), v  ! energy [energy], lower and upper sides [length], velocity of a side
+                                                        ! [length/time]
     integer :: k
 
     problem = ""
@@ -30,7 +31,7 @@ contains
     other%system_t = system
     other%with%own_sizes = sim%with%own_sizes
     other%box%epoch = sim%box%epoch
-    do k = 1, n_sides                                        ! a piston starts where the side is, and as fast
+    do k = 1, n_sides                                        ! a piston starts at the position and with the velocity of the side
       if (other%box%surface(k)%motion%kind /= piston) cycle
       v = 0
       if (sim%box%surface(k)%motion%travels()) v = sim%box%side_velocity(k, sim%now)
@@ -53,7 +54,8 @@ contains
     call book(sim, before)
   contains
 
-    !> The number of kicks that would have come by now: random numbers of the next one, and its time, follow from that.
+    !> Sets the number of kicks to that of a run with the new driving from the start. It determines the time and the random
+    !> numbers of the next kick.
     subroutine count_kicks()
       if (.not. sim%drive%is_on()) return
       sim%kicks = int(min(sim%time()/sim%drive%interval, 2.0_real64**62), int64)
@@ -66,11 +68,11 @@ contains
     end subroutine count_kicks
   end subroutine change_system
 
-  !> Gives all disks other velocities.
+  !> Sets the velocities of all disks.
   subroutine change_velocities(sim, v)
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: v(:, :)                      !! (2,n) by id [length/time]
-    real(real64) :: before, old(2)                           ! [energy], [length/time]
+    real(real64), intent(in) :: v(:, :)                      !! (2,n) new velocities in the order of ids [length/time]
+    real(real64) :: before, old(2)                           ! energy [energy], velocity [length/time]
     integer(int32) :: i
 
     before = total_energy(sim)
@@ -85,8 +87,9 @@ contains
     call book(sim, before)
   end subroutine change_velocities
 
-  !> Takes all disks to where they are now, as flights under one law. Their clocks are equal then, so that no collision may
-  !> pass for one that rounding left of an earlier one: what a disk met last, it may meet again at once, as after a kick.
+  !> Advances all disks to the present time under the old law. Their clocks are equal afterwards. The last partners are erased,
+  !> because a disk may collide with its last partner again at once, as after a kick, and this must not be taken for a rounding
+  !> error of the previous collision.
   subroutine land_all(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i
@@ -98,10 +101,10 @@ contains
     end do
   end subroutine land_all
 
-  !> Notes the energy that a change has given, in sums as fine as a run with this system has them.
+  !> Adds the energy change to the work, in sums whose units are those of a run with the new system.
   subroutine book(sim, before)
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: before                       !! the total energy then [energy]
+    real(real64), intent(in) :: before                       !! total energy before the change [energy]
 
     sim%changes = sim%changes + 1
     sim%typical_speed2 = max(sim%typical_speed2, sim%mean_square_speed())

@@ -1,5 +1,5 @@
-!> When the origin of time moves, and when a collapse is looked for. Both follow from the state alone, so that all ways
-!> to go on from it agree.
+!> Moves the origin of time and detects collapses. Both depend on the state alone, so that all searches, queues and numbers of
+!> threads agree.
 module epochs
   use box_sides, only: keep_off_sides
   use kinds, only: int32, int64, never, pi, real64
@@ -12,20 +12,20 @@ module epochs
   private
   public :: are_crushed, begin_anew, begin_first_epoch, is_at_rest, last_time, most_events, move_epoch, stands_still
 
-  !> Pair collisions per disk after which the origin of time should move, so that times keep their digits.
+  !> Collisions of disks, per disk, in an epoch. The origin of time then moves, so that times keep their precision.
   integer(int64), parameter :: epoch_length = 24
-  integer, parameter :: significant_bits = 20      !! of an epoch: sums of epochs are exact
-  !> Events of a collapse: at least these, and these per disk.
+  integer, parameter :: significant_bits = 20  !! significant bits of the length of an epoch, few enough for exact sums of lengths
+  !> Number of events without advance of time that is considered a collapse: at least this number, and this number per disk.
   integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
-  real(real64), parameter :: shortest = 2.0_real64**(-20)  !! epoch, in blinks
+  real(real64), parameter :: shortest = 2.0_real64**(-20)  !! shortest epoch in units of `blink`
   real(real64), parameter :: last_time = 0.5_real64*never
-  real(real64), parameter :: crushing = 1.0e6_real64 !! growth of the energy that no gas survives
-  real(real64), parameter :: densest = 0.9_real64  !! packing fraction
+  real(real64), parameter :: crushing = 1.0e6_real64 !! factor of energy growth by which crushed disks are recognised
+  real(real64), parameter :: densest = 0.9_real64  !! largest packing fraction used in the estimate
 
 contains
 
-  !> Chooses the length of the first epoch by a guess at the rate of events, and the time that is too short for any
-  !> disk to move visibly.
+  !> Chooses the length of the first epoch from an estimate of the event rate, and the time within which no disk moves
+  !> noticeably.
   pure subroutine begin_first_epoch(sim)
     type(simulation_t), intent(inout) :: sim
     real(real64) :: fastest, mean
@@ -46,8 +46,8 @@ contains
     sim%events_then = sim%tally%events
   contains
 
-    !> Events per disk and length of its path in a gas: with other disks, by the equation of state of Henderson, and with
-    !> walls.
+    !> Events of a disk per length of its path in a gas: collisions with other disks, from the equation of state of Henderson (Mol.
+    !> Phys. 30, 971 (1975)), and with walls.
     pure function events_per_path() result(rate)
       real(real64) :: rate                           !! [1/length]
       real(real64) :: packing
@@ -58,7 +58,7 @@ contains
     end function events_per_path
   end subroutine begin_first_epoch
 
-  !> Events of any kind wanted between two epochs.
+  !> Number of events intended for an epoch.
   pure function events_per_epoch(sim) result(n)
     type(simulation_t), intent(in) :: sim
     integer(int64) :: n
@@ -66,7 +66,7 @@ contains
     n = epoch_length*sim%n_disks()/2 + 100
   end function events_per_epoch
 
-  !> An epoch of a given length begins now.
+  !> Starts an epoch of a given length at the present time.
   pure subroutine begin_epoch(sim, length)
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: length             !! [time]
@@ -76,9 +76,9 @@ contains
     sim%epoch_events = sim%tally%events
   end subroutine begin_epoch
 
-  !> Ends the epoch now: moves the origin of time to about now, so that times stay small and keep their digits. As
-  !> everything must be predicted again then, it also sorts the disks by cell. The next epoch ends at a time, not after a
-  !> number of events, so that parts of a simulation that know nothing of each other agree on it.
+  !> Ends the epoch and moves the origin of time to about the present time, so that times stay small and keep their precision. As
+  !> all events have to be predicted again, the disks are also sorted by cells. The end of the next epoch is a time and not a
+  !> number of events, so that domains that run independently of each other agree on it.
   subroutine move_epoch(sim)
     type(simulation_t), intent(inout) :: sim
     real(real64) :: shift, length
@@ -95,9 +95,9 @@ contains
     call begin_epoch(sim, length)
   end subroutine move_epoch
 
-  !> Ends the epoch now because the disks, or what acts on them, have been changed: what happens next may be faster by any
-  !> factor, so the origin of time moves to this very moment, and the length of the epoch is found anew when the evolution
-  !> starts. Time steps count from the start of the run and have no epochs.
+  !> Ends the epoch because the disks, or the forces and laws, have been changed. The following motion may be faster by any
+  !> factor. The origin of time therefore moves exactly to the present time, and the length of the epoch is determined again when
+  !> the evolution starts. Time-stepped dynamics counts from the start of the run and has no epochs.
   subroutine begin_anew(sim)
     type(simulation_t), intent(inout) :: sim
 
@@ -107,7 +107,7 @@ contains
     sim%epoch_end = 0
   end subroutine begin_anew
 
-  !> Moves the origin from which moments of this epoch count, and lets all events be stale.
+  !> Moves the origin of all times of this epoch. All predicted events become stale.
   subroutine move_origin(sim, shift)
     type(simulation_t), intent(inout) :: sim
     real(real64), value :: shift                    !! [time]
@@ -122,13 +122,13 @@ contains
     sim%last_advance = sim%last_advance - shift
     sim%box%epoch = sim%box%epoch + shift
     sim%box%side%clock = sim%box%side%clock - shift
-    if (.not. any(sim%box%surface(:n_sides)%motion%travels())) return    ! only sides move
+    if (.not. any(sim%box%surface(:n_sides)%motion%travels())) return    ! only moving sides need this
     do i = 1, sim%n_disks()
       call keep_off_sides(sim%box, sim%disk(i), sim%now)
     end do
   end subroutine move_origin
 
-  !> The number of events at which an epoch ends early, as it has had far more than it should: at the end of bouncing.
+  !> Number of events at which an epoch ends early, because the event rate is far higher than expected, as before a collapse.
   pure function most_events(sim) result(n)
     type(simulation_t), intent(in) :: sim
     integer(int64) :: n
@@ -136,8 +136,8 @@ contains
     n = sim%epoch_events + 2*events_per_epoch(sim)
   end function most_events
 
-  !> Whether sides press the disks together where there is no room: their energy grows without limit, ever faster. What
-  !> else heats them, or lets them fall, is not meant. Asked at the end of an epoch.
+  !> Whether moving sides compress the disks beyond close packing, so that their energy grows without limit. Other energy sources,
+  !> such as driving, hot walls or gravity, are excluded. Tested at the end of an epoch.
   pure function are_crushed(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -150,7 +150,7 @@ contains
     end associate
   end function are_crushed
 
-  !> Whether a long series of events has not advanced the clock, as in a collapse; asked at the end of an epoch.
+  !> Whether a long series of events has not advanced the time, as in a collapse. Tested at the end of an epoch.
   pure function stands_still(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -159,9 +159,9 @@ contains
       .and. sim%tally%events - sim%events_then >= max(collapse_length, collapse_length_per_disk*sim%n_disks())
   end function stands_still
 
-  !> Whether all disks have come to rest. Bounces of a disk that falls back on what is still take ever shorter times, whose sum
-  !> is finite: where time stands still, a disk is at rest if its next bounces end within a blink, and it had its last one
-  !> within a blink. Without gravity it is at rest if it does not move.
+  !> Whether all disks are at rest. The bounces of a disk that falls back on a surface at rest take ever shorter times with a
+  !> finite sum. A disk is considered at rest if its remaining bounces would end within a blink and its last one was within a
+  !> blink. Without gravity it is at rest if it does not move.
   pure function is_at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes

@@ -1,8 +1,8 @@
-!> Event-driven dynamics: exact, from collision to collision. Each disk holds one event, the earliest that it can
-!> have; when it is due, the disks concerned collide and predict again.
+!> Event-driven dynamics: exact trajectories from event to event. Each disk stores one event, its earliest. When it is due, the
+!> disks involved collide, and their next events are predicted.
 !>
-!> An event becomes stale when the partner collides with another disk first. Stale events are not searched for: the
-!> partner's stamp reveals them when they come up, and the disk only predicts again.
+!> An event becomes stale when its partner collides with another disk first. Stale events are not searched for. They are
+!> recognised by the collision counter of the partner when they are due; the disk then only predicts its next event.
 module event_driven
   use kinds, only: int32, int64, never, real64
   use box_sides, only: side_time
@@ -26,18 +26,18 @@ module event_driven
   private
   public :: event_driven_t
 
-  integer(int64), parameter :: events_to_look = 20000  !! between two looks at the number of pair collisions
-  integer(int32), parameter :: disks_in_cache = 20000    !! more do not fit into a second-level cache: prefetch
-  integer(int64), parameter :: events_ahead = 8    !! after which to prefetch again
+  integer(int64), parameter :: events_to_look = 20000  !! number of events between two checks of the number of collisions
+  integer(int32), parameter :: disks_in_cache = 20000    !! more disks do not fit into a second-level cache, and prefetching pays
+  integer(int64), parameter :: events_ahead = 8    !! number of events between two prefetches
 
   type, extends(evolution_t) :: event_driven_t
-    class(cell_grid_t), allocatable :: search      !! a class, so that its rare parts are not inlined into the hot path
+    class(cell_grid_t), allocatable :: search      !! polymorphic, so that its rare procedures are not inlined into the hot path
     type(event_queue_t) :: queue
-    logical :: windowed = .true.                   !! the queue uses its calendar, not the heap alone
-    logical :: thorough = .false.                  !! a collision is more than a change of two velocities
-    logical :: is_part = .false.                   !! of a simulation: only collisions of disks that belong here count
-    class(tracks_t), allocatable :: tracks         !! of its disks, in a part
-    integer(int64) :: last_count = 0               !! the number of events at which `run_events` returns
+    logical :: windowed = .true.                   !! the queue uses its calendar, not only the heap
+    logical :: thorough = .false.                  !! collisions need the general procedure
+    logical :: is_part = .false.  !! this engine advances one domain, and only collisions that belong to it are counted
+    class(tracks_t), allocatable :: tracks         !! tracks of the disks of the domain
+    integer(int64) :: last_count = 0               !! number of events at which `run_events` returns
   contains
     procedure :: start
     procedure :: advance
@@ -48,7 +48,7 @@ module event_driven
 
 contains
 
-  !> Builds search and queue from a state: new, restored, or in a new epoch.
+  !> Sets up search and queue from a state: a new one, a restored one, or at the start of an epoch.
   subroutine start(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -60,12 +60,12 @@ contains
     call self%search%build(sim)
     do i = 1, sim%n_disks()
       if (stop_requested()) return                 ! see `advance`
-      if (sim%tag(i)%id > 0) call self%search%predict(sim, i)    ! else a vacant slot
+      if (sim%tag(i)%id > 0) call self%search%predict(sim, i)    ! otherwise a vacant slot
     end do
     call self%queue%fill(sim%disk, sim%tag, sim%now, self%windowed)
   end subroutine start
 
-  !> Predicts the disks anew that have changed; the events of all others that they were to meet are stale.
+  !> Predicts the events of disks that have been changed. Events of other disks with them are now stale.
   subroutine renew(self, sim, changed)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -83,8 +83,8 @@ contains
     end do
   end subroutine renew
 
-  !> Predicts all disks, whose clocks are equal. An event later than the next kick of all disks will never happen, so it is
-  !> not filed, unless it is the earliest of all: the queue is never empty.
+  !> Predicts the events of all disks, whose clocks are equal. If the next kick changes all velocities, later events will never
+  !> happen and are not filed. The earliest event is always filed, because the queue must not be empty.
   subroutine renew_all(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -109,8 +109,8 @@ contains
     end do
   end subroutine renew_all
 
-  !> Executes events until a limit is met. None after a stop has been requested: many predictions take long and are
-  !> then left unfinished; the state itself is whole.
+  !> Executes events until a limit is reached. Returns early when a stop has been requested: long predictions are then
+  !> left incomplete, but the state itself is complete.
   subroutine advance(self, sim, limits, error, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -135,16 +135,17 @@ contains
       call self%run_events(sim, t_limit, turns, event, log)
       self%turns_left = turns
       self%last_event = [event%disk, event%partner]
-      if (turns == 0 .and. .not. sim%now < limits%time) turns = 1    ! a sample of this moment waits for all its events
+      if (turns == 0 .and. .not. sim%now < limits%time) turns = 1  ! a sample at this time requires that all events at this time
+                                                                   ! have been executed
       if (self%search%everyone .and. sim%tally%events > events) call self%predict_all(sim)
       if (event%time <= t_limit) cycle
       if (t_limit < limits%time .and. event%time > t_limit) then
-        turns = turns + 1                          ! nothing has happened
+        turns = turns + 1                          ! no event has been executed
         self%turns_left = turns
         call follow_piston(self, sim)
         cycle
       end if
-      if (is_stale()) then                         ! what is to come must not depend on who was predicted when
+      if (is_stale()) then                         ! the returned event must not depend on the order of predictions
         call predict(self, sim, event%disk)
         cycle
       end if
@@ -152,14 +153,14 @@ contains
         call fail(error, exit_broken, "a time became NaN: "//encounter_text(sim, event%disk, event%partner))
         return
       end if
-      self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! there images move for ever
+      self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! in a sheared box the images move for ever
       if (limits%time < last_time) sim%now = max(sim%now, limits%time)
       self%arrived = .true.
       return
     end do
   contains
 
-    !> Whether the partner of an event has collided since it was predicted.
+    !> Whether the partner of an event has collided since the prediction.
     pure function is_stale() result(yes)
       logical :: yes
 
@@ -167,7 +168,7 @@ contains
       if (yes) yes = sim%disk(event%partner)%stamp /= sim%tag(event%disk)%partner_stamp
     end function is_stale
 
-    !> The event count before which no check is due.
+    !> The number of events up to which no check is due.
     pure function next_pause() result(events)
       integer(int64) :: events
 
@@ -175,7 +176,7 @@ contains
       if (limits%watches() .or. present(log) .or. self%search%everyone) events = sim%tally%events + 1
     end function next_pause
 
-    !> Prefetches what the next events will read, and pauses soon to do so again.
+    !> Prefetches the data for the next events, and schedules the next prefetch.
     subroutine read_ahead()
       integer(int32) :: stage, n, disks(most_coming)
 
@@ -188,14 +189,14 @@ contains
     end subroutine read_ahead
   end subroutine advance
 
-  !> The loop: event after event, up to the number `last_count` of events, to the limit of time, or as long as
-  !> there are turns. Hot path only; rare work is left to the caller.
+  !> Hot path: executes event after event, up to `last_count` events, a time limit, or a number of iterations. All
+  !> rare work is left to the caller.
   subroutine run_events(self, sim, t_limit, turns, event, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: t_limit            !! since the epoch [time]
-    integer(int64), intent(inout) :: turns         !! that are left
-    type(event_t), intent(out) :: event            !! the last one; beyond the limit of time: not executed
+    integer(int64), intent(inout) :: turns         !! number of iterations left
+    type(event_t), intent(out) :: event            !! the last event; not executed if it is later than the time limit
     type(event_log_t), intent(inout), optional :: log
     real(real64) :: t
     integer(int32) :: i, code
@@ -214,11 +215,11 @@ contains
     event = event_t(t, i, code)
   end subroutine run_events
 
-  !> Executes the event of disk i, and predicts the disks concerned again.
+  !> Executes the event of disk i and predicts the next events of the disks involved.
   subroutine execute(self, sim, i, code, t, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i, code          !! the disk and its partner: see `partners`
+    integer(int32), intent(in) :: i, code          !! the disk and the code of its partner: see `partners`
     real(real64), intent(in) :: t
     type(event_log_t), intent(inout), optional :: log
     logical :: counts
@@ -227,7 +228,7 @@ contains
     if (self%is_part) counts = self%tracks%counts(sim%tag, i, code)
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
-        ! Equal clocks are rare: of two that are together, or that have both had a collision at this very time.
+        ! Equal clocks are rare: the disks are still in contact, or both have collided at exactly this time.
         if (self%thorough .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0) then
           call collide(sim, i, code, t, counts, log)
         else
@@ -257,12 +258,12 @@ contains
     call predict(self, sim, i)
   end subroutine execute
 
-  !> Predicts the disks anew that expected to hit a piston, which now flies otherwise, and those that hit it sooner. The loop
-  !> ends, as the piston may leave its strip sooner.
+  !> Predicts again the events of disks that were to collide with a piston whose motion has changed, and of those that now
+  !> collide with it earlier. Makes the loop return, because the piston may leave its strip earlier.
   subroutine follow_side(self, sim, side)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: side             !! its code
+    integer(int32), intent(in) :: side             !! code of the side
     integer(int32) :: k
 
     call self%search%faces%watch_pistons(sim%box, sim%now)
@@ -276,7 +277,7 @@ contains
     end associate
   end subroutine follow_side
 
-  !> Predicts the disks that a piston may strike in the strip that it enters, or might have struck in the one that it leaves.
+  !> Predicts the events of disks that a piston may touch in the strip that it enters, and of those in the strip that it leaves.
   subroutine follow_piston(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -289,7 +290,7 @@ contains
     end do
   end subroutine follow_piston
 
-  !> Predicts disk i and files its event.
+  !> Predicts the next event of disk i and files it.
   subroutine predict(self, sim, i)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -299,7 +300,7 @@ contains
     call self%queue%schedule(sim%disk, sim%tag, i)
   end subroutine predict
 
-  !> Predicts all disks, not just those involved: the first textbook method.
+  !> Predicts the events of all disks, not only of those involved: the simplest algorithm of textbooks.
   subroutine predict_all(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -1,5 +1,6 @@
-!> An array-backed min-heap of events with four children per node, at most one event per disk, with access by disk:
-!> earliest first, ties in a fixed order that does not depend on which disk expects the event or how it was filed.
+!> A priority queue: a min-heap of events in an array, with four children per node and at most one event per
+!> disk, which can be accessed by disk. Simultaneous events have a fixed order that depends neither on which disk stores the
+!> event nor on the order of insertion.
 module event_heap
   use kinds, only: int32
   use disks, only: tag_t
@@ -8,12 +9,12 @@ module event_heap
   private
   public :: event_heap_t, need_order, precedes
 
-  integer(int32), parameter :: arity = 4         !! children per node: half as deep as with 2, on the same cache lines
+  integer(int32), parameter :: arity = 4  !! children per node: half the depth of a binary heap, with equally many cache lines
 
   type :: event_heap_t
     integer(int32) :: n = 0                      !! number of events
-    type(event_t), allocatable, private :: entry(:)        !! (n) in heap order
-    integer(int32), allocatable, private :: slot(:)        !! (disks) place of a disk's event, 0: none
+    type(event_t), allocatable, private :: entry(:)        !! (n) events in heap order
+    integer(int32), allocatable, private :: slot(:)        !! (disks) position of the event of each disk; 0: none
   contains
     procedure :: initialise
     procedure :: update
@@ -23,8 +24,8 @@ module event_heap
 
 contains
 
-  !> Order of events: by time, then as `wins` says. Both disks of a pair may expect the collision; its place does not depend
-  !> on which of them does.
+  !> Order of events: by time, then by `wins`. Both disks of a pair may store the same collision; its position in the order
+  !> does not depend on which of them does.
   pure function precedes(a, b, tag) result(yes)
     type(event_t), intent(in) :: a, b
     type(tag_t), intent(in) :: tag(*)
@@ -34,7 +35,7 @@ contains
     if (.not. (yes .or. a%time > b%time)) yes = wins(a, b, tag)
   end function precedes
 
-  !> Not zero if two simultaneous events need an order: most are one collision that both disks expect.
+  !> Nonzero if two simultaneous events need an order. Most of them are the same collision, stored by both disks, and need none.
   elemental function need_order(a, b) result(bits)
     type(event_t), intent(in) :: a, b
     integer(int32) :: bits
@@ -42,7 +43,7 @@ contains
     bits = iand(-merge(1, 0, a%time <= b%time), ior(ieor(a%disk, b%partner), ieor(a%partner, b%disk)))
   end function need_order
 
-  !> Empties the heap and makes room for the events of n disks.
+  !> Empties the heap and allocates space for the events of n disks.
   subroutine initialise(self, n)
     class(event_heap_t), intent(inout) :: self
     integer(int32), intent(in) :: n              !! number of disks
@@ -55,11 +56,11 @@ contains
     self%n = 0
   end subroutine initialise
 
-  !> Inserts the event of a disk, or puts it in the place of the one that this disk had.
+  !> Inserts the event of a disk, or replaces the event that this disk had.
   pure subroutine update(self, event, tag)
     class(event_heap_t), intent(inout) :: self
     type(event_t), intent(in) :: event
-    type(tag_t), intent(in) :: tag(*)            !! of all disks
+    type(tag_t), intent(in) :: tag(*)            !! tags of all disks
     integer(int32) :: k
 
     k = self%slot(event%disk)
@@ -82,7 +83,7 @@ contains
   !> Removes the earliest event. The heap must not be empty.
   pure subroutine drop_first(self, tag)
     class(event_heap_t), intent(inout) :: self
-    type(tag_t), intent(in) :: tag(*)            !! of all disks
+    type(tag_t), intent(in) :: tag(*)            !! tags of all disks
     type(event_t) :: last
 
     self%slot(self%entry(1)%disk) = 0
@@ -91,7 +92,7 @@ contains
     if (self%n > 0) call sift_down(self, 1_int32, last, tag)
   end subroutine drop_first
 
-  !> Moves the hole at `start` up to where `event` belongs and fills it.
+  !> Moves the vacant position `start` up to the position of `event`, and stores the event there.
   pure subroutine sift_up(self, start, event, tag)
     class(event_heap_t), intent(inout) :: self
     integer(int32), intent(in) :: start
@@ -111,7 +112,7 @@ contains
     self%slot(event%disk) = k
   end subroutine sift_up
 
-  !> Moves the hole at `start` down to where `event` belongs and fills it.
+  !> Moves the vacant position `start` down to the position of `event`, and stores the event there.
   pure subroutine sift_down(self, start, event, tag)
     class(event_heap_t), intent(inout) :: self
     integer(int32), intent(in) :: start

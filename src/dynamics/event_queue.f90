@@ -1,8 +1,8 @@
-!> What happens next: a calendar over the heap (G. Paul, J. Comput. Phys. 221, 615 (2007)).
+!> The event queue: a calendar combined with a heap (G. Paul, J. Comput. Phys. 221, 615 (2007)).
 !>
-!> The near future, one window of time, is a short sorted list; if it grows long, the heap takes over until the window
-!> is done. Later events go to the calendar; those whose bucket is full go to the heap. Nothing is ever searched or
-!> removed singly: an entry counts only if it is still what its disk expects. Without the calendar all events are in
+!> Events of the current time window are in a short sorted list; if it grows too long, the heap is used until the window is done.
+!> Later events are in the calendar, or in the heap if their bucket is full. Single entries are never searched or
+!> removed: an entry is valid only if it still equals the event that its disk stores. Without the calendar all events are in
 !> the heap.
 module event_queue
   use kinds, only: int32, int64, never, real64
@@ -22,16 +22,16 @@ module event_queue
     private
     type(calendar_t) :: calendar
     type(event_heap_t) :: heap
-    type(event_t) :: near(0:near_capacity)         !! (n_near) latest first, after one that is never due
+    type(event_t) :: near(0:near_capacity)  !! (0:n_near) sorted list, latest first; element 0 is a sentinel that is never due
     integer(int32) :: n_near = 0
-    logical :: near_is_open = .false.              !! it takes events; else the heap does
-    logical :: windowed = .true.                   !! the calendar is in use, not the heap alone
-    integer(int32) :: window = 0                   !! number of the current window since the epoch
+    logical :: near_is_open = .false.              !! the list accepts events; otherwise the heap does
+    logical :: windowed = .true.                   !! the calendar is in use, not only the heap
+    integer(int32) :: window = 0                   !! index of the current window since the epoch
     integer(int32) :: n_disks = 0
-    real(real64) :: width = never                  !! of a window [time]
-    real(real64) :: per_time = 0.0_real64          !! windows per time, 1/width
+    real(real64) :: width = never                  !! width of a window [time]
+    real(real64) :: per_time = 0.0_real64          !! number of windows per time, 1/width
     real(real64) :: next_window = 1.0_real64       !! window + 1
-    integer(int64) :: n_taken = 0                  !! events since the last filling
+    integer(int64) :: n_taken = 0                  !! number of events taken since the last filling
     real(real64) :: filled_at = 0.0_real64         !! time of the last filling [time]
   contains
     procedure :: fill
@@ -41,7 +41,7 @@ module event_queue
     procedure :: drop_first
     procedure :: forget
     procedure :: list_coming
-    ! Bound to the type so that these rare parts are not inlined into the frequent ones.
+    ! Rare procedures are bound to the type, so that they are not inlined into frequent ones.
     procedure, private :: insert_near
     procedure, private :: insert_into_heap
     procedure, private :: first_in_heap
@@ -52,13 +52,13 @@ module event_queue
 
 contains
 
-  !> Files the events of all disks again.
+  !> Files the events of all disks.
   subroutine fill(self, disk, tag, now, windowed)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
     type(tag_t), intent(inout) :: tag(:)
     real(real64), intent(in) :: now                !! since the epoch [time]
-    logical, intent(in) :: windowed                !! .false.: everything into the heap
+    logical, intent(in) :: windowed                !! .false.: all events are filed in the heap
     integer(int32) :: i
 
     self%n_disks = size(disk, kind=int32)
@@ -66,12 +66,12 @@ contains
     self%near(0)%time = huge(now)
     call self%heap%initialise(self%n_disks)
     tag%window = window_none
-    self%width = max(window_width(), 1.0e-9_real64*now, 1/never)   ! numbers fit int32
+    self%width = max(window_width(), 1.0e-9_real64*now, 1/never)   ! window numbers fit into 32 bits
     self%windowed = windowed .and. self%width < never
     self%near_is_open = self%windowed
     self%n_taken = 0
     self%filled_at = now
-    self%per_time = 0                              ! one window without end
+    self%per_time = 0                              ! a single window without end
     if (self%windowed) then
       self%per_time = 1/self%width
       call self%calendar%empty(self%n_disks)
@@ -84,8 +84,8 @@ contains
     end do
   contains
 
-    !> The width of a window that holds a few events: by the rate since the last filling or, at first, by the
-    !> median wait of a sample of disks. `never` if nothing is expected at all.
+    !> Width of a window that contains a few events, from the event rate since the last filling or, at first, from the
+    !> median waiting time of a sample of disks. `never` if there are no events.
     pure function window_width() result(width)
       real(real64) :: width, waits(sample_size), swap
       integer :: i, k, n_waits
@@ -110,7 +110,7 @@ contains
     end function window_width
   end subroutine fill
 
-  !> Files the event of disk i. An earlier entry, if any, becomes invalid by itself.
+  !> Files the event of disk i. A previous entry of the disk becomes invalid by itself.
   subroutine schedule(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -121,7 +121,7 @@ contains
     logical :: full
 
     number = disk(i)%event_time*self%per_time
-    if (.not. number >= self%next_window) then     ! NaN as well, to be found
+    if (.not. number >= self%next_window) then     ! also true for NaN, which is then found at once
       tag(i)%window = window_none
       call self%insert_near(disk, tag, i)
       return
@@ -139,7 +139,7 @@ contains
     end if
   end subroutine schedule
 
-  !> Leaves the event of a disk unfiled. An earlier entry becomes invalid by itself.
+  !> Removes the entry of a disk from the queue; it becomes invalid by itself.
   pure subroutine withhold(self, tag)
     class(event_queue_t), intent(in) :: self
     type(tag_t), intent(inout) :: tag
@@ -147,7 +147,7 @@ contains
     tag%window = window_none
   end subroutine withhold
 
-  !> Into the current window: the sorted list, or the heap once the list has overflowed.
+  !> Adds an event to the current window: to the sorted list, or to the heap once the list has overflowed.
   subroutine insert_near(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -164,7 +164,7 @@ contains
     end if
   end subroutine insert_near
 
-  !> Moves the list into the heap.
+  !> Moves the sorted list into the heap.
   subroutine hand_over(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -177,7 +177,7 @@ contains
     self%n_near = 0
   end subroutine hand_over
 
-  !> Into the heap.
+  !> Adds the event of disk i to the heap.
   subroutine insert_into_heap(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -187,8 +187,8 @@ contains
     call self%heap%update(event_of(disk, i), tag)
   end subroutine insert_into_heap
 
-  !> Inserts an event into a sorted list of n. Times nearly always decide: most simultaneous events are one collision
-  !> that both disks expect, and these need no order.
+  !> Inserts an event into a sorted list of n events. The time nearly always decides. Most simultaneous events are the same
+  !> collision, stored by both disks, and need no order.
   pure subroutine insert(list, n, event, tag)
     type(event_t), intent(inout) :: list(0:*)
     integer(int32), intent(in) :: n
@@ -210,7 +210,7 @@ contains
     list(k + 1) = event
   end subroutine insert
 
-  !> The disk whose event comes first; the event stays in the queue.
+  !> Finds the disk with the earliest event, which stays in the queue.
   subroutine first(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -231,7 +231,7 @@ contains
     end do
   end subroutine first
 
-  !> The disk with the first event in the heap; 0: none is due in this window.
+  !> The disk with the earliest event in the heap; 0 if none is due in this window.
   subroutine first_in_heap(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -251,7 +251,7 @@ contains
     i = 0
   end subroutine first_in_heap
 
-  !> Removes the event that `first` found.
+  !> Removes the event found by `first`.
   subroutine drop_first(self, tag)
     class(event_queue_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
@@ -264,8 +264,8 @@ contains
     self%n_taken = self%n_taken + 1
   end subroutine drop_first
 
-  !> Drops the event of disk i if it is next. Only saves time: when both disks of a collision expected it, the second
-  !> entry follows the first.
+  !> Removes the entry of disk i if it is the next one. This only saves time: when both disks of a collision have stored it, the
+  !> second entry follows the first one.
   subroutine forget(self, i)
     class(event_queue_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -279,13 +279,13 @@ contains
     type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(in) :: stage
     integer(int32), intent(out) :: n
-    integer(int32), intent(out) :: disks(most_coming)    !! (n)
+    integer(int32), intent(out) :: disks(most_coming)    !! (n) the disks
 
     n = 0
     if (self%windowed) call self%calendar%list_coming(tag, self%window, stage, n, disks)
   end subroutine list_coming
 
-  !> Whether an entry is still what its disk expects.
+  !> Whether an entry is valid: it equals the event that its disk stores.
   pure function expected(disk, event) result(yes)
     type(disk_t), intent(in) :: disk(*)
     type(event_t), intent(in) :: event
@@ -296,7 +296,7 @@ contains
     end associate
   end function expected
 
-  !> Moves on by one window and sorts what is due in it into the list, which is empty.
+  !> Advances by one window and sorts its events into the list, which is empty before.
   subroutine open_next_window(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -311,8 +311,8 @@ contains
     if (self%calendar%span_begins(self%window)) call self%open_next_span(disk, tag)
   end subroutine open_next_window
 
-  !> Empties a bucket into a sorted list: the events that its disks expect before the next window; other entries are
-  !> no longer valid. They are so few that each finds its place by counting the later ones, without a branch on times.
+  !> Empties a bucket into a sorted list. Only events before the next window are valid. Their number is so small that the position
+  !> of each is found by counting later events, without branches on times.
   pure subroutine take_bucket(bucket, disk, tag, per_time, next_window, list, n)
     type(bucket_t), intent(inout) :: bucket
     type(disk_t), intent(in) :: disk(*)
@@ -352,7 +352,7 @@ contains
     end do
   end subroutine take_bucket
 
-  !> Moves what is due in this window from the heap into the list; if that overflows, everything into the heap.
+  !> Moves the events due in this window from the heap to the sorted list; if the list overflows, moves it into the heap.
   subroutine take_from_heap(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -368,8 +368,8 @@ contains
     call hand_over(self, disk, tag)
   end subroutine take_from_heap
 
-  !> Files the events of the next span into their buckets. If windows have turned out far too narrow or too wide, it
-  !> files all events again.
+  !> Files the events of the next span into their buckets. If windows have proved far too narrow or too wide, all events
+  !> are filed again.
   subroutine open_next_span(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -389,8 +389,8 @@ contains
     end do
   contains
 
-    !> Whether windows turned out far too narrow or too wide since the last filling, which must be so long ago that
-    !> filing all disks again pays.
+    !> Whether windows have proved far too narrow or too wide since the last filling, and enough windows have passed to justify
+    !> filing all disks again.
     pure function ill_fitting() result(yes)
       logical :: yes
       real(real64) :: per_window

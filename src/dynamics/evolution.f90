@@ -1,4 +1,4 @@
-!> The seam between the timeline and the ways to move on in time.
+!> Interface between the timeline and the kinds of dynamics.
 module evolution
   use kinds, only: int32, int64, never, real64
   use errors, only: error_t
@@ -9,15 +9,15 @@ module evolution
   private
   public :: evolution_t, limits_t
 
-  !> Where to pause; the first that is met counts. What is not set is out of reach.
+  !> Limits at which the dynamics stops; the first one reached applies. The default values are never reached.
   type :: limits_t
-    real(real64) :: time = never                         !! since the start of the run; for an evolution, since the epoch
+    real(real64) :: time = never  !! since the start of the run; when passed to an evolution, since the epoch [time]
     integer(int64) :: collisions = huge(0_int64)
     integer(int64) :: events = huge(0_int64)
-    real(real64) :: dissipated = huge(0.0_real64)        !! energy
-    logical :: at_rest = .false.                         !! where all disks have come to rest
-    integer(int64) :: turns = huge(0_int64)              !! of the loop, so that the caller can check other things
-    real(real64) :: sampled = 0.0_real64                 !! the time of the latest sample: the end is not before it
+    real(real64) :: dissipated = huge(0.0_real64)        !! dissipated energy [energy]
+    logical :: at_rest = .false.                         !! all disks are at rest
+    integer(int64) :: turns = huge(0_int64)              !! iterations of the loop, so that the caller can make other checks
+    real(real64) :: sampled = 0.0_real64                 !! time of the latest sample; the run does not end before it
   contains
     procedure :: reached
     procedure :: outgrown
@@ -25,11 +25,11 @@ module evolution
   end type limits_t
 
   type, abstract :: evolution_t
-    logical :: idle = .false.     !! nothing will ever happen again
-    logical :: arrived = .false.  !! at the limit of time of the last advance, with all that happens up to it behind
-    integer(int64) :: turns_left = 0       !! of those that the last advance was allowed
-    integer(int64) :: alone = 0            !! events on one core, where there are more
-    integer(int32) :: last_event(2) = 0    !! disk and partner of the last event, or of the first one beyond the limit of time
+    logical :: idle = .false.     !! no event will ever occur again
+    logical :: arrived = .false.  !! the last advance reached its time limit, and all events up to it have been executed
+    integer(int64) :: turns_left = 0       !! number of iterations left of those that the last advance was allowed
+    integer(int64) :: alone = 0            !! number of events executed by the serial engine of a parallel run
+    integer(int32) :: last_event(2) = 0    !! disk and partner of the last event, or of the first one beyond the time limit
   contains
     procedure :: warning
     procedure :: pause_at
@@ -39,27 +39,27 @@ module evolution
   end type evolution_t
 
   abstract interface
-    !> Prepares to go on from `sim`, new or restored: all that is not in the state is derived from it here.
+    !> Prepares to continue from `sim`, new or restored. All data that are not part of the state are derived from it here.
     subroutine start_evolution(self, sim)
       import :: evolution_t, simulation_t
       class(evolution_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: sim
     end subroutine start_evolution
 
-    !> Moves on until a limit is met or the log is full. Where it pauses leaves no trace in the trajectory.
+    !> Advances until a limit is reached or the log is full. The trajectory does not depend on where it stops.
     subroutine advance_evolution(self, sim, limits, error, log)
       import :: error_t, event_log_t, evolution_t, limits_t, simulation_t
       class(evolution_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: sim
       type(limits_t), intent(in) :: limits
       type(error_t), allocatable, intent(out) :: error
-      type(event_log_t), intent(inout), optional :: log    !! of the collisions; without it there is none
+      type(event_log_t), intent(inout), optional :: log    !! log of the collisions; if it is absent, they are not logged
     end subroutine advance_evolution
   end interface
 
 contains
 
-  !> Whether a limit other than that of time is met: all that happens at the very limit of time belongs to the part before.
+  !> Whether a limit other than that of time is reached. (Events at exactly the time limit are still executed.)
   pure function reached(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally
@@ -68,8 +68,8 @@ contains
     yes = tally%events >= self%events .or. tally%collisions >= self%collisions .or. self%outgrown(tally)
   end function reached
 
-  !> Whether a limit of what any collision may bring there is met. It must never decrease: a run that is past the limit has met
-  !> it on the way, and goes back to find out in which collision.
+  !> Whether a limit on a quantity that any collision may change is reached. Such a quantity must never decrease: parallel runs
+  !> detect afterwards that the limit was exceeded, and go back to find the collision at which it was reached.
   pure function outgrown(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally
@@ -86,7 +86,7 @@ contains
     yes = self%dissipated < huge(self%dissipated)
   end function watches
 
-  !> What is legal but rarely meant in a simulation with this dynamics; empty if nothing.
+  !> A warning about settings that are legal but rarely sensible with this dynamics; empty if there is none.
   pure function warning(self, sim) result(text)
     class(evolution_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -95,20 +95,20 @@ contains
     text = ""
   end function warning
 
-  !> The first moment from a time on at which what happens to all disks can come between two parts of the dynamics.
+  !> The first time, not before `time`, at which a change to all disks can occur between two steps of the dynamics.
   pure function pause_at(self, time) result(t)
     class(evolution_t), intent(in) :: self
     real(real64), intent(in) :: time              !! since the start of the run
-    real(real64) :: t                             !! likewise
+    real(real64) :: t                             !! since the start of the run
 
     t = time
   end function pause_at
 
-  !> Goes on after the state of some disks has been changed from outside, now.
+  !> Continues after the state of some disks has been changed from outside at the present time.
   subroutine renew(self, sim, changed)
     class(evolution_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: changed(:)      !! their numbers
+    integer(int32), intent(in) :: changed(:)      !! indices of these disks
 
     call self%start(sim)
   end subroutine renew

@@ -1,5 +1,5 @@
-!> What a kick does to the disks. The random numbers are a function of the seed, the disk and the number of the kick
-!> alone, so that it matters neither in which order disks are kicked nor how the run has come there.
+!> The velocity changes of a kick. Their random numbers are functions of the seed, the disk and the number of the kick
+!> alone, so that they depend neither on the order of the disks nor on the history of the run.
 module kicks
   use kinds, only: int32, pi, real64
   use disks, only: land
@@ -14,11 +14,11 @@ module kicks
 
 contains
 
-  !> Gives the disks their next kick, now, and lists whom it has reached.
+  !> Applies the next kick to the disks at the present time, and lists those affected.
   subroutine kick(sim, kicked)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable, intent(out) :: kicked(:)
-    real(real64), allocatable :: draws(:, :)     ! (2,n) of the disks that were kicked, kept where they are needed again
+    real(real64), allocatable :: draws(:, :)     ! (2,n) random numbers of the affected disks, kept where they are needed again
     real(real64) :: z(2)
     integer(int32) :: i, n
     logical :: is_hit
@@ -39,8 +39,8 @@ contains
     if (sim%drive%keep_momentum) call restore_momentum()
   contains
 
-    !> Subtracts the mean velocity that noise has given to the disks. The sums are exact, so that the order of the disks
-    !> leaves no trace.
+    !> Subtracts the mean velocity that noise has added to the disks. The sums are exact and do not depend on the order of the
+    !> disks.
     subroutine restore_momentum()
       type(exact_sum_t) :: momentum(2), mass
       real(real64) :: scale, heaviest
@@ -62,13 +62,13 @@ contains
     end subroutine restore_momentum
   end subroutine kick
 
-  !> Gives disk i a new velocity, in a sheared box relative to the profile: what it met last, it may meet again at once.
-  !> This is no contact.
+  !> Sets a new velocity of disk i, in a sheared box relative to the profile. Erases its last partner, with which it may now
+  !> collide again at once. A kick is not a contact.
   subroutine kick_disk(sim, i, is_hit, z)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    logical, intent(out) :: is_hit               !! 'andersen' may leave it alone
-    real(real64), intent(out) :: z(2)            !! Gaussian random numbers of variance 1 that were drawn for its velocity
+    logical, intent(out) :: is_hit               !! .false. if 'andersen' does not select the disk
+    real(real64), intent(out) :: z(2)            !! Gaussian random numbers of variance 1 drawn for the velocity
     type(random_stream_t) :: stream
     real(real64) :: u, spin(2), v(2)
 
@@ -98,7 +98,7 @@ contains
     end associate
   contains
 
-    !> Lets the orientation of disk i diffuse, and adds a velocity along it.
+    !> Applies rotational diffusion to the orientation of disk i, and adds the self-propulsion velocity.
     subroutine swim()
       type(random_stream_t) :: stream
       real(real64) :: z(2)
@@ -112,7 +112,7 @@ contains
     end subroutine swim
   end subroutine kick_disk
 
-  !> Gives the active disks orientations at the start, uniform in all directions.
+  !> Draws the initial orientations of active disks from a uniform distribution.
   subroutine orient(sim)
     type(simulation_t), intent(inout) :: sim
     type(random_stream_t) :: stream
@@ -127,7 +127,7 @@ contains
     end do
   end subroutine orient
 
-  !> Gives disk i a velocity, and counts the energy that this takes.
+  !> Sets the velocity of disk i and adds the energy change to the sum.
   subroutine change_velocity(sim, i, v)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -140,7 +140,7 @@ contains
     call sim%note_change(i, before, sim%now)
   end subroutine change_velocity
 
-  !> Gives disk i an angular velocity, and counts the energy that this takes.
+  !> Sets the angular velocity of disk i and adds the energy change to the sum.
   subroutine change_spin(sim, i, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

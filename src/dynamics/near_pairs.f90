@@ -1,6 +1,6 @@
-!> Which disks are near each other, or an obstacle, at the positions of a time step. Others cannot touch before a disk has
-!> moved by half the `skin`, so one list serves many steps (Verlet, Phys. Rev. 159, 98 (1967)). What is done in every step
-!> is done in vector registers, for which the directives ask: loops without a branch.
+!> Lists of pairs that are close to each other at the positions of a time step: two disks, or a disk and an obstacle. Other pairs
+!> cannot touch before a disk has moved by half the `skin`, so that a list is valid for many steps (Verlet, Phys. Rev. 159, 98
+!> (1967)). Loops that run in every step have no branches and are vectorised, as requested by directives.
 module near_pairs
   use kinds, only: int32, pi, real64
   use box_geometry, only: box_t, obstacle_gap
@@ -13,22 +13,22 @@ module near_pairs
   private
   public :: near_pairs_t
 
-  integer, parameter :: steps_per_list = 16                !! that a list should serve
-  real(real64), parameter :: pairs_per_disk = 4.0_real64   !! in a list, at most, at the mean density
-  real(real64), parameter :: least_skin = 0.2_real64       !! [mean diameter]
-  real(real64), parameter :: cells_per_disk = 4.0_real64   !! at most
+  integer, parameter :: steps_per_list = 16                !! number of steps for which a list should be valid
+  real(real64), parameter :: pairs_per_disk = 4.0_real64   !! largest number of pairs per disk in a list, at the mean density
+  real(real64), parameter :: least_skin = 0.2_real64       !! smallest skin [mean diameter]
+  real(real64), parameter :: cells_per_disk = 4.0_real64   !! largest number of bins per disk
 
-  !> Who may meet whom: first the obstacles in order, each with its disks ascending; then pairs of disks, ascending in i,
-  !> then in the partner.
+  !> Pairs that may touch: first those with obstacles, in the order of obstacles and then of disks; then pairs of disks, in the
+  !> order of i and then of the partner.
   type :: near_pairs_t
     integer(int32) :: n = 0
-    integer(int32), allocatable :: i(:)        !! (n, and room for more) a disk
-    integer(int32), allocatable :: partner(:)  !! (n, and room for more) a disk > i, or the code of an obstacle
-    integer(int32), allocatable :: hit(:)      !! (n, and room for more) 1: they overlap
-    integer(int32), private :: n_obstacles = 0 !! those that are with obstacles
+    integer(int32), allocatable :: i(:)        !! (at least n) a disk
+    integer(int32), allocatable :: partner(:)  !! (at least n) a disk > i, or the code of an obstacle
+    integer(int32), allocatable :: hit(:)      !! (at least n) 1: the pair overlaps
+    integer(int32), private :: n_obstacles = 0 !! number of pairs with obstacles
     logical, private :: known = .false.
-    real(real64), private :: skin = 0.0_real64 !! gap up to which they are listed [length]
-    real(real64), allocatable, private :: from(:, :)   !! (disks,2) where they were when listed [length]
+    real(real64), private :: skin = 0.0_real64 !! largest gap between the members of a pair [length]
+    real(real64), allocatable, private :: from(:, :)   !! (disks,2) positions when the list was made [length]
   contains
     procedure :: update
     procedure :: mark_overlaps
@@ -37,7 +37,7 @@ module near_pairs
 
 contains
 
-  !> Notes that disk i has been moved by a period.
+  !> Registers that disk i has been moved by a period.
   subroutine shift(self, i, dx)
     class(near_pairs_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -46,16 +46,16 @@ contains
     if (self%known) self%from(i, :) = self%from(i, :) + dx
   end subroutine shift
 
-  !> Lists the pairs anew unless no disk has moved by half the skin since. `all_pairs`: every time, and without bins; a
-  !> request to stop ends that, and then the list is not complete.
+  !> Makes a new list, unless all disks have moved by less than half the skin since the last one. With `all_pairs` a list is made
+  !> every time and without bins; a stop request ends this early, and the list is then incomplete.
   subroutine update(self, sim, x, step, all_pairs)
     class(near_pairs_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    real(real64), contiguous, intent(in) :: x(:, :)   !! (disks,2) where they are [length]
+    real(real64), contiguous, intent(in) :: x(:, :)   !! (disks,2) positions [length]
     real(real64), intent(in) :: step           !! [time]
     logical, intent(in) :: all_pairs
-    real(real64) :: width                      ! of a bin: a mean disk and the skin; more in a vast box [length]
-    integer(int32) :: bins(2), i, k, still     ! those that have not
+    real(real64) :: width                      ! width of a bin: a mean diameter and the skin, or more in a very large box [length]
+    integer(int32) :: bins(2), i, k, still     ! number of disks that have moved less
 
     if (self%known) then
       still = 0
@@ -88,7 +88,7 @@ contains
     call list_disks(self, sim, x, bins)
   contains
 
-    !> Wide enough to serve many steps, not so wide that most pairs are far apart. Affects the cost only.
+    !> Skin that is wide enough for many steps but does not include too many distant pairs. It affects only the speed.
     pure function wanted_skin() result(skin)
       real(real64) :: skin, diameter, reach, fastest
       integer(int32) :: i
@@ -103,11 +103,11 @@ contains
     end function wanted_skin
   end subroutine update
 
-  !> Marks with 1 those in the list that overlap, with 0 the others.
+  !> Marks pairs that overlap with 1, the others with 0.
   pure subroutine mark_overlaps(self, box, x, radius)
     class(near_pairs_t), intent(inout) :: self
     type(box_t), intent(in) :: box
-    real(real64), contiguous, intent(in) :: x(:, :)     !! (disks,2) where they are [length]
+    real(real64), contiguous, intent(in) :: x(:, :)     !! (disks,2) positions [length]
     real(real64), contiguous, intent(in) :: radius(:)   !! (disks) [length]
     real(real64) :: period(2)
     integer :: k
@@ -124,13 +124,13 @@ contains
     end associate
   end subroutine mark_overlaps
 
-  !> Adds the pairs of disks. Each looks for smaller ones, or equal ones of higher numbers: so a small disk searches only
-  !> bins close by, however large the largest disk is. Bins go on round the box; at walls that does no harm.
+  !> Adds pairs of disks. Each disk searches for smaller disks, or equal ones with higher indices. A small disk therefore searches
+  !> only few bins, however large the largest disk is. Bins are treated as periodic, which has no effect at walls.
   subroutine list_disks(self, sim, x, bins)
     type(near_pairs_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: x(:, :)
-    integer(int32), intent(in) :: bins(2)      !! columns, rows
+    integer(int32), intent(in) :: bins(2)      !! number of columns and rows
     integer(int32) :: bin(size(x, 1)), place(size(x, 1)), member(size(x, 1)), low(2), high(2), i, iy, row, from, to, first_pair
     integer(int32), allocatable :: first(:)
     real(real64) :: period(2), centre(2), reach
@@ -147,20 +147,20 @@ contains
       centre = [x(i, 1), x(i, 2)]
       reach = (2*sim%disk(i)%radius + self%skin)*(1 + spare)
       low = bin_at(in_box(centre) - reach)
-      high = min(bin_at(in_box(centre) + reach), low + bins - 1)    ! each once
+      high = min(bin_at(in_box(centre) + reach), low + bins - 1)    ! each bin once
       from = 1 + modulo(low(1), bins(1))
       to = from + high(1) - low(1)
       do iy = low(2), high(2)
         row = bins(1)*modulo(iy, bins(2))
         call add_run(row + from, row + min(to, bins(1)))
-        call add_run(row + 1, row + to - bins(1))           ! what goes on at the other end
+        call add_run(row + 1, row + to - bins(1))           ! part of the range beyond the last column
       end do
     end do
     call sort_pairs(self%i(first_pair:self%n), self%partner(first_pair:self%n), size(x, 1, kind=int32))
 
   contains
 
-    !> The image of a point that is in the box: a disk may have travelled more periods than an integer can count.
+    !> The image of a point inside the box. A disk may have travelled more periods than an integer can hold.
     pure function in_box(point) result(image)
       real(real64), intent(in) :: point(2)
       real(real64) :: image(2)
@@ -168,7 +168,7 @@ contains
       image = sim%box%lower + modulo(point - sim%box%lower, sim%box%edges())
     end function in_box
 
-    !> Column and row of a point in or near the box, from 0.
+    !> Column and row of a point in or near the box, counted from 0.
     pure function bin_at(point) result(c)
       real(real64), intent(in) :: point(2)
       integer(int32) :: c(2)
@@ -176,7 +176,7 @@ contains
       c = floor((point - sim%box%lower)/sim%box%edges()*bins, int32)
     end function bin_at
 
-    !> Adds the pairs of disk i with those in bins c to d of a row, if any.
+    !> Adds the pairs of disk i with disks in bins c to d of a row.
     subroutine add_run(c, d)
       integer(int32), intent(in) :: c, d
       integer(int32) :: k, j
@@ -191,7 +191,7 @@ contains
     end subroutine add_run
   end subroutine list_disks
 
-  !> Adds the pairs of disks, by a test of each. A request to stop ends it.
+  !> Adds pairs of disks by testing all of them. A stop request ends this early.
   subroutine test_all_pairs(self, x, radius, period)
     type(near_pairs_t), intent(inout) :: self
     real(real64), contiguous, intent(in) :: x(:, :), radius(:)   !! [length]
@@ -215,7 +215,7 @@ contains
     end do
   end subroutine test_all_pairs
 
-  !> 1 if the nearest images of two points in the box are nearer to each other than sigma, else 0.
+  !> 1 if the distance between the nearest images of two points in the box is less than sigma, otherwise 0.
   elemental function near(dx, dy, sigma, period_x, period_y) result(yes)
     real(real64), intent(in) :: dx, dy, sigma, period_x, period_y    !! [length]
     integer(int32) :: yes

@@ -1,4 +1,4 @@
-!> Disks that are neighbours in space become neighbours in memory.
+!> Sorts the disks in memory such that neighbours in space become neighbours in memory.
 module renumbering
   use kinds, only: int32, real64
   use disks, only: whole_disk_t
@@ -8,20 +8,20 @@ module renumbering
   private
   public :: renumber
 
-  integer(int32), parameter :: tile = 8           !! cells along the side of a tile, whose disks fill a page
+  integer(int32), parameter :: tile = 8           !! edge of a tile in cells; the disks of a tile fill a memory page
 
 contains
 
   !> Sorts the disks by the cells of a grid with about one disk per cell, and the cells by square tiles, so that
-  !> few pages hold a neighbourhood. Those of one cell keep their order. The order follows from the state alone and is the
-  !> same for every search and queue; `tag%id` keeps the order of the input.
+  !> a neighbourhood extends over few memory pages. Disks of one cell keep their order. The order depends on the state alone, not on
+  !> the search or the queue; `tag%id` keeps the order of the input.
   subroutine renumber(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable :: first(:), place(:), cell(:), order(:)
     integer(int32) :: n(2), c(2), i
 
     n = int(max(1.0_real64, min(sqrt(real(sim%n_disks(), real64)), 30000.0_real64)), int32)
-    n = (n + tile - 1)/tile                       ! tiles
+    n = (n + tile - 1)/tile                       ! number of tiles
     allocate (order(sim%n_disks()), place(sim%n_disks()), cell(sim%n_disks()))
     do i = 1, sim%n_disks()
       c = int(min(max((sim%position(i) - sim%box%lower)/sim%box%edges()*tile*n, 0.0_real64), tile*n - 1.0_real64), int32)
@@ -34,10 +34,10 @@ contains
     call move_in_order(sim, order)
   end subroutine renumber
 
-  !> Lets the disks take their places: no second copy of them is needed, and most are near already.
+  !> Permutes the disks in place, without a second copy of them. Most of them are already near their new position.
   subroutine move_in_order(sim, order)
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(inout) :: order(:)     !! the disk that comes to each place; afterwards each is there
+    integer(int32), intent(inout) :: order(:)     !! in: disk for each position; out: the identity permutation
     type(whole_disk_t) :: held
     integer(int32) :: start, to, from
 

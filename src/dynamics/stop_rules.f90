@@ -1,9 +1,9 @@
-!> When a run ends: when the first of the rules in the input is met, or when rounding errors dominate.
+!> Decides when a run ends: when the first rule in the input is met, or when rounding errors dominate.
 !>
-!> In a periodic box inelastic disks cool until they all drift together, with only the common momentum that rounding
-!> left. The temperature has lost all its digits long before that, so the run ends when the gas is that cold. This
-!> is checked whenever the epoch has moved, so that the end depends on the trajectory alone. The energy is compared with that
-!> of the velocities as they were given: digits are lost from then on only.
+!> In a periodic box inelastic disks cool until they all move with the common velocity that rounding has
+!> left. The temperature loses its precision long before that; the run then ends. This
+!> is tested when the epoch has moved, so that the end depends on the trajectory alone. The energy is compared with that
+!> of the velocities that were set last, because precision is lost only from then on.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use epochs, only: is_at_rest, stands_still
@@ -15,24 +15,24 @@ module stop_rules
   private
   public :: coldness, stop_rule_t, stop_settings_t, whole_collisions
 
-  real(real64), parameter :: coldest = 1.0e-25_real64        !! temperature over the first one
+  real(real64), parameter :: coldest = 1.0e-25_real64        !! smallest temperature relative to the first one
   character(len=*), parameter :: coldness = "cooled to 1e-25 of the first temperature"
 
-  !> A rule that is not given is never met.
+  !> Stop rules. The default values are never reached.
   type :: stop_settings_t
     real(real64) :: time = never
     integer(int64) :: collisions = huge(0_int64)
     real(real64) :: collisions_per_disk = never
     integer(int64) :: events = huge(0_int64)
     real(real64) :: energy_fraction = 0.0_real64
-    logical :: at_rest = .false.                      !! all disks have come to rest
+    logical :: at_rest = .false.                      !! all disks are at rest
     real(real64) :: wall_clock = never                !! [s]
   end type stop_settings_t
 
   type :: stop_rule_t
     type(limits_t) :: limits
     real(real64) :: wall_clock = never       !! [s]
-    logical :: cools = .false.               !! for ever, if the disks lose energy
+    logical :: cools = .false.               !! inelastic disks in a periodic box, which cool for ever
   contains
     procedure :: met
     procedure :: rests
@@ -47,7 +47,7 @@ module stop_rules
 
 contains
 
-  !> The rules of the input, in terms of the state they are compared with.
+  !> The stop rules of the input, converted to the quantities with which they are compared.
   pure function new_stop_rule(settings, sim) result(rule)
     type(stop_settings_t), intent(in) :: settings
     type(simulation_t), intent(in) :: sim
@@ -64,7 +64,7 @@ contains
       .and. .not. sim%is_driven()
   end function new_stop_rule
 
-  !> The first whole number of collisions that reaches a real one, rounding errors aside; huge if there is none.
+  !> The smallest integer that is not less than a real number of collisions, apart from rounding errors; huge if there is none.
   pure function whole_collisions(number) result(n)
     real(real64), intent(in) :: number
     integer(int64) :: n
@@ -73,7 +73,7 @@ contains
     if (number < 9.0e18_real64) n = ceiling(number - 4*spacing(number), int64)
   end function whole_collisions
 
-  !> Whether a rule is met, wall clock aside.
+  !> Whether a rule other than that of wall-clock time is met.
   pure function met(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -83,8 +83,8 @@ contains
     if (.not. yes .and. self%limits%at_rest) yes = stands_still(sim) .and. is_at_rest(sim)
   end function met
 
-  !> Whether all disks have come to rest, and the run is to end then. Where no force keeps their bounces going this is not a
-  !> matter of counts: then it is asked where nothing will ever happen any more.
+  !> Whether all disks are at rest and the run is to end then. This applies where no force causes bounces, so that no events occur
+  !> and the test at the end of an epoch is never made.
   pure function rests(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -94,7 +94,7 @@ contains
     if (yes) yes = is_at_rest(sim)
   end function rests
 
-  !> Whether the motion relative to the common motion had practically died out when the epoch began.
+  !> Whether the motion relative to the mean velocity had practically ceased at the beginning of the epoch.
   pure function too_cold(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -105,8 +105,8 @@ contains
       yes = relative_energy(sim) < coldest*sim%given_energy
   end function too_cold
 
-  !> Whether a run has come to its end: a rule is met, only rounding is left to follow, or nothing will ever happen any more
-  !> and no rule names a time to wait for. What breaks a run off is an error of `timeline` or of an evolution.
+  !> Whether a run is finished: a rule is met, rounding errors dominate, or no event will occur any more and no time is given
+  !> to wait for. Failures are errors of `timeline` or of the evolution.
   pure function is_over(self, sim, evolution) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -118,7 +118,8 @@ contains
       yes = self%rests(sim) .or. .not. min(self%limits%time, next_kick(evolution, sim)) < never
   end function is_over
 
-  !> Kinetic energy relative to the common motion. Two passes, because the difference of two large sums would lose digits.
+  !> Kinetic energy relative to the mean velocity. Computed in two passes, because a difference of two large sums would lose
+  !> precision.
   pure function relative_energy(sim) result(energy)
     type(simulation_t), intent(in) :: sim
     real(real64) :: energy                          !! [energy]
@@ -137,13 +138,13 @@ contains
     end do
   end function relative_energy
 
-  !> How much of the run is done, from 0 to 1, by the rule that is closest to being met.
+  !> Completed fraction of the run, from 0 to 1, by the rule that is closest to being met.
   pure function share(self, sim, elapsed) result(done)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
-    real(real64), intent(in) :: elapsed      !! by the wall clock [s]
+    real(real64), intent(in) :: elapsed      !! wall-clock time [s]
     real(real64) :: done
-    real(real64), parameter :: least = 1/never     ! a limit may be 0
+    real(real64), parameter :: least = 1/never     ! avoids division by 0
 
     done = max(sim%time()/max(self%limits%time, least), &
       real(sim%tally%collisions, real64)/max(self%limits%collisions, 1_int64), &

@@ -1,8 +1,8 @@
-!> Time-stepped dynamics: exact free flight over a fixed step; then every disk beyond a wall is reflected, and every
-!> pair that overlaps and approaches collides once. A contact is noticed up to one step late, a short one not at all:
-!> this is the method to compare the event-driven one with.
+!> Time-stepped dynamics: exact free flight over a fixed step; then each disk beyond a wall is reflected, and each
+!> pair that overlaps and approaches collides once. A contact is detected up to one step late, and a short one not at all.
+!> The method serves for comparisons with event-driven dynamics.
 !>
-!> As there, a disk's own state changes only at its own collisions, so no error accumulates from step to step.
+!> As in event-driven dynamics the state of a disk changes only in its own collisions, so that errors of steps do not accumulate.
 module time_stepped
   use images, only: images_t
   use kinds, only: int32, int64, most_exact, never, real64
@@ -22,16 +22,16 @@ module time_stepped
   private
   public :: time_stepped_t
 
-  !> A disk should move less than this share of the smallest radius in one step.
+  !> Largest recommended displacement in a step, relative to the smallest radius.
   real(real64), parameter :: longest_way = 0.5_real64
-  integer(int64), parameter :: steps_per_look = 1024  !! whether anything still moves
+  integer(int64), parameter :: steps_per_look = 1024  !! number of steps between two tests whether anything moves
 
   type, extends(evolution_t) :: time_stepped_t
     real(real64) :: dt = 0.0_real64                 !! [time]
-    logical :: every_pair = .false.                 !! test all pairs at every step, not only near ones
+    logical :: every_pair = .false.                 !! test all pairs in every step, instead of near ones
     type(near_pairs_t), private :: near
-    ! Coordinate by coordinate, for vector registers.
-    real(real64), allocatable, private :: x(:, :)    !! (disks,2) where they are in this step [length]
+    ! Coordinates are stored separately, for vectorisation.
+    real(real64), allocatable, private :: x(:, :)    !! (disks,2) positions in this step [length]
     real(real64), allocatable, private :: radius(:)  !! (disks) [length]
     integer(int32), allocatable, private :: outside(:)   !! (disks) 1: beyond a side
   contains
@@ -44,7 +44,7 @@ module time_stepped
 
 contains
 
-  !> Makes room for positions, and forgets near pairs.
+  !> Allocates the positions and deletes the lists of near pairs.
   subroutine start(self, sim)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -62,7 +62,7 @@ contains
   pure function pause_at(self, time) result(t)
     class(time_stepped_t), intent(in) :: self
     real(real64), intent(in) :: time               !! since the start of the run
-    real(real64) :: t                              !! likewise
+    real(real64) :: t                              !! since the start of the run
 
     t = time
     if (time > most_exact*self%dt) return
@@ -70,7 +70,7 @@ contains
     if (t < time) t = (steps_taken(time, self%dt) + 1)*self%dt
   end function pause_at
 
-  !> Near pairs stay near however fast they become: only what was at rest may move.
+  !> Continues after disks were changed. Lists of near pairs remain valid for any velocities; only the test for rest is reset.
   subroutine renew(self, sim, changed)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -79,7 +79,7 @@ contains
     self%idle = .false.
   end subroutine renew
 
-  !> Takes steps; the k-th is at the time k*dt, wherever this paused before.
+  !> Executes steps. The k-th step ends at the time k*dt, wherever earlier calls stopped.
   subroutine advance(self, sim, limits, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -88,7 +88,7 @@ contains
     type(event_log_t), intent(inout), optional :: log
     integer(int64) :: k
 
-    self%arrived = .not. sim%now < limits%time      ! a step is one moment, whatever ends there, the turns too
+    self%arrived = .not. sim%now < limits%time      ! the end of a step is a single moment, at which all limits are tested
     self%turns_left = limits%turns
     k = steps_taken(sim%now, self%dt)
     do while (self%turns_left > 0)
@@ -107,7 +107,7 @@ contains
     end do
   end subroutine advance
 
-  !> The largest k with k*dt <= now: it follows from the state alone.
+  !> The largest k with k*dt <= now. It depends on the state alone.
   pure function steps_taken(now, dt) result(k)
     real(real64), intent(in) :: now, dt             !! [time]
     integer(int64) :: k
@@ -118,7 +118,7 @@ contains
     end do
   end function steps_taken
 
-  !> Whether nothing moves and nothing ever will.
+  !> Whether nothing moves, and no force or side can set anything in motion.
   pure function at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -131,8 +131,8 @@ contains
     end do
   end function at_rest
 
-  !> All collisions at time t: first sides, then obstacles, then pairs of disks, each in ascending order, so that the
-  !> result does not depend on how they are found. A request to stop ends a long search, before anything has changed.
+  !> Executes all collisions at time t: first sides, then obstacles, then pairs of disks, each in ascending order, so that the
+  !> result does not depend on the search. A stop request ends a long search before the state has changed.
   subroutine take_step(self, sim, t, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -176,7 +176,7 @@ contains
     end do
   contains
 
-    !> Takes disk i through the periodic sides that it is beyond, and reflects it at walls.
+    !> Moves disk i through the periodic sides that it has passed, and reflects it at walls.
     subroutine meet_sides()
       real(real64) :: beyond, inset, before(2), low(2), high(2)
       integer(int32) :: side
@@ -203,8 +203,8 @@ contains
       end do
     end subroutine meet_sides
 
-    !> Reflects disk i, which is beyond a side or an obstacle, if it moves further out of it. It keeps its position and so
-    !> its potential energy.
+    !> Reflects disk i, which is beyond a side or an obstacle, if it moves further outwards. Its position is not changed, so that
+    !> its potential energy is conserved.
     subroutine meet_wall(i, code)
       integer(int32), intent(in) :: i, code
       real(real64) :: normal(2)
@@ -214,7 +214,7 @@ contains
         call collide(sim, i, code, sim%now, .true., log)
     end subroutine meet_wall
 
-    !> Collides the disks i < j, which overlap, if they approach.
+    !> Executes the collision of disks i < j, which overlap, if they approach.
     subroutine meet_disk(i, j)
       integer(int32), intent(in) :: i, j
       type(images_t) :: images
@@ -227,7 +227,7 @@ contains
     end subroutine meet_disk
   end subroutine take_step
 
-  !> The next place with a mark; 0: there is none.
+  !> The next marked position; 0 if there is none.
   pure function next_marked(mark, after) result(k)
     integer(int32), contiguous, intent(in) :: mark(:)
     integer(int32), intent(in) :: after
@@ -239,7 +239,7 @@ contains
     k = 0
   end function next_marked
 
-  !> Marks with 1 the disks that are not between the sides (or nowhere: NaN), with 0 the others.
+  !> Marks disks that are not between the sides, or whose position is NaN, with 1, the others with 0.
   pure subroutine mark_outside(self, sim)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -257,7 +257,7 @@ contains
     end associate
   end subroutine mark_outside
 
-  !> 1 if x is between two limits, else (or if it is NaN) 0.
+  !> 1 if x is between two limits; otherwise, or if x is NaN, 0.
   elemental function between(x, low, high) result(inside)
     real(real64), intent(in) :: x, low, high
     integer(int32) :: inside
@@ -265,9 +265,9 @@ contains
     inside = iand(merge(1, 0, x >= low), merge(1, 0, x <= high))
   end function between
 
-  !> What is wrong with the step; empty if nothing is. The fastest disk may fall through the whole box and then has the
-  !> speed v0 + sqrt(2 g L). A disk that loses energy in every step of a lasting contact sinks by up to g dt**2/2 per
-  !> step under gravity; the TC model prevents it.
+  !> Reports problems of the step; empty if there are none. The fastest disk may fall through the whole box and then has the
+  !> speed v0 + sqrt(2 g L). A disk that dissipates energy in every step of a lasting contact sinks by up to g dt**2/2 per
+  !> step under gravity; the TC model prevents this.
   pure function warning(self, sim) result(text)
     class(time_stepped_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

@@ -1,5 +1,5 @@
-!> What is due for all disks at once, in its order: at each moment first all collisions, then kicks, then what the caller
-!> does, samples or the end of the run. In between the origin of time moves.
+!> Executes everything that affects all disks at once, in its order. At each moment collisions come first, then kicks, then the
+!> actions of the caller (samples, end of the run). The origin of time moves in between.
 module timeline
   use encounters, only: encounter_text
   use box_geometry, only: wall_normal
@@ -18,11 +18,11 @@ module timeline
   private
   public :: adapted, advance, advance_once, next_kick, passed_collapse
 
-  real(real64), parameter :: pause_interval = 0.05_real64  !! between looks at signals and clocks [s]
+  real(real64), parameter :: pause_interval = 0.05_real64  !! time between two checks of signals and clocks [s]
 
 contains
 
-  !> Moves on until a limit is met, or nothing will ever happen any more.
+  !> Advances until a limit is reached, or until no event will occur any more.
   subroutine advance(evolution, sim, limits, error, log)
     class(evolution_t), intent(inout) :: evolution
     type(simulation_t), intent(inout) :: sim
@@ -37,8 +37,8 @@ contains
     end do
   end subroutine advance
 
-  !> Moves on until a limit is met, a kick is due, or the epoch is over, and lets that happen. Where this pauses leaves no
-  !> trace in the trajectory.
+  !> Advances until a limit is reached, a kick is due, or the epoch ends, and executes the kick or the change of epoch. The
+  !> trajectory does not depend on where this stops.
   subroutine advance_once(evolution, sim, limits, error, log)
     class(evolution_t), intent(inout) :: evolution
     type(simulation_t), intent(inout) :: sim
@@ -57,7 +57,7 @@ contains
     due = min(limits%time, kick_time)
     goal = limits
     goal%time = due - sim%box%epoch
-    if (sim%epoch_end > 0) then                    ! time steps have no epochs
+    if (sim%epoch_end > 0) then                    ! time-stepped dynamics has no epochs
       goal%time = min(goal%time, sim%epoch_end)
       goal%events = min(goal%events, most_events(sim))
     end if
@@ -69,7 +69,7 @@ contains
         call wait()
       else if (arrived .and. due - sim%box%epoch > sim%epoch_end) then
         epoch_is_over = .true.
-        arrived = .false.                          ! at the end of the epoch, not where it was to go
+        arrived = .false.                          ! stopped at the end of the epoch, before the intended time
       end if
       if (epoch_is_over) call end_epoch()
     end if
@@ -80,16 +80,16 @@ contains
     sim%settled = arrived .or. (sim%settled .and. sim%tally%events == events .and. .not. sim%time() > before)
   contains
 
-    !> Lets time pass until something is due where nothing will ever happen by itself; without an end, to the last collision.
+    !> Advances the time to what is due next, if no event occurs any more. Without an end the time is that of the last collision.
     subroutine wait()
       if (due < last_time) then
         sim%now = max(sim%now, due - sim%box%epoch)
-      else                                           ! a stale event, or the end of the epoch, may have moved it
+      else                                           ! a stale event, or the end of the epoch, may have advanced it
         sim%now = max(maxval(sim%disk%clock), limits%sampled - sim%box%epoch)
       end if
     end subroutine wait
 
-    !> Begins the next epoch, unless time stands still, or soon will.
+    !> Begins the next epoch, or reports that the disks are crushed or that time stands still.
     subroutine end_epoch()
       if (are_crushed(sim)) then
         call fail(error, exit_broken, "a side crushes the disks, whose energy has grown a million times: let it end " &
@@ -106,12 +106,12 @@ contains
     end subroutine end_epoch
   end subroutine advance_once
 
-  !> The number of turns that take about `pause_interval`. They grow only if all were used: else a run with many samples
-  !> would have any number of them, and when the samples cease it would not look up for hours.
+  !> Number of iterations that take about `pause_interval`. It grows only if all iterations were used. Otherwise it would grow
+  !> without limit in a run with many samples, and after the last sample signals would not be checked for hours.
   pure function adapted(turns, elapsed, cut_short) result(n)
     integer(int64), intent(in) :: turns
-    real(real64), intent(in) :: elapsed               !! for these turns, or some of them [s]
-    logical, intent(in) :: cut_short                  !! something was due before they were over
+    real(real64), intent(in) :: elapsed               !! time for these iterations, or for some of them [s]
+    logical, intent(in) :: cut_short                  !! a limit was reached before all iterations were used
     integer(int64) :: n
 
     n = turns
@@ -119,7 +119,7 @@ contains
     if (elapsed > 2*pause_interval) n = max(turns/2, 1_int64)
   end function adapted
 
-  !> When disks are kicked next: after all collisions of that moment, and before anything else is done at it.
+  !> Time of the next kick, which follows all collisions at that time and precedes everything else.
   pure function next_kick(evolution, sim) result(t)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
@@ -128,7 +128,7 @@ contains
     t = evolution%pause_at(sim%drive%time_of(sim%kicks + 1))
   end function next_kick
 
-  !> The reason why time no longer advances at the encounters of disk i with its partner, and what helps.
+  !> The reason why events of disk i with its partner no longer advance the time, and a remedy.
   pure function standstill(sim, i, code) result(text)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code            !! as in `partners`
@@ -154,7 +154,7 @@ contains
     if (is_at_rest(sim)) text = text//"; stop.at_rest = .true. ends a run where all disks have come to rest"
   end function standstill
 
-  !> Whether an encounter of disk i can cost energy.
+  !> Whether an event of disk i with this partner can dissipate energy.
   pure function may_lose(sim, i, code) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code
@@ -167,12 +167,12 @@ contains
     end if
   end function may_lose
 
-  !> Whether disk i moves along an obstacle that curves around it.
+  !> Whether disk i slides along an obstacle that is concave towards it.
   pure function slides(sim, i, code) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code
     logical :: yes
-    real(real64), parameter :: grazing = 1.0e-6_real64     ! velocity along the normal over speed
+    real(real64), parameter :: grazing = 1.0e-6_real64     ! ratio of normal velocity to speed
     real(real64) :: x(2), v(2), normal(2)
 
     yes = .false.
@@ -184,7 +184,7 @@ contains
       .and. dot_product(sim%box%obstacle(obstacle_number(code))%shape%middle - x, normal) > 0
   end function slides
 
-  !> The report of a collapse that a run has passed; empty if there was none.
+  !> The report of collapses that occurred in a run; empty if there were none.
   pure function passed_collapse(sim) result(text)
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text
@@ -195,12 +195,14 @@ contains
       //": rounding decides what follows; "//longer_contacts(sim)
   end function passed_collapse
 
-  !> The advice to let contacts last: far longer than a collapse, and far shorter than flights, as far as their mean is known.
+  !> The advice to set a contact duration: much longer than a collapse, and much shorter than the mean time between collisions, as
+  !> far
+  !> as it is known.
   pure function longer_contacts(sim) result(text)
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text
     real(real64), parameter :: share = 0.01_real64, blinks = 1.0e5_real64
-    integer(int64) :: contacts                     ! of all disks
+    integer(int64) :: contacts                     ! number of contacts of all disks
     real(real64) :: proposal                       ! [time]
 
     contacts = sim%tally%events + sim%tally%collisions - 2*sim%tally%stuck

@@ -1,6 +1,6 @@
-!> What the disks of one domain did in the present window of time: where they went and what they met, so that one can tell
-!> afterwards whether the copies did what the disks that they stand for did elsewhere; and which collisions are the domain's
-!> to count.
+!> Records of the motion of disks in one domain in the present time window: the cells that they were in and a digest of their
+!> collisions. They are used to test afterwards whether copies moved like the disks that they represent in other domains. Also
+!> decides which collisions a domain counts.
 module tracks
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int16, int32, int64, real64
@@ -11,25 +11,25 @@ module tracks
   private
   public :: track_t, tracks_t
 
-  !> What a disk did in the present window of time. An own disk that nobody else can have a copy of has no track.
+  !> The motion of a disk in the present window. An own disk of which no other domain can have a copy has no track.
   type :: track_t
-    integer(int64) :: digest = 0                   !! of the times of its collisions with disks
+    integer(int64) :: digest = 0                   !! digest of the times of its collisions with disks
     integer(int32) :: slot = 0
-    logical :: own = .false.                       !! an own disk; else a copy
-    integer(int16) :: low(2) = 0_int16             !! first column, row that it was in
-    integer(int16) :: high(2) = 0_int16            !! last
+    logical :: own = .false.                       !! owned by this domain; otherwise a copy
+    integer(int16) :: low(2) = 0_int16             !! lowest column and row that it was in
+    integer(int16) :: high(2) = 0_int16            !! highest column and row
   end type track_t
 
   type :: tracks_t
-    type(patch_t) :: patch                         !! the cells of the domain and around
+    type(patch_t) :: patch                         !! cells of the domain and its halo
     integer(int32) :: n_tracks = 0
-    type(track_t), allocatable :: track(:)         !! (n_tracks, and room for more)
-    integer(int32), allocatable :: track_of(:)     !! (slots) number of its track; 0: none
-    integer(int32) :: own_low(2) = 0, own_high(2) = 0      !! columns, rows of the domain
-    integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! those that are in no other domain's patch
-    integer(int32) :: safe_low(2) = 0, safe_high(2) = 0    !! beyond these the patch has an open end
-    integer(int8), allocatable :: reached(:, :)    !! (0:,0:) 1: an own disk came near this cell from its domain
-    logical :: too_far = .false.                   !! an own disk came to the end of the patch
+    type(track_t), allocatable :: track(:)         !! (at least n_tracks) the tracks
+    integer(int32), allocatable :: track_of(:)     !! (slots) index of the track; 0: none
+    integer(int32) :: own_low(2) = 0, own_high(2) = 0      !! columns and rows of the domain
+    integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! columns and rows that are in no patch of another domain
+    integer(int32) :: safe_low(2) = 0, safe_high(2) = 0    !! beyond these the patch ends and has no copies
+    integer(int8), allocatable :: reached(:, :)    !! (0:,0:) 1: an own disk that has left the domain came near this cell
+    logical :: too_far = .false.                   !! an own disk reached the edge of the patch
   contains
     procedure :: note_collision
     procedure :: note
@@ -47,7 +47,7 @@ module tracks
 
 contains
 
-  !> A new window begins: no own disk has left the domain yet.
+  !> Begins a new window, in which no own disk has left the domain yet.
   subroutine begin_window(self)
     class(tracks_t), intent(inout) :: self
 
@@ -55,7 +55,7 @@ contains
     self%too_far = .false.
   end subroutine begin_window
 
-  !> A new track of disk i begins where it is, if it needs one there. Whose disk it is follows from that as well.
+  !> Begins a new track of disk i at its present cell, if it needs one there. The cell also determines whether the domain owns it.
   subroutine begin_track(self, cell, i)
     class(tracks_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -69,7 +69,7 @@ contains
     end if
   end subroutine begin_track
 
-  !> Gives disk i a track that is still to begin.
+  !> Assigns a track to disk i, which has yet to be begun.
   subroutine add_track(self, i)
     class(tracks_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -79,7 +79,7 @@ contains
     self%track_of(i) = self%n_tracks
   end subroutine add_track
 
-  !> Drops the track of disk i, if any; the last one takes its number.
+  !> Deletes the track of disk i, if it has one; the last track takes its index.
   subroutine drop_track(self, i)
     class(tracks_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -95,12 +95,12 @@ contains
     self%n_tracks = self%n_tracks - 1
   end subroutine drop_track
 
-  !> Whether a collision of disk i counts in this domain: of two disks that with the lower id must be an own one.
+  !> Whether this domain counts a collision of disk i: the domain that owns the disk, or the disk with the lower id of a pair.
   pure function counts(self, tag, i, code) result(yes)
     class(tracks_t), intent(in) :: self
     type(tag_t), intent(in) :: tag(:)
     integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: code             !! whom or what it meets
+    integer(int32), intent(in) :: code             !! code of the partner
     logical :: yes
 
     if (code <= 0) then
@@ -110,7 +110,7 @@ contains
     end if
   end function counts
 
-  !> Notes that the disks i and j have collided, for whoever has copies of them, and where they are.
+  !> Records a collision of disks i and j, and their cells.
   subroutine note_collision(self, disk, tag, i, j)
     class(tracks_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -119,7 +119,7 @@ contains
 
     if (self%track_of(i) > 0) call add_moment(self%track(self%track_of(i))%digest, disk(i)%clock)
     if (self%track_of(j) > 0) call add_moment(self%track(self%track_of(j))%digest, disk(j)%clock)
-    call self%note(tag(i)%cell, i)                 ! they may have chosen other cells
+    call self%note(tag(i)%cell, i)                 ! the collision may have changed their cells
     call self%note(tag(j)%cell, j)
   end subroutine note_collision
 
@@ -131,7 +131,7 @@ contains
     digest = ieor(ishftc(digest, 11), transfer(time, digest))
   end subroutine add_moment
 
-  !> Prefetches the numbers of the tracks of some disks and of their partners.
+  !> Prefetches the track indices of some disks and of their partners.
   subroutine read_ahead(self, disk, disks)
     class(tracks_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -144,7 +144,7 @@ contains
     end do
   end subroutine read_ahead
 
-  !> Notes where disk i is.
+  !> Records the cell of disk i.
   subroutine note(self, cell, i)
     class(tracks_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -152,7 +152,7 @@ contains
 
     if (self%track_of(i) == 0) then
       if (within(cell, self%deep_low, self%deep_high)) return
-      call self%add_track(i)                       ! from here on others could have seen it
+      call self%add_track(i)                       ! from here on it can be in other domains' patches
       self%track(self%track_of(i)) = track_t(0_int64, i, .true., cell, cell)
     end if
     associate (track => self%track(self%track_of(i)))
@@ -162,7 +162,7 @@ contains
     end associate
   end subroutine note
 
-  !> Notes that an own disk has left the domain: it may meet whoever is in the nine cells around.
+  !> Records that an own disk has left the domain: it may touch any disk in the nine cells around.
   subroutine reach(self, cell)
     class(tracks_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -199,7 +199,7 @@ contains
     yes = within(cell, self%own_low, self%own_high)
   end function owns
 
-  !> Whether disk i is an own one.
+  !> Whether the domain owns disk i.
   pure function is_own(self, i) result(yes)
     class(tracks_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -209,7 +209,7 @@ contains
     if (.not. yes) yes = self%track(self%track_of(i))%own
   end function is_own
 
-  !> How many copies there are.
+  !> Number of copies.
   pure function n_copies(self) result(n)
     class(tracks_t), intent(in) :: self
     integer(int32) :: n
@@ -217,7 +217,7 @@ contains
     n = count(.not. self%track(:self%n_tracks)%own, kind=int32)
   end function n_copies
 
-  !> Whether a disk that was in these columns and rows, and nowhere else, could have met an own one.
+  !> Whether a disk that was in these columns and rows during the window could have met an own disk.
   pure function could_have_met(self, low, high) result(yes)
     class(tracks_t), intent(in) :: self
     integer(int32), intent(in) :: low(2), high(2)
