@@ -1,4 +1,4 @@
-!> Circular obstacles: disks bounce off the outside, or are kept inside.
+!> Circular obstacles. Disks are outside, or are enclosed inside.
 module circles
   use free_flight, only: time_to_circle
   use kinds, only: pi, real64
@@ -21,7 +21,7 @@ module circles
 
 contains
 
-  !> The circle with this centre; `encloses`: the disks are inside.
+  !> The circle with this centre and radius. `encloses`: the disks are inside.
   pure function new_circle(centre, radius, encloses) result(circle)
     real(real64), intent(in) :: centre(2)       !! [length]
     real(real64), intent(in) :: radius          !! [length]
@@ -35,10 +35,10 @@ contains
     circle%area = pi*radius**2
   end function new_circle
 
-  !> Between the two centres.
+  !> Distance between the two centres at contact.
   pure function distance_at_contact(self, radius) result(rho)
     class(circle_t), intent(in) :: self
-    real(real64), intent(in) :: radius          !! of the disk [length]
+    real(real64), intent(in) :: radius          !! radius of the disk [length]
     real(real64) :: rho
 
     rho = merge(self%radius - radius, self%radius + radius, self%encloses)
@@ -53,7 +53,7 @@ contains
     s = time_to_circle(d, v, g, self%distance_at_contact(radius), self%encloses)
   end function contact_time
 
-  !> Distance between the circle and the rim of a disk.
+  !> Distance between the circle and the boundary of a disk.
   pure function gap(self, d, radius) result(length)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2), radius
@@ -72,7 +72,7 @@ contains
     direction = merge(-d, d, self%encloses)/magnitude(d)
   end function normal
 
-  !> Whether a disk with its centre in a rectangle can touch the circle.
+  !> Whether a disk whose centre is in a rectangle can touch the circle.
   pure function reaches(self, d, half, radius) result(yes)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -85,7 +85,7 @@ contains
     end if
   end function reaches
 
-  !> Whether the circle keeps disks out of a whole rectangle.
+  !> Whether the circle excludes disks from a whole rectangle.
   pure function covers(self, d, half, radius) result(yes)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -102,7 +102,7 @@ contains
     end if
   end function covers
 
-  !> A circle must meet the box and fit between periodic sides.
+  !> Checks that the circle overlaps the box and fits between periodic sides.
   pure function misfit(self, lower, upper, periodic) result(problem)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: lower(2), upper(2)

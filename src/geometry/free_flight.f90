@@ -1,17 +1,17 @@
-!> Kinematics of free flight, as pure functions: where a disk is after a while, and when it touches a line or a circle.
-!> Times are measured from the state that is passed in. When two disks touch is in `neighbour_search`.
+!> Kinematics of free flight as pure functions: the position of a disk after some time, and the time until it touches a line or a
+!> circle. Times count from the state that is passed in. Contacts of two disks are predicted in `neighbour_search`.
 module free_flight
   use kinds, only: never, real64
   implicit none
   private
   public :: flight, flight_velocity, time_to_line, time_to_circle, slowest
 
-  !> What is slower than this is at rest: times would overflow. [length/time]
+  !> Speeds below this value count as rest, because times would overflow. [length/time]
   real(real64), parameter :: slowest = 1/never
 
 contains
 
-  !> Position after the time s on the parabola x + v s + g s**2/2; by coordinate.
+  !> Position after the time s on the parabola x + v s + g s**2/2, for one coordinate.
   elemental function flight(x, v, g, s) result(there)
     real(real64), intent(in) :: x         !! [length]
     real(real64), intent(in) :: v         !! [length/time]
@@ -22,7 +22,7 @@ contains
     there = x + (v + 0.5_real64*g*s)*s
   end function flight
 
-  !> Velocity after the time s; by coordinate.
+  !> Velocity after the time s, for one component.
   elemental function flight_velocity(v, g, s) result(then)
     real(real64), intent(in) :: v, g, s
     real(real64) :: then
@@ -30,10 +30,10 @@ contains
     then = v + g*s
   end function flight_velocity
 
-  !> Time until a line at `distance` ahead is crossed in the forward direction, `never` if it is not.
-  !> Each branch takes the form of the quadratic's root that does not cancel.
+  !> Time until a line at `distance` ahead is crossed in the forward direction; `never` if it is not crossed.
+  !> Each branch uses the form of the root of the quadratic that is free of cancellation.
   pure function time_to_line(distance, speed, acceleration) result(s)
-    real(real64), intent(in) :: distance      !! along the normal; negative: the line lies behind [length]
+    real(real64), intent(in) :: distance      !! along the normal; negative if the line is behind [length]
     real(real64), intent(in) :: speed         !! along the normal [length/time]
     real(real64), intent(in) :: acceleration  !! along the normal [length/time**2]
     real(real64) :: s, root
@@ -56,10 +56,10 @@ contains
     end if
   end function time_to_line
 
-  !> Time until a disk's centre reaches a circle of radius rho around the origin: from outside, or from
-  !> inside if `inside`. Zero if it is there already (or beyond, by rounding) and still moves on.
+  !> Time until the centre of a disk reaches a circle of radius rho around the origin, from outside or, with `inside`, from
+  !> inside. Zero if the disk is already on the circle (or beyond it, by rounding) and moves further.
   pure function time_to_circle(d, v, g, rho, inside) result(s)
-    real(real64), intent(in) :: d(2)      !! centre of the disk relative to the circle's [length]
+    real(real64), intent(in) :: d(2)      !! centre of the disk relative to that of the circle [length]
     real(real64), intent(in) :: v(2)      !! [length/time]
     real(real64), intent(in) :: g(2)      !! [length/time**2]
     real(real64), intent(in) :: rho       !! [length]
@@ -88,10 +88,10 @@ contains
     end if
   end function time_to_circle
 
-  !> The same on a parabola. F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic; between the roots of F'
-  !> it is monotone, and those are bracketed in turn by the roots of the quadratic F''. So every root is
-  !> found by bisection in a bracket that holds exactly one: no first contact can be missed. F itself is taken from
-  !> where the disk is, so that a small circle is not lost in the square of its distance.
+  !> The same on a parabola. F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic. It is monotonic between the roots of F',
+  !> which in turn are bracketed by the roots of the quadratic F''. Each root is therefore
+  !> found by bisection in an interval that contains exactly one root, and the first contact cannot be missed. F itself is evaluated
+  !> from the actual position, so that a small circle is not lost in the square of its distance.
   pure function time_to_circle_falling(d, v, g, rho, inside) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside
@@ -105,7 +105,7 @@ contains
     bend = [(-b - sign(sqrt(disc), a))/a, (-b + sign(sqrt(disc), a))/a]
 
     ends = [0.0_real64, min(max(bend, 0.0_real64), bound), bound]
-    edge(0) = 0                                        ! ends of the intervals on which F is monotone
+    edge(0) = 0                                        ! edges of the intervals in which F is monotonic
     n = 0
     do k = 1, 3
       if ((value(cubic, ends(k)) > 0) .eqv. (value(cubic, ends(k + 1)) > 0)) cycle
@@ -126,7 +126,7 @@ contains
 
   contains
 
-    !> F, or from inside -F: contact is where it falls through zero.
+    !> F, or -F if the disk is inside. A contact is a zero crossing from positive to negative values.
     pure function apart(s) result(f)
       real(real64), intent(in) :: s
       real(real64) :: f, x(2)
@@ -136,8 +136,8 @@ contains
       if (inside) f = -f
     end function apart
 
-    !> The last moment before contact, given that the centre meets the circle once between lo and hi: bisection
-    !> to the last bit of the distance itself, which is sharper than the polynomial.
+    !> The last time before contact, if the centre crosses the circle once between lo and hi. Bisection to the last bit uses the
+    !> distance itself, which is more precise than the polynomial.
     pure function last_apart(lo, hi) result(left)
       real(real64), intent(in) :: lo, hi
       real(real64) :: left, middle, right, x(2)
@@ -157,8 +157,8 @@ contains
     end function last_apart
   end function time_to_circle_falling
 
-  !> A power of two beyond all roots of a cubic (Fujiwara's bound), and beyond a time squared that is given in case it
-  !> has none but zero. With powers of two, other units give scaled bits.
+  !> A power of two larger than all roots of a cubic (Fujiwara's bound), and larger than the square root of `time2`, which is
+  !> used if all roots are zero. With powers of two, results scale exactly when the units change by a power of two.
   pure function root_bound(cubic, time2) result(bound)
     real(real64), intent(in) :: cubic(0:3), time2
     real(real64) :: bound
@@ -171,7 +171,7 @@ contains
     bound = scale(2.0_real64, power)
   end function root_bound
 
-  !> The root of `poly` between lo and hi, where it changes sign once; bisection to the last bit.
+  !> The root of `poly` between lo and hi, where it has one change of sign. Found by bisection to the last bit.
   pure function root_between(poly, lo, hi) result(s)
     real(real64), intent(in) :: poly(0:), lo, hi
     real(real64) :: s, left, right
@@ -189,10 +189,10 @@ contains
         right = s
       end if
     end do
-    s = left                                           ! the side before contact
+    s = left                                           ! the end of the interval before contact
   end function root_between
 
-  !> Horner's rule.
+  !> Value of a polynomial by Horner's rule.
   pure function value(poly, s) result(p)
     real(real64), intent(in) :: poly(0:)
     real(real64), intent(in) :: s

@@ -1,28 +1,27 @@
-!> Who is next door across a periodic side: the images of the box, with where they are and how they move. Search, start,
-!> obstacles and collisions ask here.
+!> Periodic images of the box: their displacements and velocities. Used by the search, the start, obstacles and collisions.
 !>
-!> In a sheared box (Lees and Edwards, J. Phys. C 5, 1921 (1972)) the image above slides along x. Where an image is depends
-!> on the time alone: its shift when the clocks began, at the epoch, and from then on its velocity. So the separation of
-!> two disks through an image is a function of their states and the time, whoever asks.
+!> In a sheared box (Lees and Edwards, J. Phys. C 5, 1921 (1972)) the image above moves along x. The position of an image
+!> depends on the time alone: it follows from its displacement at the epoch and its velocity. The separation of two disks through an
+!> image is therefore a function of their states and of the time.
 module images
   use kinds, only: never, real64
   implicit none
   private
   public :: image_t, images_t, sliding_images
 
-  !> One image of the box, as seen from the box itself.
+  !> One image of the box, relative to the box itself.
   type :: image_t
-    real(real64) :: shift(2) = 0.0_real64       !! from the box to it, at the epoch [length]
-    real(real64) :: slip = 0.0_real64           !! its velocity along x [length/time]
+    real(real64) :: shift(2) = 0.0_real64       !! displacement of the image at the epoch [length]
+    real(real64) :: slip = 0.0_real64           !! velocity of the image along x [length/time]
   end type image_t
 
-  !> An image has a number by axis: 0, 0 is the box itself, 0, 1 the image above. Numbers are whole, and real because disks
-  !> may be any number of periods apart.
+  !> All images of the box. An image has an index along each axis: (0, 0) is the box itself, (0, 1) the image above. Indices are
+  !> integers stored as reals, because disks may be any number of periods apart.
   type :: images_t
-    real(real64) :: period(2) = never           !! `never` between walls [length]
+    real(real64) :: period(2) = never           !! `never` along axes with walls [length]
     real(real64) :: slip = 0.0_real64           !! velocity of the image above [length/time]
-    real(real64) :: slide = 0.0_real64          !! of that image at the epoch, less whole periods [length]
-    real(real64) :: left_out = 0.0_real64       !! those periods
+    real(real64) :: slide = 0.0_real64          !! displacement of that image at the epoch, modulo the period [length]
+    real(real64) :: left_out = 0.0_real64       !! number of periods removed from it
   contains
     procedure :: count => count_around
     procedure :: around
@@ -38,7 +37,7 @@ module images
 contains
 
   !> The images of a box whose image above is displaced by slip*t at the time t of the run. The clocks count from `epoch`.
-  !> The displacement is reduced to a period without loss, so that times however late keep their digits.
+  !> The displacement is reduced modulo the period without rounding error, so that late times are as precise as early ones.
   pure function sliding_images(period, slip, epoch) result(images)
     real(real64), intent(in) :: period(2)       !! [length]
     real(real64), intent(in) :: slip            !! [length/time]
@@ -57,7 +56,7 @@ contains
     end associate
   end function sliding_images
 
-  !> A number as the sum of two with half the digits: their products are exact.
+  !> Splits a number into two with half the digits each. Products of such halves are exact.
   pure function halves(x)
     real(real64), intent(in) :: x
     real(real64) :: halves(2)
@@ -67,7 +66,7 @@ contains
     halves(2) = x - halves(1)
   end function halves
 
-  !> How many images there are in reach, the box itself included.
+  !> Number of images in reach, including the box itself.
   pure function count_around(self) result(n)
     class(images_t), intent(in) :: self
     integer :: n
@@ -75,8 +74,8 @@ contains
     n = product(2*self%reach() + 1)
   end function count_around
 
-  !> Along each axis, up to which number images are in reach: two disks that are in the box touch through none beyond,
-  !> until one of them passes a side or it is time to look again.
+  !> Largest index of images in reach, along each axis. Two disks in the box can touch only through these images until one of
+  !> them passes a side or `look_again` is due.
   pure function reach(self)
     class(images_t), intent(in) :: self
     integer :: reach(2)
@@ -85,11 +84,11 @@ contains
     if (abs(self%slip) > 0) reach(1) = 2
   end function reach
 
-  !> The number of the k-th of the images in reach, row by row.
+  !> Index of the k-th image in reach, in the order of rows.
   pure function around(self, k, now) result(number)
     class(images_t), intent(in) :: self
-    integer, intent(in) :: k                    !! from 1
-    real(real64), intent(in), optional :: now   !! since the epoch; where images slide [time]
+    integer, intent(in) :: k                    !! counted from 1
+    real(real64), intent(in), optional :: now   !! since the epoch; needed in a sheared box [time]
     real(real64) :: number(2)
     integer :: reach(2)
 
@@ -101,7 +100,7 @@ contains
       number(1) = number(1) - anint(self%displacement(number(2), now)/self%period(1))
   end function around
 
-  !> How far along x the image `rows` above is displaced.
+  !> Displacement along x of the image `rows` above.
   pure function displacement(self, rows, now)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: rows
@@ -111,7 +110,7 @@ contains
     displacement = rows*(self%slide + self%slip*now)
   end function displacement
 
-  !> Until when the images in reach now, or others that slide by up to `distance`, are all that matter.
+  !> Time until which only the images in reach now, and images displaced from these by up to `distance`, have to be considered.
   pure function look_again(self, now, distance) result(t)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: now             !! [time]
@@ -124,11 +123,11 @@ contains
     if (abs(self%slip) > farthest/never) t = now + farthest/abs(self%slip)
   end function look_again
 
-  !> The number of the image through which what is dx away is nearest: almost always 0, 0.
+  !> Index of the image through which an object at the separation dx is nearest; almost always (0, 0).
   pure function nearest_image(self, dx, now) result(number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: dx(2)           !! [length]
-    real(real64), intent(in), optional :: now   !! since the epoch; where images slide [time]
+    real(real64), intent(in), optional :: now   !! since the epoch; needed in a sheared box [time]
     real(real64) :: number(2)
 
     number = 0
@@ -138,7 +137,7 @@ contains
       number(1) = -anint((dx(1) + self%displacement(number(2), now))/self%period(1))
   end function nearest_image
 
-  !> Where the image of this number was at the epoch.
+  !> Displacement of the image with this index at the epoch.
   pure function shift(self, number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: number(2)
@@ -148,7 +147,7 @@ contains
     shift(1) = shift(1) + number(2)*self%slide
   end function shift
 
-  !> The image of this number.
+  !> The image with this index.
   pure function image(self, number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: number(2)
@@ -157,14 +156,14 @@ contains
     image = image_t(self%shift(number), number(2)*self%slip)
   end function image
 
-  !> Describes a disk as one of the image `rows` above: it is where it was, as seen from there.
+  !> Transforms the state of a disk into the frame of the image `rows` above. The disk itself does not move.
   pure subroutine climb(self, rows, clock, x, v, periods)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: rows
-    real(real64), intent(in) :: clock           !! of x [time]
+    real(real64), intent(in) :: clock           !! time to which x belongs [time]
     real(real64), intent(inout) :: x(2)         !! [length]
     real(real64), intent(inout) :: v(2)         !! [length/time]
-    real(real64), intent(inout) :: periods(2)   !! that the disk has travelled
+    real(real64), intent(inout) :: periods(2)   !! number of periods that the disk has travelled
 
     x = x - [self%displacement(rows, clock), rows*self%period(2)]
     v(1) = v(1) - rows*self%slip

@@ -1,8 +1,8 @@
-!> Straight walls from one point to another, solid on both sides. Their ends are points that disks bounce off.
+!> Straight walls between two points, impenetrable from both sides. Disks also collide with their ends.
 !>
 !> A disk touches the wall when its centre reaches the stadium around it: two straight sides at the distance of
-!> its radius, and two half circles around the ends. The stadium is convex, so its straight sides are only
-!> ever entered from outside, and what misses them by rounding hits a half circle at the same moment.
+!> the radius, and two half circles around the ends. The stadium is convex. Its straight sides are therefore only
+!> entered from outside, and a disk that misses them by rounding touches a half circle at the same time.
 module segments
   use free_flight, only: flight, time_to_circle, time_to_line
   use images, only: images_t
@@ -13,9 +13,9 @@ module segments
   public :: segment_t, new_segment
 
   type, extends(shape_t) :: segment_t
-    real(real64) :: half(2) = 0.0_real64        !! from the middle to an end [length]
+    real(real64) :: half(2) = 0.0_real64        !! vector from the middle to an end [length]
     real(real64) :: along(2) = [1.0_real64, 0.0_real64]   !! unit vector
-    real(real64) :: length = 0.0_real64         !! half of it [length]
+    real(real64) :: length = 0.0_real64         !! half the length [length]
   contains
     procedure :: from_nearest
     procedure :: direction
@@ -42,7 +42,7 @@ contains
     if (segment%length > 0) segment%along = segment%half/segment%length
   end function new_segment
 
-  !> From one end to the other, as far as the tangent goes there: around an end the surface moves less.
+  !> Tangential direction from one end to the other, projected on the tangent: around an end the surface moves more slowly.
   pure function direction(self, normal) result(along)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: normal(2)
@@ -51,7 +51,7 @@ contains
     along = self%along - dot_product(self%along, normal)*normal
   end function direction
 
-  !> From the middle of the image that is nearest to x: of a long wall not always the one with the nearest middle.
+  !> Vector from the middle of the nearest image to x. For a long wall this is not always the image whose middle is nearest.
   pure function from_nearest(self, x, images, heading) result(d)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: x(2)
@@ -92,19 +92,19 @@ contains
 
   contains
 
-    !> Time until a disk touches one straight side, on which `across` points away from the wall; `never` if it
-    !> passes beyond an end. The side is entered once at most: its distance is a parabola in time.
+    !> Time until a disk touches one straight side, where `across` points away from the wall; `never` if it
+    !> passes beyond an end. A side is entered at most once, because its distance is a parabola in time.
     pure function time_to_side() result(t)
       real(real64) :: t, away, speed, fall, disc
 
       away = dot_product(d, across) - radius
-      speed = -dot_product(v, across)             ! towards the wall, as `fall` is
+      speed = -dot_product(v, across)             ! towards the wall, like `fall`
       fall = -dot_product(g, across)
       if (away > -radius .and. abs(dot_product(d, self%along)) <= self%length) away = max(away, 0.0_real64)
       t = never
       if (away >= 0) then
         t = time_to_line(away, speed, fall)
-      else if (fall > 0 .and. speed < 0) then     ! rises beyond an end, and may fall onto the wall
+      else if (fall > 0 .and. speed < 0) then     ! the disk rises beyond an end and may fall onto the wall
         disc = speed**2 + 2*fall*away
         if (disc >= 0) t = (sqrt(disc) - speed)/fall
       end if
@@ -113,7 +113,7 @@ contains
     end function time_to_side
   end function contact_time
 
-  !> From the nearest point of the wall to a point.
+  !> Vector from the nearest point of the wall to a point.
   pure function from_outline(self, d) result(offset)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -123,7 +123,7 @@ contains
     offset = d - min(max(place, -self%length), self%length)*self%along
   end function from_outline
 
-  !> Distance between the wall and the rim of a disk.
+  !> Distance between the wall and the boundary of a disk.
   pure function gap(self, d, radius) result(length)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), radius
@@ -133,8 +133,8 @@ contains
     length = sqrt(dot_product(offset, offset)) - radius
   end function gap
 
-  !> Unit vector from the wall to a disk that touches it: along the straight part the wall's own, exact however small the
-  !> disk is.
+  !> Unit vector from the wall to a disk that touches it. Along the straight part it is the normal of the wall, which is exact
+  !> for disks of any size.
   pure function normal(self, d) result(direction)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -149,7 +149,7 @@ contains
     end if
   end function normal
 
-  !> Whether a disk with its centre in a rectangle can touch the wall: separating axes, corners not rounded.
+  !> Whether a disk whose centre is in a rectangle can touch the wall. Uses separating axes, without rounding the corners.
   pure function reaches(self, d, half, radius) result(yes)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -162,7 +162,7 @@ contains
       abs(dot_product(d, across)) <= dot_product(room, abs(across)) + spare*sqrt(dot_product(d, d))
   end function reaches
 
-  !> Whether the wall keeps disks out of a whole rectangle: as the stadium is convex, out of its corners.
+  !> Whether the wall excludes disks from a whole rectangle. The stadium is convex, so that the corners decide.
   pure function covers(self, d, half, radius) result(yes)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -172,7 +172,7 @@ contains
     yes = all([((self%gap(d + [i, j]*half, radius) < 0, i=-1, 1, 2), j=-1, 1, 2)])
   end function covers
 
-  !> A wall has some length, and both ends lie in the box.
+  !> Checks that the wall has a length and that both ends are in the box.
   pure function misfit(self, lower, upper, periodic) result(problem)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: lower(2), upper(2)
@@ -188,7 +188,7 @@ contains
 
   contains
 
-    !> Whether an end is not in the box.
+    !> Whether an end is outside the box.
     pure function outside(point) result(yes)
       real(real64), intent(in) :: point(2)
       logical :: yes

@@ -1,5 +1,5 @@
-!> The seam behind which the kinds of fixed obstacles stand. Search, start, time steps and observables ask an
-!> obstacle's shape all they need to know, and know no centre, radius or end themselves.
+!> Interface of fixed obstacles of all shapes. Search, start, time-stepped dynamics and observables use only this interface and
+!> do not depend on centres, radii or ends.
 module shapes
   use images, only: images_t
   use kinds, only: never, real64
@@ -7,15 +7,15 @@ module shapes
   private
   public :: shape_t, magnitude, spare
 
-  !> Relative margin above all rounding, for questions whose answer may err on one side only.
+  !> Relative margin, larger than all rounding errors, for tests that may err in one direction only.
   real(real64), parameter :: spare = 1.0e-6_real64
 
   !> The outline of an obstacle. Points are given relative to its middle.
   type, abstract :: shape_t
     real(real64) :: middle(2) = 0.0_real64      !! [length]
-    logical :: encloses = .false.               !! keeps the disks inside, not outside
-    real(real64) :: extent(2) = 0.0_real64      !! half the sides of the smallest rectangle around it [length]
-    real(real64) :: area = 0.0_real64           !! that it takes from the box or, if it encloses the disks, leaves [length**2]
+    logical :: encloses = .false.               !! disks are inside, not outside
+    real(real64) :: extent(2) = 0.0_real64      !! half the edges of the bounding rectangle [length]
+    real(real64) :: area = 0.0_real64           !! area of the obstacle or, if it encloses the disks, area inside [length**2]
   contains
     procedure :: from_nearest
     procedure :: direction
@@ -28,19 +28,19 @@ module shapes
   end type shape_t
 
   abstract interface
-    !> Time until the rim of a disk touches the outline: zero if it does already (or overlaps by rounding)
-    !> and moves on into it, `never` if it will not.
+    !> Time until the boundary of a disk touches the outline. Zero if they touch already (or overlap by rounding)
+    !> and approach; `never` if there is no contact.
     pure function contact_time(self, d, v, g, radius) result(s)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
-      real(real64), intent(in) :: d(2)          !! from the middle to the disk's centre [length]
+      real(real64), intent(in) :: d(2)          !! vector from the middle to the centre of the disk [length]
       real(real64), intent(in) :: v(2)          !! [length/time]
       real(real64), intent(in) :: g(2)          !! [length/time**2]
-      real(real64), intent(in) :: radius        !! of the disk [length]
+      real(real64), intent(in) :: radius        !! radius of the disk [length]
       real(real64) :: s
     end function contact_time
 
-    !> Distance between the outline and the rim of a disk; negative if they overlap.
+    !> Distance between the outline and the boundary of a disk; negative if they overlap.
     pure function gap(self, d, radius) result(length)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -56,7 +56,7 @@ module shapes
       real(real64) :: direction(2)
     end function normal
 
-    !> Whether a disk whose centre is in the rectangle d +- half can touch the outline. Yes, if in doubt.
+    !> Whether a disk whose centre is in the rectangle d +- half can touch the outline. .true. if in doubt.
     pure function reaches(self, d, half, radius) result(yes)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -64,8 +64,8 @@ module shapes
       logical :: yes
     end function reaches
 
-    !> Whether no disk can have its centre anywhere in the rectangle d +- half. No, if in doubt; but for a
-    !> point (half = 0) the answer is exact.
+    !> Whether the obstacle excludes disk centres from the whole rectangle d +- half. .false. if in doubt, but exact for a
+    !> point (half = 0).
     pure function covers(self, d, half, radius) result(yes)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -73,7 +73,7 @@ module shapes
       logical :: yes
     end function covers
 
-    !> What is wrong with it in a box, as `variable: what`; empty if nothing is.
+    !> Reports why the obstacle does not fit into a box, as `variable: problem`; empty if it fits.
     pure function misfit(self, lower, upper, periodic) result(problem)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -85,8 +85,8 @@ module shapes
 
 contains
 
-  !> Length of a vector. Other than `norm2` of gfortran, whose scaling rounds, it gives scaled bits for a vector that is
-  !> scaled by a power of two.
+  !> Length of a vector. If the vector is multiplied by a power of two, so is the result, exactly. This does not hold for
+  !> `norm2` of gfortran, which rounds in its scaling.
   pure function magnitude(v)
     real(real64), intent(in) :: v(2)
     real(real64) :: magnitude
@@ -94,8 +94,9 @@ contains
     magnitude = sqrt(v(1)*v(1) + v(2)*v(2))
   end function magnitude
 
-  !> From the middle of its nearest image to x. What encloses the disks has no images. Of two that are equally near, in
-  !> the middle between them, it is the one that `heading` points away from, if that is given: a disk may touch both.
+  !> Vector from the middle of the nearest image to x. Obstacles that enclose disks have no images. If x is in the middle between
+  !> two
+  !> images, both of which a disk may touch, `heading` selects the image from which it points away.
   pure function from_nearest(self, x, images, heading) result(d)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
@@ -114,10 +115,10 @@ contains
     end do
   end function from_nearest
 
-  !> Unit vector along the outline where the normal is this one: counter-clockwise around its middle.
+  !> Tangential unit vector where the outline has this normal, counter-clockwise around the middle.
   pure function direction(self, normal) result(along)
     class(shape_t), intent(in) :: self
-    real(real64), intent(in) :: normal(2)       !! from the outline to a disk
+    real(real64), intent(in) :: normal(2)       !! unit vector from the outline to a disk
     real(real64) :: along(2)
 
     along = [-normal(2), normal(1)]

@@ -1,8 +1,9 @@
-!> How a side of the box moves, and when it strikes a disk that flies freely. All along the inner normal of the side.
+!> Motion of a side of the box, and the time when it touches a disk in free flight. All quantities are components along the inner
+!> normal of the side.
 !>
-!> Where the acceleration of a disk relative to the side keeps its sign, their gap is convex or concave, and has one
-!> first zero that a bracket holds. A period falls into a few such pieces: no contact can be missed, however close the
-!> side and the disk stay together.
+!> Where the acceleration of a disk relative to the side has a constant sign, their gap is a convex or concave function of time,
+!> and its first zero can be bracketed. A period consists of a few such intervals. No contact can therefore be missed, however long
+!> the side and the disk stay close together.
 module side_motion
   use free_flight, only: flight, flight_velocity, time_to_line
   use kinds, only: never, pi, real64
@@ -10,33 +11,33 @@ module side_motion
   private
   public :: motions, side_motion_t, side_state_t
 
-  !> The motions by their names in the input; a motion is its number in this list.
+  !> Names of the motions in the input. A motion is represented by its position in this list.
   character(len=*), parameter :: motions = "still sine parabolic sawtooth constant_velocity piston"
   integer, parameter, public :: still = 1, sine = 2, parabolic = 3, sawtooth = 4, constant_velocity = 5, piston = 6
-  real(real64), parameter :: small_angle = 0.5_real64       !! below which differences would cancel [radians]
-  !> A part of a period: what bends the gap for so short a time does not change it by a bit.
+  real(real64), parameter :: small_angle = 0.5_real64       !! angle below which differences would suffer from cancellation [radian]
+  !> Fraction of a period. Accelerations that act for a shorter time do not change the gap within its precision.
   real(real64), parameter :: negligible = 1.0e-10_real64
-  integer, parameter :: pieces_in_reach = 6                 !! that take more than a period, even with some negligible ones
+  integer, parameter :: pieces_in_reach = 6  !! number of intervals that is longer than a period, even if some are negligible
 
-  !> The state of a side whose motion depends on what has happened: a piston changes it at each collision.
+  !> The state of a piston, which changes in its collisions.
   type :: side_state_t
-    real(real64) :: position = 0.0_real64            !! how far inwards of its own place at `clock` [length]
-    real(real64) :: velocity = 0.0_real64            !! inwards, at `clock` [length/time]
-    real(real64) :: clock = 0.0_real64               !! when these were set, since the epoch [time]
+    real(real64) :: position = 0.0_real64            !! displacement inwards from its mean position, at `clock` [length]
+    real(real64) :: velocity = 0.0_real64            !! velocity inwards, at `clock` [length/time]
+    real(real64) :: clock = 0.0_real64               !! time at which these were set, since the epoch [time]
   end type side_state_t
 
   type :: side_motion_t
-    integer :: kind = still                          !! in `motions`
-    real(real64) :: offset = 0.0_real64              !! how far inwards of the box's side it starts to move [length]
-    real(real64) :: amplitude = 0.0_real64           !! constant velocity: offset and path; piston: width of the box [length]
+    integer :: kind = still                          !! position in `motions`
+    real(real64) :: offset = 0.0_real64              !! displacement inwards at which the motion starts [length]
+    real(real64) :: amplitude = 0.0_real64  !! amplitude; constant velocity: offset and path; piston: width of the box [length]
     real(real64) :: period = 1.0_real64              !! [time]
-    real(real64) :: phase = 0.0_real64               !! at the time 0, in periods
-    real(real64) :: strike = 0.0_real64              !! velocity inwards, of a sawtooth or a constant one [length/time]
-    real(real64) :: start_time = 0.0_real64          !! of one of constant velocity [time]
-    real(real64) :: end_time = 0.0_real64            !! likewise
-    ! Of a piston, on which disks and a force act:
+    real(real64) :: phase = 0.0_real64               !! phase at t = 0, in periods
+    real(real64) :: strike = 0.0_real64              !! velocity inwards, of a sawtooth or constant motion [length/time]
+    real(real64) :: start_time = 0.0_real64          !! beginning of a motion at constant velocity [time]
+    real(real64) :: end_time = 0.0_real64            !! end of a motion at constant velocity [time]
+    ! Of a piston, which is moved by disks and by a force:
     real(real64) :: mass = 1.0_real64                !! [mass]
-    real(real64) :: pull = 0.0_real64                !! acceleration inwards by the force [length/time**2]
+    real(real64) :: pull = 0.0_real64                !! acceleration inwards due to the force [length/time**2]
   contains
     procedure :: travels
     procedure :: drifts
@@ -51,7 +52,7 @@ module side_motion
 
 contains
 
-  !> Whether its place changes.
+  !> Whether the position of the side changes.
   elemental function travels(self) result(yes)
     class(side_motion_t), intent(in) :: self
     logical :: yes
@@ -59,7 +60,7 @@ contains
     yes = self%kind == sine .or. self%kind == parabolic .or. self%drifts()
   end function travels
 
-  !> Whether the room that it leaves to the disks changes for good.
+  !> Whether the position changes permanently, and with it the accessible area.
   elemental function drifts(self) result(yes)
     class(side_motion_t), intent(in) :: self
     logical :: yes
@@ -67,7 +68,7 @@ contains
     yes = self%kind == constant_velocity .or. self%kind == piston
   end function drifts
 
-  !> How far inwards of its own place it ever is; a piston yields from where it starts.
+  !> Largest displacement inwards; for a piston the initial one.
   elemental function inmost(self) result(x)
     class(side_motion_t), intent(in) :: self
     real(real64) :: x                                !! [length]
@@ -77,7 +78,7 @@ contains
     if (self%kind == constant_velocity) x = x + max(0.0_real64, self%strike*(self%end_time - self%start_time))
   end function inmost
 
-  !> The highest speed of the side; of a piston, that of a fall through the box.
+  !> Highest speed of the side; for a piston the speed of free fall through the box.
   elemental function top_speed(self) result(speed)
     class(side_motion_t), intent(in) :: self
     real(real64) :: speed                            !! [length/time]
@@ -88,12 +89,12 @@ contains
     if (self%kind == piston) speed = sqrt(2*abs(self%pull)*self%amplitude)
   end function top_speed
 
-  !> Time since a period, a stroke or the flight of a piston began, at the time epoch + t of the run. The remainders are exact, so
-  !> that a late time is as sharp as an early one.
+  !> Time since the beginning of the period, of the motion, or of the free flight of a piston, at the time epoch + t of the run. The
+  !> remainders are exact, so that late times are as precise as early ones.
   elemental function moment(self, epoch, t, state) result(tau)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! [time]
-    type(side_state_t), intent(in), optional :: state     !! of a piston
+    type(side_state_t), intent(in), optional :: state     !! state of a piston
     real(real64) :: tau                              !! [time]
 
     if (self%kind == piston) then
@@ -105,11 +106,11 @@ contains
     end if
   end function moment
 
-  !> How far the side is inwards of its own place.
+  !> Displacement of the side inwards from its mean position.
   elemental function place(self, tau, state) result(x)
     class(side_motion_t), intent(in) :: self
-    real(real64), intent(in) :: tau                  !! a moment [time]
-    type(side_state_t), intent(in), optional :: state     !! of a piston
+    real(real64), intent(in) :: tau                  !! time as returned by `moment` [time]
+    type(side_state_t), intent(in), optional :: state     !! state of a piston
     real(real64) :: x                                !! [length]
     real(real64) :: s
 
@@ -126,11 +127,11 @@ contains
     end if
   end function place
 
-  !> Its velocity inwards.
+  !> Velocity of the side inwards.
   elemental function velocity(self, tau, state) result(v)
     class(side_motion_t), intent(in) :: self
-    real(real64), intent(in) :: tau                  !! a moment [time]
-    type(side_state_t), intent(in), optional :: state     !! of a piston
+    real(real64), intent(in) :: tau                  !! time as returned by `moment` [time]
+    type(side_state_t), intent(in), optional :: state     !! state of a piston
     real(real64) :: v                                !! [length/time]
     real(real64) :: s
 
@@ -147,10 +148,10 @@ contains
     end if
   end function velocity
 
-  !> Its acceleration inwards, just after a moment.
+  !> Acceleration of the side inwards, just after a time.
   elemental function acceleration(self, tau) result(a)
     class(side_motion_t), intent(in) :: self
-    real(real64), intent(in) :: tau                  !! a moment [time]
+    real(real64), intent(in) :: tau                  !! time as returned by `moment` [time]
     real(real64) :: a                                !! [length/time**2]
 
     a = 0
@@ -161,7 +162,7 @@ contains
     end if
   end function acceleration
 
-  !> How far the side moves from a moment on during the time s.
+  !> Displacement of the side from the time tau on, during the time s.
   elemental function displacement(self, tau, s) result(way)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -176,7 +177,7 @@ contains
     end if
   end function displacement
 
-  !> Whether `lead` holds: soon after a moment.
+  !> Whether s is so short that `lead` is valid.
   elemental function is_soon(self, tau, s) result(yes)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -184,12 +185,12 @@ contains
 
     if (self%kind == sine) then
       yes = s < small_angle*self%period/(2*pi)
-    else                                             ! on the same parabola
+    else                                             ! still on the same parabola
       yes = s <= 0.5_real64*self%period - modulo(tau, 0.5_real64*self%period)
     end if
   end function is_soon
 
-  !> By how much the side is then ahead of one that kept its velocity, to its last digits.
+  !> Displacement relative to a side that keeps its velocity of the time tau, in full precision.
   elemental function lead(self, tau, s) result(way)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -206,7 +207,7 @@ contains
     end if
   end function lead
 
-  !> By how much its velocity has grown during the time s.
+  !> Change of the velocity of the side from the time tau on, during the time s.
   elemental function velocity_change(self, tau, s) result(v)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -223,11 +224,11 @@ contains
     end if
   end function velocity_change
 
-  !> How long, after a moment, the gap to a disk of acceleration g stays convex or concave: until the side's own
-  !> acceleration passes through g. At most half a period.
+  !> Time from tau on during which the gap to a disk with the acceleration g stays convex or concave: until the acceleration
+  !> of the side equals g. At most half a period.
   elemental function piece(self, tau, g) result(s)
     class(side_motion_t), intent(in) :: self
-    real(real64), intent(in) :: tau                  !! a moment [time]
+    real(real64), intent(in) :: tau                  !! time as returned by `moment` [time]
     real(real64), intent(in) :: g                    !! [length/time**2]
     real(real64) :: s                                !! [time]
     real(real64) :: bend(2), ratio
@@ -242,15 +243,16 @@ contains
     s = minval(bend)
   end function piece
 
-  !> Time until the side strikes the rim of a disk on a parabola; `never` if it does not. A disk that is in its reach for a
-  !> whole period is struck, unless it is at the very end of the reach and hardly moves: then ever more periods are skipped.
+  !> Time until the side touches the boundary of a disk on a parabola; `never` if it does not. A disk that stays in the range of the
+  !> side for a whole period is touched, unless it is at the very end of the range and hardly moves; then more and more periods are
+  !> skipped.
   pure function contact_time(self, tau, gap, v, g, state) result(s)
-    class(side_motion_t), intent(in) :: self         !! one that travels
-    real(real64), intent(in) :: tau                  !! the moment from which the time counts [time]
-    real(real64), intent(in) :: gap                  !! from the side to the rim, not negative [length]
-    real(real64), intent(in) :: v                    !! of the disk [length/time]
-    real(real64), intent(in) :: g                    !! its acceleration [length/time**2]
-    type(side_state_t), intent(in), optional :: state     !! of a piston
+    class(side_motion_t), intent(in) :: self         !! a moving side
+    real(real64), intent(in) :: tau                  !! time from which the result counts [time]
+    real(real64), intent(in) :: gap                  !! gap between the side and the boundary of the disk, not negative [length]
+    real(real64), intent(in) :: v                    !! velocity of the disk [length/time]
+    real(real64), intent(in) :: g                    !! acceleration of the disk [length/time**2]
+    type(side_state_t), intent(in), optional :: state     !! state of a piston
     real(real64) :: s, from, to, above, entry
     integer :: pieces
 
@@ -261,8 +263,8 @@ contains
       s = time_to_line(gap, self%velocity(tau, state) - v, self%pull - g)
       return
     end if
-    above = gap + self%place(tau) - self%amplitude   ! beyond the reach of the side
-    entry = time_to_line(above, -v, -g)              ! comes into it, the last time
+    above = gap + self%place(tau) - self%amplitude   ! distance from the range of the side
+    entry = time_to_line(above, -v, -g)              ! time of the last entry into the range
     s = never
     from = 0
     pieces = 0
@@ -285,7 +287,7 @@ contains
     end do
   end function contact_time
 
-  !> The contact with a side that stands, moves with constant velocity, and stands again.
+  !> Time until contact with a side that is at rest, moves at constant velocity, and is at rest again.
   pure function time_in_stroke(motion, tau, gap, v, g) result(s)
     class(side_motion_t), intent(in) :: motion
     real(real64), intent(in) :: tau, gap, v, g       !! as in `contact_time`
@@ -304,11 +306,11 @@ contains
     s = never
   end function time_in_stroke
 
-  !> The contact within a piece of the flight in which the gap is convex or concave; `never` if there is none.
+  !> Time of contact within an interval in which the gap is convex or concave; `never` if there is none.
   pure function strike_between(motion, tau, gap, v, g, from, to) result(s)
     class(side_motion_t), intent(in) :: motion
     real(real64), intent(in) :: tau, gap, v, g       !! as in `contact_time`
-    real(real64), intent(in) :: from, to             !! the piece [time]
+    real(real64), intent(in) :: from, to             !! the interval [time]
     real(real64) :: s, curvature, low, high, relative
 
     relative = v - motion%velocity(tau)
@@ -322,7 +324,7 @@ contains
     if (.not. apart(from) > 0 .and. opening(from) < 0) return
     s = never
     high = to
-    if (curvature > 0) then                          ! the gap is smallest where it no longer shrinks
+    if (curvature > 0) then                          ! the gap has its minimum where it stops decreasing
       if (.not. opening(from) < 0) return
       low = from
       if (opening(to) > 0) call bisect(.true., low, high)
@@ -346,7 +348,7 @@ contains
       end if
     end function apart
 
-    !> How fast it grows then.
+    !> Rate of change of the gap after the time t.
     pure function opening(t) result(speed)
       real(real64), intent(in) :: t
       real(real64) :: speed
@@ -354,7 +356,7 @@ contains
       speed = relative + (g*t - motion%velocity_change(tau, t))
     end function opening
 
-    !> Halves an interval to the last bit: beyond its end the gap grows, or is negative.
+    !> Bisects an interval to the last bit. Beyond the result the gap increases, or is negative.
     pure subroutine bisect(to_smallest, left, right)
       logical, intent(in) :: to_smallest
       real(real64), intent(inout) :: left, right
