@@ -2,21 +2,31 @@
 
     python post/cooling.py runs/cooling/*.h5 -o cooling.png --csv cooling.csv
 
-Runs are combined by restitution xi; lines are means over the runs, bands are errors.  K is
-per disk and in units of its start value over all disks.  The lowest row shows the temperature ratio
-of the heaviest to the lightest species, 1 in equilibrium; not for equal masses.  The table has all
-curves, against collisions per disk in the same units, against time in those of the input.
+Runs are combined by restitution xi; lines are means over the runs.  The first panels, one for each
+xi, show the mean kinetic energy per disk against time in the units of the input, with the band that
+contains 95 % of single runs: measured from four runs on, else estimated from the numbers of disks.
+The row below compares all xi on a logarithmic axis: K is per disk and in units of its start value
+over all disks, and bands are errors of the means.  The lowest row shows the temperature ratio of
+the heaviest to the lightest species, 1 in equilibrium; not for equal masses.  Of few runs its band
+is the expected scatter of single runs, too.  The table has all curves, against collisions per disk
+in the same units, against time in those of the input.
 """
 
 from itertools import chain, cycle
 
 from ricochet import Run
 from ricochet.analysis.cooling import SMOOTH, Curves, energies
-from ricochet.analysis.statistics import Estimate
-from ricochet.figures.drawing import band, caption, colours, dilute_limit, plt
+from ricochet.analysis.statistics import FEWEST_RUNS, Estimate, student
+from ricochet.analysis.thermodynamics import lightest_and_heaviest
+from ricochet.figures.drawing import COLOURS, band, caption, colours, dilute_limit, plt
 from ricochet.predictions.theory import EQUIPARTITION
+from ricochet.reading.reader import Restitution, Species
 from ricochet.script import by_restitution, command_line, launch, measured, report, spread
 
+import numpy as np
+from matplotlib.ticker import LogLocator
+
+TINY = np.finfo(float).tiny
 DASHES = ("--", ":", "-.", (0, (5, 1)), (0, (1, 3)), (0, (8, 3)))  # line styles of the species
 
 
@@ -28,10 +38,12 @@ def in_time(found: Curves, name: str) -> Estimate:
 
 def draw_ratio(axes: plt.Axes, groups: list, results: list[Curves]) -> None:
     """Draw the temperature ratio against collisions, with the dilute limit."""
-    for (xi, _), found, colour in zip(groups, results, colours(len(groups), 2), strict=True):
+    for (xi, own), found, colour in zip(groups, results, colours(len(groups), 2), strict=True):
         if "ratio" in found:
             tau, ratio = found["collisions_per_disk"], found["ratio"]
-            band(axes, tau, *ratio, color=colour, label=f"ξ = {xi:g}")
+            band(axes, tau, ratio.mean, ratio_band(own, found), color=colour, label=f"ξ = {xi:g}")
+    if any(len(own) < FEWEST_RUNS for _, own in groups):
+        axes.fill_between([], [], color="0.85", label="95 % of single runs, estimated")
     runs = [run for _, own in groups for run in own]
     kinds = sorted((kind.mass, kind.disks.sum()) for kind in runs[0].by_species)
     alone = all(run.nature <= {*SMOOTH, "obstacles", "walls"} for run in runs)
@@ -44,32 +56,125 @@ def draw_ratio(axes: plt.Axes, groups: list, results: list[Curves]) -> None:
     axes.legend(ncols=2)
 
 
-def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
-    """Draw energies against time and collisions, and the ratio; colours mean restitution."""
-    rows = 1 + any("ratio" in found for found in results)
-    figure = plt.figure(figsize=(11, 4.5 + 3 * (rows - 1)))
-    grid = figure.add_gridspec(rows, 2, height_ratios=(1.5, 1)[:rows])
-    left = figure.add_subplot(grid[0, 0])
-    right = figure.add_subplot(grid[0, 1], sharey=left)
+def draw_overview(figure: plt.Figure, places: tuple, runs: list[Run], found: list) -> None:
+    """Draw all energies, logarithmic, against time and collisions; colours mean restitution."""
+    left = figure.add_subplot(places[0])
+    right = figure.add_subplot(places[1], sharey=left)
     styles = list(zip(("all", *runs[0].names), chain("-", cycle(DASHES)), strict=False))
-    for (xi, _), found, colour in zip(groups, results, colours(len(groups), 2), strict=True):
+    for ((xi, _), curves), colour in zip(found, colours(len(found), 2), strict=True):
         for name, style in styles:
             line = {"color": colour, "ls": style, "lw": 1.4}
-            band(left, found["time"], *in_time(found, name), **line)
-            band(right, found["collisions_per_disk"], *found[f"K_{name}"], **line)
+            band(left, curves["time"], *in_time(curves, name), **line)
+            band(right, curves["collisions_per_disk"], *curves[f"K_{name}"], **line)
         left.plot([], [], color=colour, label=f"ξ = {xi:g}")
     for name, style in styles:
         right.plot([], [], color="0.3", ls=style, label=name)
     left.set(yscale="log", xlabel=runs[0].units.label("time"))
     low, high = left.get_ylim()  # for an elastic gas the limits would enclose rounding only
     left.set_ylim(min(low, 0.9), max(high, 1.1))
+    left.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    left.yaxis.set_major_formatter("{x:g}")
+    left.yaxis.set_minor_formatter("")
     left.set_ylabel("$\\langle K \\rangle\\,/\\,\\langle K \\rangle_{all,\\,t=0}$")
     right.set(xlabel="collisions per disk")
     for axes in (left, right):
         axes.set_xlim(0, max(line.get_xdata()[-1] for line in axes.lines if len(line.get_xdata())))
         axes.legend(loc="lower left")
-    if rows == 2:
-        draw_ratio(figure.add_subplot(grid[1, :]), groups, results)
+
+
+def randomised(run: Run, kind: Species, tau: np.ndarray) -> np.ndarray:
+    """Return the variance of the energies of a species' disks over their squared mean.
+
+    It goes from its value at the start to 1, that of an exponential distribution, as disks collide.
+    """
+    first = run.kinetic_energy(0)[kind.disks]
+    start = float(np.var(first) / np.mean(first) ** 2) if np.any(first) else 1.0
+    return 1 - (1 - start) * np.exp(-tau)  # exp(-tau): share of disks without a collision
+
+
+def expected_scatter(run: Run, energies: dict[str, np.ndarray], tau: np.ndarray) -> dict:
+    """Return the standard deviation of mean energies, of species and "all", over single runs.
+
+    Energies of disks are taken as independent; where the kinetic energy is kept, their sum is
+    fixed.  Losses correlate energies, which makes the true scatter smaller.
+    """
+    counts = {kind.name: int(kind.disks.sum()) for kind in run.by_species}
+    variances = {
+        kind.name: counts[kind.name] * energies[kind.name] ** 2 * randomised(run, kind, tau)
+        for kind in run.by_species
+    }
+    total, kept = sum(variances.values()), run.nature.keeps_kinetic_energy
+    found = {"all": 0 * total if kept else np.sqrt(total) / run.n_disks}
+    for name, own in variances.items():
+        fixed = own**2 / np.maximum(total, TINY) if kept else 0.0
+        found[name] = np.sqrt(np.maximum(own - fixed, 0)) / counts[name]
+    return found
+
+
+def scatter(runs: list[Run], found: Curves) -> dict[str, np.ndarray]:
+    """Return the standard deviation of each energy against time over single runs.
+
+    It is measured over four runs and more, else expected.
+    """
+    names = ("all", *runs[0].names)
+    if len(runs) >= FEWEST_RUNS:
+        to_one = np.sqrt(len(runs)) / student(len(runs))
+        return {name: found[f"energy_{name}"].error * to_one for name in names}
+    tau = np.interp(found["time"], *runs[0].collisions_per_disk)
+    means = {name: found[f"energy_{name}"].mean for name in names}
+    return expected_scatter(runs[0], means, tau)
+
+
+def ratio_band(runs: list[Run], found: Curves) -> np.ndarray:
+    """Return the error of the temperature ratio; of few runs, twice the scatter of a single one."""
+    if len(runs) >= FEWEST_RUNS:
+        return found["ratio"].error
+    both = [runs[0].by_species[k] for k in lightest_and_heaviest(runs[0])]
+    parts = [
+        randomised(runs[0], kind, found["collisions_per_disk"]) / kind.disks.sum() for kind in both
+    ]
+    return 2 * np.sqrt(sum(parts)) * found["ratio"].mean
+
+
+def draw_energies(axes: plt.Axes, runs: list[Run], found: Curves, xi: Restitution) -> None:
+    """Draw the mean energies of one restitution in units of the input, on linear axes."""
+    names = ("all", *runs[0].names) if len(runs[0].names) > 1 else ("all",)
+    labels, deviations = (
+        {kind.name: kind.label for kind in runs[0].by_species},
+        scatter(runs, found),
+    )
+    for name, colour in zip(names, ("black", *COLOURS), strict=False):
+        style = {"color": colour, "lw": 1.4, "label": labels.get(name, "all disks")}
+        band(axes, found["time"], found[f"energy_{name}"].mean, 2 * deviations[name], **style)
+    units, tau = runs[0].units, found["collisions_per_disk"][-1]
+    number = f"mean of {len(runs)} runs" if len(runs) > 1 else "one run"
+    axes.set(xlim=(0, found["time"][-1]), ylim=(0, None), xlabel=units.label("time"))
+    axes.set_title(f"ξ = {xi:g}: {number}, to {tau:.3g} collisions per disk")
+
+
+def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
+    """Draw a panel for each restitution, then all of them: energies, and the ratio."""
+    ratio = any("ratio" in found for found in results)
+    columns = min(len(groups), 3)
+    above = -(-len(groups) // columns)
+    heights = [1.2] * above + [1.4] + [1.0] * ratio
+    figure = plt.figure(figsize=(max(4.2 * columns, 11), 3.2 * sum(heights)))
+    grid = figure.add_gridspec(len(heights), 6, height_ratios=heights)
+    for k, ((xi, own), found) in enumerate(zip(groups, results, strict=True)):
+        width = 6 // columns
+        row, left = k // columns, width * (k % columns)
+        axes = figure.add_subplot(grid[row, left : left + width])
+        draw_energies(axes, own, found, xi)
+        if left == 0:
+            axes.set_ylabel(runs[0].units.label("mean energy per disk", "energy"))
+        if k == 0:
+            measured = all(len(own) >= FEWEST_RUNS for _, own in groups)
+            title = "band: 95 % of single runs" + ("" if measured else ", estimated")
+            axes.legend(loc="upper right", title=title)
+    places = grid[above, :3], grid[above, 3:]
+    draw_overview(figure, places, runs, list(zip(groups, results, strict=True)))
+    if ratio:
+        draw_ratio(figure.add_subplot(grid[above + 1, :]), groups, results)
     figure.suptitle(f"{caption(runs)}, wall rule: {runs[0].parameter('contact', 'wall_rule', '')}")
     return figure
 

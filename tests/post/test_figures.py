@@ -1,0 +1,84 @@
+"""What figures show beside the measured curves: bands of single runs, panels, explanations."""
+
+import numpy as np
+import pytest
+
+import cooling as cooling_figure
+from ricochet import read_run, script
+from synthetic_run import run_script, write_run
+
+
+@pytest.fixture
+def figures(monkeypatch):
+    """The figures that scripts would have written, one after the other."""
+    found = []
+    monkeypatch.setattr(script, "save", lambda figure, *_: found.append(figure))
+    return found
+
+
+# --- cooling ---
+
+
+def mixture(path, energies, tau=20.0, cooled=0.0):
+    """A run of light and heavy disks with these energies (T, N) of single disks."""
+    frames, count = energies.shape
+    species = np.repeat([1, 2], [count // 3, count - count // 3])
+    mass = np.array([1.0, 4.0])[species - 1]
+    v = np.sqrt(2 * energies / mass)[..., None] * [1.0, 0.0]
+    means = {
+        f"{name}/kinetic_energy": energies[:, species == k + 1].mean(axis=1)
+        for k, name in enumerate(("light", "heavy"))
+    }
+    lost = cooled * count * energies[0].mean() * np.linspace(0, 1, frames)
+    ends = {"collisions": np.linspace(0, tau * count / 2, frames).astype(int)}
+    more = {"observables": means | ends | {"dissipated_energy": lost}, "species": species}
+    more |= {"names": ("light", "heavy"), "mass": mass}
+    more |= {"parameters": {"contact": {"restitution": 1.0 - cooled}}}
+    return write_run(path, np.full(v.shape, 0.5), v, **more)
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_the_expected_scatter_of_one_run_is_that_of_exponential_energies(tmp_path, rng, kept):
+    """Of a fixed sum where the energy is kept: 4000 gases of 3 to 60 disks."""
+    count = int(rng.integers(3, 60))
+    draws = rng.exponential(size=(4000, count))
+    if kept:
+        draws *= count / draws.sum(axis=1, keepdims=True)
+    energies = np.stack([np.full(count, 1.0), draws[0]])
+    run = read_run(mixture(tmp_path / "a.h5", energies, cooled=0.0 if kept else 0.1))
+    light = run.of_species("light")
+    means = {"all": np.ones(1), "light": np.ones(1), "heavy": np.ones(1)}
+    found = cooling_figure.expected_scatter(run, means, np.array([50.0]))
+    for name, mask in (("all", np.ones(count, bool)), ("light", light), ("heavy", ~light)):
+        own = draws[:, mask].mean(axis=1).std()
+        # A Beta distribution has N + 1 where the Gaussian estimate has N.
+        assert found[name][0] == pytest.approx(own, rel=0.05 + 0.5 * kept / count, abs=1e-12)
+    assert np.all(cooling_figure.expected_scatter(run, means, np.zeros(1))["light"] == 0), (
+        "equal speeds at the start have no scatter"
+    )
+
+
+def test_cooling_has_a_linear_panel_for_each_restitution(tmp_path, rng, figures):
+    """Three averages in units of the input, with the band of single runs, even of one run."""
+    paths = []
+    for k, cooled in enumerate((0.0, 0.1)):
+        draws = 3 * rng.exponential(size=(5, 30))
+        draws *= 3 * 30 * (1 - cooled * np.arange(5)[:, None] / 4) / draws.sum(axis=1)[:, None]
+        paths.append(mixture(tmp_path / f"{k}.h5", draws, cooled=cooled))
+    words = ("-o", tmp_path / "a.png", "--units", "energy=J,time=s")
+    assert run_script("cooling", *paths, *words) == 0
+    (figure,) = figures
+    first, second, overview, *_ = figure.axes
+    for axes, cooled in ((first, 0.1), (second, 0.0)):
+        assert axes.get_yscale() == axes.get_xscale() == "linear"
+        assert [line.get_label() for line in axes.lines] == [
+            "all disks",
+            "light, m = 1",
+            "heavy, m = 4",
+        ]
+        assert axes.lines[0].get_ydata()[-1] == pytest.approx(3 * (1 - cooled))
+        band = axes.collections[1].get_paths()[0].vertices[:, 1]
+        assert np.ptp(band) > np.ptp(axes.lines[1].get_ydata()), "a single run has a band"
+    assert first.get_ylabel() == "mean energy per disk (J)" and first.get_xlabel() == "time (s)"
+    assert overview.get_yscale() == "log"
+    assert "estimated" in first.get_legend().get_title().get_text()
