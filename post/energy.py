@@ -2,11 +2,16 @@
 
     python post/energy.py runs/gravity/events.h5 runs/gravity/steps_*.h5 -o energy.png
 
-The upper panel shows the mean kinetic and potential energy per disk of each species in the first
-run.  The lower panel shows, for each run, the largest relative change so far of the conserved
-quantity.  That is the total energy, or, where energy is exchanged, total + dissipated - heat - work
-- drive.  The time axis is logarithmic, because most happens at first; it is linear for driven
-disks.
+The panels of the first row show the total energy and its parts against time on linear axes, side by
+side for the first run of each time step.  The middle row shows the mean kinetic and potential
+energy per disk of each species in the first run, against linear and logarithmic time.  The lowest
+panel shows, for each run, the largest relative change so far of the conserved quantity.  That is
+the total energy, or, where energy is exchanged, total + dissipated - heat - work - drive.  Of
+driven disks no time axis is logarithmic.
+
+Time steps here do not conserve energy better if they are smaller: a step moves disks along their
+exact parabolas and every collision conserves energy, so that only rounding is left.  Larger steps
+miss collisions instead; missed.py counts them.
 
 The table has three numbers for each run, relative to the total energy at the start, or to the
 largest one if that is 0: the drift, which is the change over the whole run along a fitted line; the
@@ -24,6 +29,9 @@ import numpy as np
 
 EPSILON = np.finfo(float).eps  # the smallest change of a number near 1
 WINDOWS = 60  # windows of time
+MOST_PANELS = 4
+ROUNDING = 1e-9  # largest relative change that is taken for rounding
+WHY_EXACT = "flight and collisions are exact, only rounding is left; larger steps miss collisions"
 
 
 def method(run: Run) -> str:
@@ -66,8 +74,11 @@ def means_of_windows(
     return tuple(total / number[some] for total in sums)
 
 
-def draw_species(axes: plt.Axes, run: Run) -> None:
-    """Draw kinetic energy solid and potential dotted, a colour for each species."""
+def draw_species(axes: plt.Axes, run: Run, spaced: Callable) -> None:
+    """Draw kinetic energy solid and potential dotted, a colour for each species.
+
+    Windows of the means are made by `spaced`: `np.linspace`, or `np.geomspace` on a log axis.
+    """
     curves = [(name, "kinetic", "-") for name in run.names]
     if np.any(run.gravity):
         curves += [(name, "potential", ":") for name in run.names]
@@ -75,34 +86,84 @@ def draw_species(axes: plt.Axes, run: Run) -> None:
         colour = COLOURS[run.names.index(name) % len(COLOURS)]
         time, value = (series[1:] for series in run.observable(f"{name}/{kind}_energy"))
         axes.plot(time, value, color=colour, lw=0.5, alpha=0.15)
-        spaced = np.linspace if run.nature.driven else np.geomspace
         means = means_of_windows(time, value, spaced)
         axes.plot(*means, color=colour, ls=style, label=f"{kind}, {name}", **lone(time))
     axes.set_ylabel(run.units.label("energy per disk", "energy"))
-    axes.set_title(f"{method(run)}: {caption([run])}")
-    axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
-    axes.legend(ncols=2, loc="upper right", title="means; faint: samples")
+    axes.set(xlabel=run.units.label("time"), ylim=(0, 1.35 * axes.get_ylim()[1]))
+    if spaced is np.geomspace:
+        axes.set_xscale("log")
+    else:
+        axes.set_xlim(0, run.observable("total_energy").time[-1])
+
+
+def of_each_method(runs: list[Run]) -> list[Run]:
+    """Return the first run of each way of integration and time step, at most `MOST_PANELS`."""
+    first: dict[float, Run] = {}
+    for run in runs:
+        first.setdefault(run.time_step, run)
+    return list(first.values())[:MOST_PANELS]
+
+
+def draw_total(axes: plt.Axes, run: Run) -> None:
+    """Draw the total energy and its parts on linear axes, in units of the input."""
+    time, total = run.observable("total_energy")
+    axes.plot(time, total, color="black", lw=1.6, label="$E_{tot}$", zorder=3, **lone(time))
+    for kind, colour in (("kinetic", COLOURS[2]), ("potential", COLOURS[3])):
+        if f"all/{kind}_energy" in run.observables and np.any(run.gravity):
+            part = run.n_disks * run.observable(f"all/{kind}_energy").value
+            axes.plot(time, part, color=colour, lw=0.8, label=f"{kind} energy")
+    constant, words = balance(run)
+    if words != "total":
+        axes.plot(time, constant, color="0.5", ls="--", lw=1.2, label=words)
+    _, lost = change(run)
+    axes.set_title(f"{method(run)}\nlargest change {np.abs(lost).max():.2g}", fontsize="medium")
+    axes.set(xlabel=run.units.label("time"), xlim=(time[0], time[-1]))
 
 
 def draw(runs: list[Run]) -> plt.Figure:
-    """Draw two rows with one time axis."""
-    figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(9, 7.5))
-    draw_species(top, runs[0])
+    """Draw the total for each method, the energies of species, and the changes of the total."""
+    shown = of_each_method(runs)
+    figure = plt.figure(figsize=(max(9, 3.2 * len(shown)), 10.5))
+    grid = figure.add_gridspec(3, len(shown), height_ratios=(1, 1.3, 1.3))
+    totals = [figure.add_subplot(grid[0, k]) for k in range(len(shown))]
+    for axes, run in zip(totals, shown, strict=True):
+        axes.sharey(totals[0])
+        draw_total(axes, run)
+        axes.tick_params(labelleft=axes is totals[0])
+    totals[0].set_ylabel(runs[0].units.label("energy of all disks", "energy"))
+    totals[0].set_ylim(min(0, totals[0].get_ylim()[0]), 1.45 * totals[0].get_ylim()[1])
+    totals[0].legend(loc="upper right", ncols=1 + (len(shown) < 3))
+    scales = (np.linspace,) if runs[0].nature.driven else (np.linspace, np.geomspace)
+    parts = grid[1, :].subgridspec(1, len(scales))
+    left, *_ = (figure.add_subplot(parts[k]) for k in range(len(scales)))
+    for axes, spaced in zip(figure.axes[-len(scales) :], scales, strict=True):
+        draw_species(axes, runs[0], spaced)
+    left.set_title(f"{method(runs[0])}: {caption(runs[:1])}")
+    left.legend(ncols=2, loc="upper right", title="means; faint: samples")
+    draw_changes(figure.add_subplot(grid[2, :]), runs)
+    return figure
+
+
+def draw_changes(axes: plt.Axes, runs: list[Run]) -> None:
+    """Draw the largest change of the conserved quantity so far, for each run."""
+    worst = 0.0
     for run, colour in zip(runs, colours(len(runs), 2), strict=True):
         time, lost = change(run)
         largest = np.maximum(np.maximum.accumulate(np.abs(lost)), EPSILON / 2)
+        worst = max(worst, float(largest[-1]))
         style = {"label": f"{method(run)}: {balance(run)[1]}"} | lone(time[1:])
-        bottom.semilogy(time[1:], largest[1:], color=colour, lw=1.4, **style)
+        axes.semilogy(time[1:], largest[1:], color=colour, lw=1.4, **style)
     if not any(run.nature.driven for run in runs):
-        bottom.set_xscale("log")
-    bottom.set(
+        axes.set_xscale("log")
+    axes.set(
         xlabel=runs[0].units.label("time"),
         ylabel="largest change so far, over E(0)",
         xlim=(min(run.observable("total_energy").time[1] for run in runs), None),
-        ylim=(EPSILON / 4, 10 * bottom.get_ylim()[1]),
+        ylim=(EPSILON / 4, 10 * axes.get_ylim()[1]),
     )
-    bottom.legend(ncols=1 + (len(runs) > 2), loc="upper right", title="change of")
-    return figure
+    axes.legend(ncols=1 + (len(runs) > 2), loc="upper right", title="change of")
+    if any(run.time_step for run in runs) and worst < ROUNDING:
+        axes.set_title(WHY_EXACT, fontsize="medium")
 
 
 def main() -> None:

@@ -82,3 +82,35 @@ def test_cooling_has_a_linear_panel_for_each_restitution(tmp_path, rng, figures)
     assert first.get_ylabel() == "mean energy per disk (J)" and first.get_xlabel() == "time (s)"
     assert overview.get_yscale() == "log"
     assert "estimated" in first.get_legend().get_title().get_text()
+
+
+# --- energies ---
+
+
+def test_the_total_energy_has_a_linear_panel_for_each_time_step(tmp_path, rng, figures):
+    """Of each method the first run; steps that only round say that they do."""
+    paths, totals, time = [], [], np.linspace(0, 8, 41)
+    for k, dt in enumerate((0.0, 0.1, 0.2, 0.2)):
+        total = 7.0 + 1e-15 * rng.normal(size=41)
+        kinetic = rng.uniform(0, 7, 41)
+        found = {"total_energy": total, "all/kinetic_energy": kinetic / 2}
+        found |= {"disk/kinetic_energy": kinetic / 2, "disk/potential_energy": (7 - kinetic) / 2}
+        found["all/potential_energy"] = (7 - kinetic) / 2
+        own = {"box": {"gravity": [0.0, -1.0]}, "run": {"dt": dt, "seed": k}}
+        own["run"]["dynamics"] = "steps" if dt else "events"
+        more = {"observables": found, "observable_time": time, "parameters": own}
+        v = rng.normal(size=(2, 2, 2))
+        paths.append(write_run(tmp_path / f"{k}.h5", 0 * v + 0.5, v, **more))
+        totals.append(total)
+    words = ("-o", tmp_path / "a.png", "--units", "energy=J,time=s")
+    assert run_script("energy", *paths, *words) == 0
+    (figure,) = figures
+    for axes, total in zip(figure.axes, totals[:3], strict=False):
+        assert axes.get_xscale() == axes.get_yscale() == "linear"
+        np.testing.assert_array_equal(axes.lines[0].get_xdata(), time)
+        np.testing.assert_array_equal(axes.lines[0].get_ydata(), total)
+        assert axes.get_xlabel() == "time (s)"
+    first, species, changes = figure.axes[0], figure.axes[3], figure.axes[-1]
+    assert first.get_ylabel() == "energy of all disks (J)" and len(figure.axes) == 3 + 2 + 1
+    assert species.get_xscale() == "linear" and figure.axes[4].get_xscale() == "log"
+    assert "only rounding is left" in changes.get_title(loc="left") + changes.get_title()

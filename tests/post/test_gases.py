@@ -516,7 +516,8 @@ def test_single_points_are_seen_and_titles_lie_over_no_words_of_a_wall(simulated
     top = "&side name = 'top' temperature = 2 /"
     run = simulated(f"{top} &species count = 2 radius = 0.1 temperature = 1 / &stop time = 1 /")
     curves = [line for axes in energy.draw([run]).axes for line in axes.lines]
-    assert [line.get_marker() for line in curves if line.get_alpha() is None] == ["o", "o"]
+    single = [line for line in curves if len(line.get_xdata()) == 1 and line.get_alpha() is None]
+    assert [line.get_marker() for line in single] == ["o", "o"]
     figure, axes = plt.subplots(figsize=(5.2, 5.7))
     trajectory.draw_paths(axes, run, [0], [0, -1])
     figure.draw_without_rendering()
