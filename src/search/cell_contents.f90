@@ -1,5 +1,5 @@
-!> Which disks are in which cell: three slots and their count, 16 bytes that are copied as a whole. A cell with more
-!> disks chains the rest behind its last slot.
+!> The disks in each cell: three slots and their count, 16 bytes that are copied as a unit. If a cell contains more disks, the
+!> others are in a linked list behind the last slot.
 module cell_contents
   use kinds, only: int16, int32, int64
   use disks, only: disk_t, tag_t
@@ -11,12 +11,12 @@ module cell_contents
 
   integer(int32), parameter :: cell_capacity = 3
   integer(int32), parameter :: count_slot = cell_capacity + 1
-  integer(int32), parameter :: counted = 65535               !! mask of the number of disks
-  integer(int32), parameter :: crowd = counted + 1           !! unit of the crowded cells around
-  integer(int32), parameter :: marked = shiftl(crowd, 8)     !! beyond nine crowded cells
+  integer(int32), parameter :: counted = 65535               !! bit mask of the number of disks
+  integer(int32), parameter :: crowd = counted + 1           !! increment of the number of crowded cells
+  integer(int32), parameter :: marked = shiftl(crowd, 8)     !! bit of the mark, above a count of nine crowded cells
 
-  !> Disks are counted from 0, as the kernel does. The last slot holds three things: in its lower half the number of
-  !> disks in the slots, in its upper half the number of crowded cells among the nine around this one, and a mark.
+  !> The slots of a cell. Disks are counted from 0, as in the kernel. The last slot holds three values: in its lower half the
+  !> number of disks in the slots, in its upper half the number of crowded cells among the nine around this one, and a mark.
   type :: cell_t
     integer(int32) :: slot(count_slot)
   contains
@@ -25,9 +25,9 @@ module cell_contents
   end type cell_t
 
   type :: cell_contents_t
-    integer(int32) :: stride = 0                 !! from row to row
-    type(cell_t), allocatable :: cell(:)         !! (0:)
-    integer(int32), allocatable :: next(:)       !! (disks) chain of a crowded cell; 0: its end
+    integer(int32) :: stride = 0                 !! difference between the numbers of cells in adjacent rows
+    type(cell_t), allocatable :: cell(:)         !! (0:) cells, row by row
+    integer(int32), allocatable :: next(:)       !! (disks) next disk in the list of a crowded cell; 0: end
   contains
     procedure :: number
     procedure :: empty
@@ -43,7 +43,7 @@ module cell_contents
 
 contains
 
-  !> Number of the cell in column cell(1) and row cell(2), both from 1.
+  !> Number of the cell in column cell(1) and row cell(2), which are counted from 1.
   pure function number(self, cell) result(c)
     class(cell_contents_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -52,7 +52,7 @@ contains
     c = cell(1) + self%stride*cell(2)
   end function number
 
-  !> Makes rows of `stride` empty cells for n_disks disks.
+  !> Allocates `rows` rows of `stride` empty cells for n_disks disks.
   subroutine empty(self, stride, rows, n_disks)
     class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: stride, rows, n_disks
@@ -68,11 +68,11 @@ contains
     end do
   end subroutine empty
 
-  !> Takes all disks out of cell c, and counts them.
+  !> Removes all disks from cell c and counts them.
   pure subroutine clear(self, c, n)
     class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c
-    integer(int32), intent(inout) :: n             !! number of disks taken out of cells so far
+    integer(int32), intent(inout) :: n             !! number of disks removed from cells so far
     integer(int32) :: link, in_slots
 
     in_slots = self%cell(c)%in_slots()
@@ -88,7 +88,7 @@ contains
     self%cell(c)%slot(count_slot) = self%cell(c)%slot(count_slot) - in_slots
   end subroutine clear
 
-  !> Marks cell c, or takes its mark away.
+  !> Sets or removes the mark of cell c.
   pure subroutine mark(self, c, yes)
     class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c
@@ -99,7 +99,7 @@ contains
     end associate
   end subroutine mark
 
-  !> Puts disk i into cell c.
+  !> Inserts disk i into cell c.
   pure subroutine insert(self, c, i)
     class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c, i
@@ -114,7 +114,7 @@ contains
         return
       end if
       head = slot(cell_capacity) + 1
-      self%next(i) = head                          ! becomes the head of the chain
+      self%next(i) = head                          ! becomes the head of the list
       slot(cell_capacity) = i - 1
     end associate
     if (self%next(head) == 0) call self%count_crowd(c, 1)
@@ -135,7 +135,7 @@ contains
         slot(count_slot) = slot(count_slot) - 1
         return
       end if
-      if (slot(k) == i - 1) then                   ! the head of the chain takes the free place
+      if (slot(k) == i - 1) then                   ! the head of the list takes the free slot
         slot(k) = link - 1
         slot(cell_capacity) = self%next(link) - 1
         self%next(link) = 0
@@ -149,7 +149,7 @@ contains
     if (self%chain(c) == 0) call self%count_crowd(c, -1)
   end subroutine remove
 
-  !> Notes in the nine cells around that cell c became crowded (1), or no longer is (-1).
+  !> Updates the counts of the nine cells around c when c becomes crowded (1) or is no longer crowded (-1).
   pure subroutine count_crowd(self, c, change)
     class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c, change
@@ -170,7 +170,7 @@ contains
     n = iand(self%slot(count_slot), counted)
   end function in_slots
 
-  !> Whether predictions in this cell take more than the plain way: it is marked, or near a crowded cell.
+  !> Whether predictions in this cell need the general procedure, because the cell is marked or near a crowded cell.
   elemental function needs_care(self) result(yes)
     class(cell_t), intent(in) :: self
     logical :: yes
@@ -178,7 +178,7 @@ contains
     yes = self%slot(count_slot) >= crowd
   end function needs_care
 
-  !> Whether a cell is crowded among the nine around c.
+  !> Whether any of the nine cells around c is crowded.
   pure function is_crowded_around(self, c) result(yes)
     class(cell_contents_t), intent(in) :: self
     integer(int32), intent(in) :: c
@@ -187,7 +187,7 @@ contains
     yes = iand(self%cell(c)%slot(count_slot), marked - crowd) > 0
   end function is_crowded_around
 
-  !> The first disk in the chain of cell c, which is the last one in its slots; 0 if the cell is not crowded.
+  !> First disk in the list of cell c, which also occupies the last slot; 0 if the cell is not crowded.
   pure function chain(self, c) result(i)
     class(cell_contents_t), intent(in) :: self
     integer(int32), intent(in) :: c
@@ -199,7 +199,7 @@ contains
     if (self%next(i) == 0) i = 0
   end function chain
 
-  !> Number of slots before the one of disk i, which is in this cell; 2 if it is in the chain.
+  !> Number of slots before that of disk i, which is in this cell; 2 if the disk is in the list.
   elemental function slots_before(self, i) result(n)
     type(cell_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -209,15 +209,14 @@ contains
     n = first + iand(first, merge(0, 1, self%slot(2) == i - 1))
   end function slots_before
 
-  !> Lists the disks in the slots of the nine cells around c, which contains disk i, without i. Whole cells are copied,
-  !> without a branch on how many disks they hold. If i is not in the slots of its crowded cell, the first disk of the
-  !> chain is left out instead.
+  !> Lists the disks in the slots of the nine cells around c, which contains disk i, without i. Whole cells are copied, without
+  !> branches on the numbers of disks. If i is not in a slot of its crowded cell, the head of the list is left out instead.
   subroutine gather(cell, c, stride, i, list, n)
     type(cell_t), intent(in) :: cell(0:*)
     integer(int32), intent(in) :: c, stride, i
     integer(int32), intent(out) :: list(list_capacity)
     integer(int32), intent(out) :: n               !! number of disks listed
-    integer(int64) :: below, here, above, m, own   ! as long as an address: no conversions
+    integer(int64) :: below, here, above, m, own   ! 64 bits like an address, to avoid conversions
 
     here = c
     below = here - stride
@@ -238,7 +237,7 @@ contains
     n = int(m, int32)
   end subroutine gather
 
-  !> Adds the disks in the slots of a cell to a list of n.
+  !> Appends the disks in the slots of a cell to a list of n disks.
   pure subroutine append(cell, list, n)
     type(cell_t), intent(in) :: cell
     integer(int32), intent(inout) :: list(list_capacity)
@@ -248,8 +247,8 @@ contains
     n = n + cell%in_slots()
   end subroutine append
 
-  !> Prefetches what predictions for some disks will read, stage by stage: their records, their cells, the disks in
-  !> those; and, one stage later, the record and the cells of their partners.
+  !> Prefetches data for predictions of some disks, in stages: their records, their cells, and the disks in
+  !> these cells. For their partners this happens one stage later.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(cell_contents_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -274,7 +273,7 @@ contains
     end do
   contains
 
-    !> The record and tag of a disk.
+    !> Prefetches the record and tag of a disk.
     subroutine fetch(i)
       integer(int32), intent(in) :: i
 
@@ -282,18 +281,18 @@ contains
       call prefetch(disk(i)%stamp)
     end subroutine fetch
 
-    !> The nine cells around c.
+    !> Prefetches the nine cells around c.
     subroutine fetch_cells(c)
       integer(int32), intent(in) :: c
       integer(int32) :: m
 
       do m = c - self%stride, c + self%stride, self%stride
-        call prefetch(self%cell(m - 1)%slot(1))    ! three cells lie on one line or two
+        call prefetch(self%cell(m - 1)%slot(1))    ! three adjacent cells occupy one or two cache lines
         call prefetch(self%cell(m + 1)%slot(count_slot))
       end do
     end subroutine fetch_cells
 
-    !> The first disk of each of them.
+    !> Prefetches the first disk in each of the nine cells around c.
     subroutine fetch_disks(c)
       integer(int32), intent(in) :: c
       integer(int32) :: m, l

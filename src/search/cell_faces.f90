@@ -1,7 +1,7 @@
-!> The faces of the cells of a grid, and when a disk leaves its cell; the sides of the box are faces as well.
+!> The faces of the cells of a grid, and the times when disks leave their cells. The sides of the box are faces as well.
 !>
-!> Neighbouring cells overlap as far as correctness allows: disks two cells apart can never touch. Where cells overlap, a
-!> disk may belong to any of them, best to the one that it leaves last. With wide cells this halves the crossings.
+!> Neighbouring cells overlap as far as possible: disks that are two cells apart must not touch. In the overlap a disk may belong to
+!> either cell; the best one is that which it leaves last. With wide cells this halves the number of crossings.
 module cell_faces
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t
@@ -16,17 +16,18 @@ module cell_faces
   private
   public :: all_cells, cell_faces_t, line_t, patch_t
 
-  !> The cells that a grid holds, of all those that the box is cut into: usually all. A patch may lie across a periodic
-  !> side. Its outer faces are open where they are not sides of the box: what leaves there is lost to it.
+  !> The cells of a grid, out of all cells into which the box is divided: usually all of them, or the patch of a domain, which may
+  !> extend across a periodic side. Outer faces of a patch that are not sides of the box are open: disks that pass them are
+  !> no longer in the grid.
   type :: patch_t
-    integer(int32) :: whole(2) = 0                 !! columns, rows of the box
-    integer(int32) :: first(2) = 1                 !! first column, row of the patch; below 1 beyond a periodic side
-    integer(int32) :: n(2) = 0                     !! columns, rows of the patch
-    real(real64) :: small = 0.0_real64             !! largest radius that the cells are made for [length]
-    real(real64) :: reach = 0.0_real64             !! within which such disks touch [length]
-    real(real64) :: lower(2) = 0.0_real64          !! corner of the box [length]
-    real(real64) :: width(2) = 0.0_real64          !! from cell to cell [length]
-    ! By axis, if there is a periodic side in the patch: the last cells before it and the first behind it; else 0.
+    integer(int32) :: whole(2) = 0                 !! numbers of columns and rows in the box
+    integer(int32) :: first(2) = 1                 !! first column and row of the patch; less than 1 beyond a periodic side
+    integer(int32) :: n(2) = 0                     !! numbers of columns and rows in the patch
+    real(real64) :: small = 0.0_real64             !! largest radius for which the cells are wide enough [length]
+    real(real64) :: reach = 0.0_real64             !! largest distance at which such disks touch [length]
+    real(real64) :: lower(2) = 0.0_real64          !! lower left corner of the box [length]
+    real(real64) :: width(2) = 0.0_real64          !! distance between the centres of adjacent cells [length]
+    ! Along each axis, if there is a periodic side in the patch: the last cells before it and the first behind it; otherwise 0.
     integer(int32) :: last(2) = 0
     integer(int32) :: next(2) = 0
   contains
@@ -40,26 +41,27 @@ module cell_faces
     procedure :: equals
   end type patch_t
 
-  !> A face of a column or row of cells, or the side of the box there: lines that disks reach.
+  !> A line that disks reach: a face of a column or row of cells, or a side of the box.
   type :: line_t
-    real(real64) :: place = 0.0_real64             !! of the face or side [length]
-    real(real64) :: inset = 0.0_real64             !! in radii, from there to the line that the disk's centre reaches
-    integer(int32) :: code = 0                     !! of the event: a side, or a crossing
-    logical :: struck = .false.                    !! on this side of the cell, or here, a side moves that may come into it
+    real(real64) :: place = 0.0_real64             !! position of the face or side [length]
+    real(real64) :: inset = 0.0_real64             !! distance to the line that the centre of a disk reaches, in radii
+    integer(int32) :: code = 0                     !! code of the event: a side, or a crossing
+    logical :: struck = .false.                    !! a moving side may touch disks of this cell
   end type line_t
 
   type :: cell_faces_t
-    real(real64) :: width(2) = 0.0_real64          !! from cell to cell [length]
-    real(real64) :: overlap(2) = 0.0_real64        !! of neighbouring cells [length]
-    logical :: moving = .false.                    !! sides move
-    logical :: falling = .false.                   !! disks fly on parabolas, or sides move: more than one face is in question
-    logical :: periodic(2) = .false.               !! by axis
-    ! Pistons can strike disks anywhere, but for some time only in a strip of columns or rows.
-    real(real64) :: due = never                    !! when the first piston leaves its strip, since the epoch [time]
-    real(real64) :: centre(n_sides) = 0.0_real64   !! of the strip of each, inwards of the box's side [length]
-    real(real64) :: beyond(2, 2) = 0.0_real64      !! how far disks may be beyond the sides: lower ones, upper ones [length]
-    type(line_t), allocatable :: column(:, :)      !! (0:1,columns) their left and right faces
-    type(line_t), allocatable :: row(:, :)         !! (0:1,rows)
+    real(real64) :: width(2) = 0.0_real64          !! distance between the centres of adjacent cells [length]
+    real(real64) :: overlap(2) = 0.0_real64        !! width of the overlap of neighbouring cells [length]
+    logical :: moving = .false.                    !! there are moving sides
+    logical :: falling = .false.                   !! gravity or moving sides: more than one face has to be considered along an axis
+    logical :: periodic(2) = .false.               !! periodic boundary along each axis
+    ! Pistons can touch disks anywhere, but for some time only in a strip of columns or rows.
+    real(real64) :: due = never                    !! time when the first piston leaves its strip, since the epoch [time]
+    real(real64) :: centre(n_sides) = 0.0_real64  !! centre of the strip of each piston, as displacement inwards from the side
+                                                  !! [length]
+    real(real64) :: beyond(2, 2) = 0.0_real64      !! (axis, lower or upper) distance that disks can be beyond the sides [length]
+    type(line_t), allocatable :: column(:, :)      !! (0:1,columns) left and right faces
+    type(line_t), allocatable :: row(:, :)         !! (0:1,rows) lower and upper faces
   contains
     procedure :: set
     procedure :: find_strips
@@ -73,18 +75,18 @@ module cell_faces
 
 contains
 
-  !> The patch of all cells of a box that is cut into n(1) columns and n(2) rows.
+  !> The patch of all cells of a box that is divided into n(1) columns and n(2) rows.
   pure function all_cells(box, n, reach) result(patch)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: n(2)
-    real(real64), intent(in) :: reach              !! within which disks touch [length]
+    real(real64), intent(in) :: reach              !! largest distance at which disks touch [length]
     type(patch_t) :: patch
 
     patch%whole = n
     patch%n = n
     patch%reach = reach
     patch%lower = box%lower
-    patch%width = box%edges()/n*(1 + 4*epsilon(reach))     ! the last face is not before the side
+    patch%width = box%edges()/n*(1 + 4*epsilon(reach))     ! rounding must not place the last face before the side
     call patch%find_sides(box%periodic)
   end function all_cells
 
@@ -101,7 +103,7 @@ contains
     end where
   end subroutine find_sides
 
-  !> The cell of the patch that a point in the box is in; beyond `n` if in none.
+  !> The cell of the patch that contains a point of the box; beyond `n` if there is none.
   pure function cell_at(self, x) result(cell)
     class(patch_t), intent(in) :: self
     real(real64), intent(in) :: x(2)               !! [length]
@@ -111,7 +113,7 @@ contains
     if (self%first(1) /= 1 .or. self%first(2) /= 1) cell = modulo(cell - self%first, self%whole) + 1
   end function cell_at
 
-  !> The column or row of the whole grid that a column or row of the patch is.
+  !> Column or row in the whole grid of a column or row of the patch.
   elemental function place_of(self, cell, axis) result(place)
     class(patch_t), intent(in) :: self
     integer(int32), intent(in) :: cell
@@ -121,7 +123,7 @@ contains
     place = modulo(self%first(axis) + cell - 2, self%whole(axis)) + 1
   end function place_of
 
-  !> Whether a cell belongs to the patch, not to what lies beyond its open faces.
+  !> Whether a cell is inside the patch.
   pure function holds(self, cell) result(yes)
     class(patch_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -130,7 +132,7 @@ contains
     yes = all(cell >= 1 .and. cell <= self%n)
   end function holds
 
-  !> Which cells of the whole grid are in the patch.
+  !> Selects those of the given cells of the whole grid that are in the patch.
   pure function covers(self, cell) result(yes)
     class(patch_t), intent(in) :: self
     integer(int16), intent(in) :: cell(:, :)       !! (2,n)
@@ -140,7 +142,7 @@ contains
       .and. modulo(cell(2, :) - self%first(2), self%whole(2)) < self%n(2)
   end function covers
 
-  !> Whether some of the cells around a cell are images beyond a periodic side.
+  !> Whether some of the nine cells around a cell are images beyond a periodic side.
   pure function at_seam(self, cell) result(yes)
     class(patch_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -149,7 +151,7 @@ contains
     yes = any(cell == self%last .or. cell == self%next)
   end function at_seam
 
-  !> The column or row that lies some ahead of another, and how many periods it is away.
+  !> The column or row that is `ahead` steps from another one, and the number of periods between them.
   pure subroutine step(self, axis, cell, ahead, there, periods)
     class(patch_t), intent(in) :: self
     integer, intent(in) :: axis
@@ -160,7 +162,7 @@ contains
     periods = 0
     associate (last => self%last(axis), n => self%n(axis))
       if (last == 0) return
-      if (last < n) periods = merge(1, 0, there > last) - merge(1, 0, cell > last)      ! the side lies within the patch
+      if (last < n) periods = merge(1, 0, there > last) - merge(1, 0, cell > last)      ! the periodic side is inside the patch
       if (last < n) return
       do while (there > n)
         there = there - n
@@ -173,7 +175,7 @@ contains
     end associate
   end subroutine step
 
-  !> Whether two patches are made of the same cells for the same disks.
+  !> Whether two patches consist of the same cells for the same disks.
   pure function equals(self, other) result(yes)
     class(patch_t), intent(in) :: self
     type(patch_t), intent(in) :: other
@@ -184,7 +186,7 @@ contains
       .and. all(abs(self%lower - other%lower) <= 0) .and. all(abs(self%width - other%width) <= 0)
   end function equals
 
-  !> Finds the faces of the cells of a patch.
+  !> Sets up the faces of the cells of a patch.
   subroutine set(self, box, patch, now)
     class(cell_faces_t), intent(out) :: self
     type(box_t), intent(in) :: box
@@ -205,7 +207,7 @@ contains
     call self%find_strips(box, patch%small, now)
   contains
 
-    !> The faces of columns (axis 1) or rows.
+    !> Sets up the faces of columns (axis 1) or rows (axis 2).
     pure subroutine cut(axis, line)
       integer(int32), intent(in) :: axis
       type(line_t), allocatable, intent(out) :: line(:, :)
@@ -226,7 +228,7 @@ contains
       end do
     end subroutine cut
 
-    !> Finds the columns (axis 1) or rows in which a side that moves may strike disks.
+    !> Finds the columns (axis 1) or rows (axis 2) in which a moving side may touch disks.
     pure subroutine find_struck(axis, line)
       integer, intent(in) :: axis
       type(line_t), intent(inout) :: line(0:, :)
@@ -240,8 +242,8 @@ contains
     end subroutine find_struck
   end subroutine set
 
-  !> Finds the columns and rows in which a piston may strike disks until it has moved by the width of a cell. Beyond the cells
-  !> it strikes in the outermost one, whose disks may follow it.
+  !> Finds the columns and rows in which a piston may touch disks before it has moved by the width of a cell. A piston beyond all
+  !> cells touches disks of the outermost ones, which may follow it there.
   pure subroutine find_strips(self, box, small, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -258,7 +260,7 @@ contains
     call self%watch_pistons(box, now)
   contains
 
-    !> Marks the lines of an axis.
+    !> Marks the lines along one axis.
     pure subroutine mark(line, axis)
       type(line_t), intent(inout) :: line(0:, :)
       integer, intent(in) :: axis
@@ -272,7 +274,7 @@ contains
     end subroutine mark
   end subroutine find_strips
 
-  !> Finds when the first piston leaves its strip, if no disk strikes one before.
+  !> Finds the time when the first piston leaves its strip, unless a disk collides with one before.
   pure subroutine watch_pistons(self, box, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -293,25 +295,25 @@ contains
     end do
   end subroutine watch_pistons
 
-  !> The rectangle in which the centres of disks in a cell are. The outer ones go on as far as sides move: for ever, if
-  !> disks push them.
+  !> The rectangle that contains the centres of the disks in a cell. Outermost cells extend as far as sides move, in the case of a
+  !> piston without limit.
   pure subroutine rectangle(self, cell, n, low, high)
     class(cell_faces_t), intent(in) :: self
-    integer(int32), intent(in) :: cell(2)          !! of all those of the box
-    integer(int32), intent(in) :: n(2)             !! columns, rows of the box
-    real(real64), intent(out) :: low(2), high(2)   !! from its lower left corner [length]
+    integer(int32), intent(in) :: cell(2)          !! column and row in the box
+    integer(int32), intent(in) :: n(2)             !! numbers of columns and rows in the box
+    real(real64), intent(out) :: low(2), high(2)   !! relative to the lower left corner of the box [length]
 
     low = self%width*(cell - 1) - 0.5_real64*self%overlap - merge(self%beyond(:, 1), 0.0_real64, cell == 1)
     high = self%width*cell + 0.5_real64*self%overlap + merge(self%beyond(:, 2), 0.0_real64, cell == n)
   end subroutine rectangle
 
-  !> Of the cells that contain the disk, the one that it leaves last.
+  !> Chooses, among the cells that contain the disk, the one that it leaves last.
   pure subroutine choose_cell(self, gravity, disk, now, cell)
     class(cell_faces_t), intent(in) :: self
     real(real64), intent(in) :: gravity(2)         !! [length/time**2]
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
-    integer(int16), intent(inout) :: cell(2)       !! in: any of them
+    integer(int16), intent(inout) :: cell(2)       !! in: any cell that contains the disk
     real(real64) :: s
 
     s = now - disk%clock
@@ -319,7 +321,7 @@ contains
     cell(2) = cell(2) + ahead(self%row, self%overlap(2), disk%x(2), disk%v(2), gravity(2), s, cell(2))
   end subroutine choose_cell
 
-  !> Along one axis: 1 or -1 if the disk is in the next cell as well, and moves towards it; else 0.
+  !> Along one axis: 1 or -1 if the disk is also in the next cell in its direction of motion, otherwise 0.
   pure function ahead(line, overlap, x, v, g, s, cell) result(step)
     type(line_t), intent(in) :: line(0:1, *)
     real(real64), intent(in) :: overlap, x, v, g, s
@@ -333,7 +335,7 @@ contains
     step = int(chosen(0_int32, 2*up - 1, left < overlap .and. .not. is_wall(line(up, cell)%code)), int16)
   end function ahead
 
-  !> `second` if the condition holds, else `first`. Which is a toss-up: this is done without a branch.
+  !> `second` if the condition holds, otherwise `first`. Written without a branch, because the condition is unpredictable.
   elemental function chosen(first, second, condition) result(n)
     integer(int32), intent(in) :: first, second
     logical, intent(in) :: condition
@@ -342,7 +344,7 @@ contains
     n = ieor(first, iand(-merge(1, 0, condition), ieor(first, second)))
   end function chosen
 
-  !> When and how the disk leaves its cell, or meets a side within it.
+  !> Finds when and how the disk leaves its cell or touches a side within it.
   pure subroutine next(self, box, disk, cell, now, falling, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -350,7 +352,7 @@ contains
     integer(int16), intent(in) :: cell(2)
     real(real64), intent(in) :: now
     logical, intent(in) :: falling
-    type(prospect_t), intent(inout) :: near        !! gets time and partner
+    type(prospect_t), intent(inout) :: near        !! its time and partner are set
 
     if (falling) then
       call self%next_falling(box, self%column(:, cell(1)), self%row(:, cell(2)), disk, now, near)
@@ -359,14 +361,14 @@ contains
     end if
   end subroutine next
 
-  !> When and how the disk reaches one of four lines around it, which may be nearer than its cell's.
+  !> Finds when and how the disk reaches one of four given lines around it, which may be closer than the faces of its cell.
   pure subroutine next_within(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: column(0:1), row(0:1)
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
-    type(prospect_t), intent(inout) :: near        !! gets time and partner
+    type(prospect_t), intent(inout) :: near        !! its time and partner are set
 
     if (self%falling) then
       call self%next_falling(box, column, row, disk, now, near)
@@ -375,7 +377,7 @@ contains
     end if
   end subroutine next_within
 
-  !> On a straight line. Which axis and which way are toss-ups: no branch on them.
+  !> The same for a straight path. Axis and direction are unpredictable and are selected without branches.
   pure subroutine next_straight(column, row, disk, cell, t, code)
     type(line_t), intent(in) :: column(0:1, *), row(0:1, *)
     type(disk_t), intent(in) :: disk
@@ -393,8 +395,8 @@ contains
     t = merge(t_y, t_x, t_y < t_x)
   end subroutine next_straight
 
-  !> When a disk reaches a line across an axis that it moves towards. Contact with a side comes out as `side_time` has
-  !> it, to the last bit: it is one event, whoever predicts it.
+  !> Time when a disk on a straight path reaches a line that it approaches along an axis. For a side the result is bit-identical
+  !> to that of `side_time`, because the event must not depend on the procedure that predicts it.
   pure function line_time(line, disk, axis) result(t)
     type(line_t), intent(in) :: line
     type(disk_t), intent(in) :: disk
@@ -408,14 +410,14 @@ contains
     t = merge(t, never, speed > slowest)
   end function line_time
 
-  !> On a parabola.
+  !> The same for a parabolic path, or with moving sides.
   pure subroutine next_falling(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: column(0:1), row(0:1)
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
-    type(prospect_t), intent(inout) :: near        !! gets time and partner
+    type(prospect_t), intent(inout) :: near        !! its time and partner are set
     real(real64) :: t_x, t_y
     integer(int32) :: code_x, code_y
 
@@ -430,10 +432,10 @@ contains
     near%time = merge(t_y, t_x, t_y < t_x)
   end subroutine next_falling
 
-  !> The same along one axis.
+  !> The same along one axis, without moving sides.
   pure subroutine next_along(box, line, axis, disk, now, t, code)
     type(box_t), intent(in) :: box
-    type(line_t), intent(in) :: line(0:1)          !! of the disk's cell
+    type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
     integer(int32), intent(in) :: axis
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
@@ -451,13 +453,13 @@ contains
       t_other = falling_time(line(1 - up), axis, box, disk, now)
       up = chosen(up, 1 - up, t_other < t)
       t = min(t, t_other)
-    else                                           ! forward, or, if gravity turns the disk before, back
+    else                                           ! the forward face or, if gravity reverses the motion before, the one behind
       x = flight(disk%x(axis), disk%v(axis), g, now - disk%clock)
       v = flight_velocity(disk%v(axis), g, now - disk%clock)
       up = merge(1, 0, v > -g*resolution(now))
       sense = 2*up - 1                             ! the roots of `time_to_line`, whose case is known here
       gap = max(sense*(line(up)%place - x), 0.0_real64)
-      disc = (v*v + tiny(v)) + 2*sense*g*gap       ! not zero if at rest on the face
+      disc = (v*v + tiny(v)) + 2*sense*g*gap       ! positive also at rest on the face
       if (disc >= 0) then
         t = now + 2*gap/(abs(v) + sqrt(disc))
       else
@@ -469,10 +471,10 @@ contains
     code = line(up)%code
   end subroutine next_along
 
-  !> The same where sides move, which may come into the cell.
+  !> The same along one axis, with moving sides that may come into the cell.
   pure subroutine next_beside(box, line, axis, disk, now, t, code)
     type(box_t), intent(in) :: box
-    type(line_t), intent(in) :: line(0:1)          !! of the disk's cell
+    type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
     integer(int32), intent(in) :: axis
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
@@ -486,9 +488,9 @@ contains
     end if
   end subroutine next_beside
 
-  !> The same where a side that moves may come into the cell, whether it is a side of it or not.
+  !> The same for a cell that a moving side may reach, whether the side is a face of the cell or not.
   pure subroutine next_moving(line, axis, box, disk, now, t, code)
-    type(line_t), intent(in) :: line(0:1)          !! of the disk's cell
+    type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
     integer(int32), intent(in) :: axis
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -512,7 +514,7 @@ contains
     end do
   end subroutine next_moving
 
-  !> When a falling disk reaches a face or side. The root before `now`, when it came in, is not the one.
+  !> Time when a disk on a parabola reaches a face or side. The earlier root, at which it entered the cell, is excluded.
   pure function falling_time(line, axis, box, disk, now) result(t)
     type(line_t), intent(in) :: line
     integer(int32), intent(in) :: axis
@@ -529,11 +531,11 @@ contains
     sense = sense_of(side_crossed(line%code))
     g = box%gravity(axis)
     if (sense*flight_velocity(disk%v(axis), g, now - disk%clock + resolution(now)) <= 0 &
-      .and. sense*g < 0) return                    ! flies away from it, ever faster
+      .and. sense*g < 0) return                    ! it moves away faster and faster
     t = max(now, disk%clock + time_to_line(sense*(line%place - disk%x(axis)), sense*disk%v(axis), sense*g))
   end function falling_time
 
-  !> Smallest resolvable time step at `now`; without it a disk that turns at a face could cross it back and forth
+  !> Smallest resolvable time step at `now`. Without it a disk that reverses its motion at a face could cross it back and forth
   !> for ever.
   elemental function resolution(now)
     real(real64), intent(in) :: now

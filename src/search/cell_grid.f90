@@ -1,6 +1,5 @@
-!> Search by cells: the box is cut into cells at least one diameter wide, so that a disk meets only those in
-!> its own cell and the eight around it before it leaves its cell, which is an event like any other. Wider cells
-!> overlap (see `cell_faces`).
+!> Search by cells (linked-cell method). The box is divided into cells at least one diameter wide. Before a disk leaves its cell,
+!> which is an event, it can only touch disks in its own cell and the eight cells around it. Wide cells overlap (see `cell_faces`).
 module cell_grid
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t, meet_image, next_obstacle
@@ -21,22 +20,23 @@ module cell_grid
   private
   public :: cell_grid_t
 
-  real(real64), parameter :: spacious = 1.2_real64          !! width of cells, in diameters, from which choosing pays
+  real(real64), parameter :: spacious = 1.2_real64  !! width of cells in diameters from which choosing between overlapping cells
+                                                    !! pays
 
   type :: cell_grid_t
     private
-    type(patch_t), public :: patch                 !! the cells; chosen here unless they are only a part of the box
+    type(patch_t), public :: patch                 !! the cells; chosen here, except in a domain
     logical, public :: is_part = .false.
     logical, public :: undivided = .false.         !! a single cell: all disks are candidates
-    logical, public :: everyone = .false.          !! predict all disks again after each event, not just those involved
-    type(cell_faces_t), public :: faces                    !! of the cells, and the sides among them
-    logical, public :: roomy = .false.             !! cells overlap: a disk that collides chooses its cell again
-    type(cell_contents_t), public :: cells                 !! numbered row by row, with a ring of empty ones around
-    type(reach_lists_t), public :: reach           !! obstacles, and disks much larger than those the cells are made for
-    type(images_t) :: images                       !! of the box, in this epoch
-    integer(int32) :: n_listed = 0                 !! disks in cells, since they were filled
-    type(neighbour_lists_t), public :: lists       !! of the small disks, where cells hold many of them
-    real(real64) :: plain_radius = 0.0_real64      !! largest of disks whose crossings are plain: none, with lists [length]
+    logical, public :: everyone = .false.          !! predict all disks after each event, not only those involved
+    type(cell_faces_t), public :: faces                    !! faces of the cells, and sides
+    logical, public :: roomy = .false.             !! cells overlap: a disk chooses its cell again after a collision
+    type(cell_contents_t), public :: cells                 !! numbered row by row, surrounded by a ring of empty cells
+    type(reach_lists_t), public :: reach           !! obstacles, and disks much larger than those for which the cells are made
+    type(images_t) :: images                       !! images of the box in this epoch
+    integer(int32) :: n_listed = 0                 !! number of disks inserted into cells
+    type(neighbour_lists_t), public :: lists       !! neighbour lists of the small disks, where cells contain many of them
+    real(real64) :: plain_radius = 0.0_real64      !! largest radius of disks with simple crossings; negative with lists [length]
   contains
     procedure :: build
     procedure :: predict
@@ -54,13 +54,13 @@ module cell_grid
 
 contains
 
-  !> Chooses the cells, sorts the disks into them and finds what reaches into each. Where there are obstacles and the cells
-  !> are the same as before, only the disks are listed again: a few disks among many obstacles begin epochs often.
+  !> Chooses the cells, inserts the disks, and finds the objects that reach into each cell. If there are obstacles and the cells
+  !> have not changed, only the disks are inserted again, because few disks among many obstacles often begin a new epoch.
   subroutine build(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(place_t), allocatable :: rims(:)
-    logical :: kept                                ! obstacles remain listed
+    logical :: kept                                ! lists of obstacles are kept
     integer(int32) :: i
     integer(int16) :: ix, iy
 
@@ -97,7 +97,7 @@ contains
     end associate
   end subroutine build
 
-  !> Takes all disks out of the cells where their tags say that they are. `all_found`: no disk remains in any cell.
+  !> Removes all disks from the cells stored in their tags. `all_found`: all cells are empty now.
   subroutine clear_cells(self, sim, all_found)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -114,7 +114,7 @@ contains
     all_found = n == self%n_listed
   end subroutine clear_cells
 
-  !> Sorts the disks into the cells.
+  !> Inserts the disks into the cells.
   subroutine fill_cells(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -125,7 +125,7 @@ contains
     associate (patch => self%patch)
       do i = 1, sim%n_disks()
         if (sim%disk(i)%radius > patch%small) then
-          sim%tag(i)%cell = 1                      ! one that is marked in any case
+          sim%tag(i)%cell = 1                      ! a marked cell in any case
         else if (sim%tag(i)%id > 0) then
           cell = int(patch%cell_at(sim%position(i)), int16)
           call put(self, sim%tag(i), i, cell)
@@ -135,7 +135,7 @@ contains
     end associate
   end subroutine fill_cells
 
-  !> Lists the neighbours of all small disks, if that pays.
+  !> Sets up the neighbour lists of all small disks, if they pay.
   subroutine list_all(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -150,7 +150,7 @@ contains
     end do
   end subroutine list_all
 
-  !> Puts disk i into a cell.
+  !> Inserts disk i into a cell and updates the neighbour lists.
   subroutine insert(self, sim, i, cell)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -161,7 +161,7 @@ contains
     if (self%lists%used) call self%list(sim, i)
   end subroutine insert
 
-  !> Takes disk i out of its cell.
+  !> Removes disk i from its cell and from the neighbour lists.
   subroutine take_out(self, tag, i)
     class(cell_grid_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag
@@ -171,7 +171,7 @@ contains
     call take(self, tag, i)
   end subroutine take_out
 
-  !> Puts disk i into a cell; lists of neighbours stay as they are.
+  !> Inserts disk i into a cell, without the neighbour lists.
   subroutine put(self, tag, i, cell)
     class(cell_grid_t), intent(inout) :: self
     type(tag_t), intent(inout) :: tag
@@ -182,7 +182,7 @@ contains
     call self%cells%insert(self%cells%number(cell), i)
   end subroutine put
 
-  !> Takes disk i out of its cell; lists of neighbours stay as they are.
+  !> Removes disk i from its cell, without the neighbour lists.
   subroutine take(self, tag, i)
     class(cell_grid_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag
@@ -191,7 +191,7 @@ contains
     call self%cells%remove(self%cells%number(tag%cell), i)
   end subroutine take
 
-  !> Lists the neighbours of disk i around where it is now; none if it has left the patch.
+  !> Sets up the neighbour list of disk i at its present position, unless it has left the patch.
   subroutine list(self, sim, i)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -202,7 +202,7 @@ contains
     call self%lists%enter(i, self%cells, self%patch, sim%tag(i)%cell)
   end subroutine list
 
-  !> Marks a cell if a disk there may meet an obstacle, a big disk, or others beyond a periodic side; or may be big.
+  !> Marks a cell if disks there may touch obstacles, big disks or periodic images, or if big disks are assigned to it.
   subroutine mark(self, cell)
     class(cell_grid_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -214,7 +214,7 @@ contains
     call self%cells%mark(self%cells%number(cell), special)
   end subroutine mark
 
-  !> Notes where a big disk is now. The cells that it leaves and those that it reaches change their marks.
+  !> Lists a big disk at its present position, and updates the marks of the cells that it leaves and reaches.
   subroutine follow_big(self, sim, number)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -230,7 +230,7 @@ contains
     end do
   end subroutine follow_big
 
-  !> Moves disk i into the next cell and predicts there, or where its search ends otherwise.
+  !> Executes a crossing of disk i: moves it to the next cell, or renews its search region, and predicts its next event.
   subroutine cross(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -244,7 +244,7 @@ contains
     call self%predict(sim, i)
   end subroutine cross
 
-  !> Notes where a big disk is now, or lists a small one again.
+  !> Lists a big disk at its present position, or renews the neighbour list of a small one.
   subroutine cross_with_care(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -259,7 +259,7 @@ contains
     end if
   end subroutine cross_with_care
 
-  !> Moves disk i into the cell beyond the face, over a periodic side into the first one behind it.
+  !> Moves disk i into the cell beyond a face; for a periodic side this is the first cell behind it.
   subroutine change_cell(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -274,7 +274,7 @@ contains
     cell = sim%tag(i)%cell
     cell(axis) = cell(axis) + int(sense_of(side), int16)
     if (is_wall(code) .and. self%patch%last(axis) > 0) then
-      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%patch%cell_at(sim%position(i)), int16)   ! was displaced
+      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%patch%cell_at(sim%position(i)), int16)   ! displaced by the shear
       cell(axis) = int(merge(self%patch%next(axis), self%patch%last(axis), sense_of(side) > 0), int16)
     end if
     inside = .true.
@@ -309,7 +309,7 @@ contains
     call put(self, tag, i, cell)
   end subroutine move
 
-  !> The earliest of: side or cell face, obstacle, disk in the cells around.
+  !> Predicts the earliest event of disk i: side or cell face, obstacle, or disk in the nine cells around it.
   subroutine predict(self, sim, i)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -324,7 +324,7 @@ contains
     end if
   end subroutine predict
 
-  !> Predicts the disks i and j, which have just collided.
+  !> Predicts the next events of disks i and j, which have just collided.
   subroutine predict_both(self, sim, i, j)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -352,7 +352,7 @@ contains
     end if
   end subroutine predict_both
 
-  !> Whether a disk, which is small, has a list of disks that it sees through no image.
+  !> Whether a small disk has a complete list that includes no disks across a periodic side.
   pure function is_plainly_listed(self, cell, i) result(yes)
     class(cell_grid_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -362,7 +362,7 @@ contains
     yes = self%lists%is_short(i) .and. .not. self%patch%at_seam(cell)
   end function is_plainly_listed
 
-  !> Predicts two disks that have just collided, by their lists.
+  !> Predicts the next events of two disks that have just collided, from their neighbour lists.
   subroutine predict_listed(self, sim, i, j)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim
@@ -380,7 +380,7 @@ contains
     end if
   end subroutine predict_listed
 
-  !> When disk i leaves its neighbourhood, and whom it can meet before.
+  !> Finds when disk i leaves its neighbourhood, and copies its neighbour list.
   pure subroutine survey_list(self, box, disk, now, i, near)
     type(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -396,8 +396,8 @@ contains
     call self%lists%copy_list(near)
   end subroutine survey_list
 
-  !> Predicts two disks in plain cells. All that precedes the tests of candidates is done for both first, as it
-  !> does not wait for the tests.
+  !> Predicts the next events of two disks in unmarked cells. Cell faces and candidates of both are determined first, because this
+  !> does not depend on the tests of candidates.
   subroutine predict_two(self, box, disk, tag, now, known, pair)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -416,7 +416,7 @@ contains
     call take_earliest(box%gravity, disk, tag, now, known, second)
   end subroutine predict_two
 
-  !> Predicts one disk in a plain cell.
+  !> Predicts the next event of one disk in an unmarked cell.
   subroutine predict_one(self, box, disk, tag, now, known, i)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -431,7 +431,7 @@ contains
     call take_earliest(box%gravity, disk, tag, now, known, near)
   end subroutine predict_one
 
-  !> When a disk leaves its cell, and which disks it can meet before.
+  !> Finds when a disk leaves its cell, and lists the candidates that it can touch before.
   subroutine survey(self, box, disk, tag, now, known, near)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -439,14 +439,14 @@ contains
     type(tag_t), intent(in) :: tag
     real(real64), intent(in) :: now
     integer(int32), value :: known
-    type(prospect_t), intent(inout) :: near        !! of the disk that it names
+    type(prospect_t), intent(inout) :: near        !! prospect of the disk that it names
 
     call self%faces%next(box, disk, tag%cell, now, iand(known, no_gravity) == 0, near)
     near%cell = self%cells%number(tag%cell)
     call gather(self%cells%cell, near%cell, self%cells%stride, near%disk, near%list, near%n)
   end subroutine survey
 
-  !> Writes into a disk the earliest of the events in prospect.
+  !> Stores the earliest of the events in prospect in the record of a disk.
   subroutine take_earliest(gravity, disk, tag, now, known, near)
     real(real64), intent(in) :: gravity(2)         !! [length/time**2]
     type(disk_t), intent(inout) :: disk(*)
@@ -458,10 +458,10 @@ contains
     call earliest_contact(disk, tag, near, now, gravity, known)
     disk(near%disk)%event_time = near%time
     disk(near%disk)%partner = near%partner
-    tag(near%disk)%partner_stamp = disk(max(near%partner, 1))%stamp    ! without a branch; used if partner > 0
+    tag(near%disk)%partner_stamp = disk(max(near%partner, 1))%stamp    ! without a branch; used only if partner > 0
   end subroutine take_earliest
 
-  !> Prefetches what predictions for some disks will read, stage by stage.
+  !> Prefetches data for predictions of some disks, in stages.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(cell_grid_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -475,8 +475,8 @@ contains
     end if
   end subroutine read_ahead
 
-  !> Predicts a disk where there is more than nine cells with a few small disks each. One that has left the patch is
-  !> lost: nobody meets it any more.
+  !> Predicts the next event of a disk in the general case. A disk that has left the patch is removed from the search; no other disk
+  !> is tested against it any more.
   subroutine predict_with_care(self, sim, i)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -501,7 +501,7 @@ contains
     sim%tag(i)%partner_stamp = sim%disk(max(near%partner, 1))%stamp
   contains
 
-    !> The earliest event of a small disk.
+    !> Finds the earliest event of a small disk.
     subroutine find_event_of_small()
       associate (cell => sim%tag(i)%cell)
         call self%faces%next(sim%box, sim%disk(i), cell, sim%now, self%faces%falling, near)
@@ -510,7 +510,7 @@ contains
       call scan_cells_around()
     end subroutine find_event_of_small
 
-    !> The earliest event of a small disk where there are neighbour lists.
+    !> Finds the earliest event of a small disk where there are neighbour lists.
     subroutine find_event_of_listed()
       associate (cell => sim%tag(i)%cell, region => self%lists%neighbourhood(i))
         call self%faces%next_within(sim%box, region%column, region%row, sim%disk(i), sim%now, near)
@@ -526,7 +526,7 @@ contains
       end associate
     end subroutine find_event_of_listed
 
-    !> The contacts of a small disk with those in the nine cells around it.
+    !> Finds contacts of a small disk with disks in the nine cells around it.
     subroutine scan_cells_around()
       real(real64) :: t
 
@@ -543,11 +543,11 @@ contains
       end if
     end subroutine scan_cells_around
 
-    !> The contacts of a small disk with what reaches into its cell.
+    !> Finds contacts of a small disk with obstacles and big disks that reach into its cell.
     subroutine scan_reach(first)
-      integer(int32), intent(in) :: first            !! entry in the list of the cell
+      integer(int32), intent(in) :: first            !! first entry in the list of the cell
       integer(int32) :: e
-      real(real64) :: number(2), shift(2)            ! of the image of an obstacle; to it [length]
+      real(real64) :: number(2), shift(2)            ! index of the image of an obstacle; shift to it [length]
 
       e = first
       do while (e > 0)
@@ -564,8 +564,8 @@ contains
       end do
     end subroutine scan_reach
 
-    !> The earliest event of a big disk: side, obstacle, end of its margin, another big disk, or a small one in
-    !> the cells along its rim.
+    !> Finds the earliest event of a big disk: a side, an obstacle, the end of its margin, another big disk, or a small disk in
+    !> the cells along its boundary.
     subroutine find_event_of_big()
       real(real64) :: t_margin
       integer(int32) :: number, m, image, n, c(9)
@@ -583,7 +583,7 @@ contains
       end do
       associate (rim => self%reach%big(number)%rim)
         n = 0
-        do m = 1, size(rim, kind=int32)            ! cells that are seen through one image together
+        do m = 1, size(rim, kind=int32)            ! cells seen through the same image are treated together
           n = n + 1
           c(n) = rim(m)%cell(1) + self%cells%stride*rim(m)%cell(2)
           if (m < size(rim) .and. n < size(c)) then

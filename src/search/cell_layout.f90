@@ -1,4 +1,4 @@
-!> How wide the cells of the search are.
+!> The width of the cells of the search.
 module cell_layout
   use kinds, only: int32, never, real64
   use cell_faces, only: all_cells, patch_t
@@ -9,13 +9,13 @@ module cell_layout
   private
   public :: whole_box
 
-  !> Fewer disks per cell mean fewer candidates, but more crossings of faces.
-  real(real64), parameter :: disks_per_cell = 0.6_real64    !! wanted when dilute
+  !> With fewer disks per cell there are fewer candidates, but more crossings of faces.
+  real(real64), parameter :: disks_per_cell = 0.6_real64    !! intended for a dilute system
 
 contains
 
-  !> The cells that suit all disks of a simulation, and its obstacles: each counts as much as a disk, as a disk has to be
-  !> tested against those that reach into its cell.
+  !> The cells that are appropriate for all disks and obstacles of a simulation. An obstacle counts like a disk, because disks have
+  !> to be tested against obstacles that reach into their cells.
   pure function whole_box(sim, undivided) result(patch)
     type(simulation_t), intent(in) :: sim
     logical, intent(in) :: undivided

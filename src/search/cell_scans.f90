@@ -1,5 +1,5 @@
-!> Contacts with disks that the plain way through nine cells does not reach: those of crowded cells, those seen
-!> through a periodic side, and single ones.
+!> Contacts that the simple scan of nine cells does not include: with disks of crowded cells, across
+!> a periodic side, and with single disks.
 module cell_scans
   use kinds, only: int32, int64, real64
   use cell_contents, only: append, cell_contents_t
@@ -14,11 +14,11 @@ module cell_scans
 
 contains
 
-  !> Contacts with some disks, seen through an image.
+  !> Finds contacts with given disks, seen through an image.
   pure subroutine scan_disks(sim, disks, image, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: disks(:)
-    type(image_t), intent(in) :: image             !! through which they are seen
+    type(image_t), intent(in) :: image             !! image through which they are seen
     type(prospect_t), intent(inout) :: near
     integer(int32) :: first
 
@@ -29,7 +29,7 @@ contains
     end do
   end subroutine scan_disks
 
-  !> Contacts with the disks in the list of a disk.
+  !> Finds contacts with the disks in the neighbour list of a disk.
   subroutine scan_list(lists, sim, images, falling, near)
     type(neighbour_lists_t), intent(in) :: lists
     type(simulation_t), intent(in) :: sim
@@ -54,7 +54,7 @@ contains
     end do
   contains
 
-    !> Literals let the compiler specialise the kernel.
+    !> Tests the candidates. The literals let the compiler specialise the kernel.
     subroutine test_list()
       if (falling) then
         call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0)
@@ -65,13 +65,13 @@ contains
     end subroutine test_list
   end subroutine scan_list
 
-  !> Contacts with the disks of some cells, seen through an image.
+  !> Finds contacts with the disks of some cells, seen through an image.
   pure subroutine scan_cells(cells, sim, c, near, image)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: c(:)             !! numbers of up to nine cells
     type(prospect_t), intent(inout) :: near
-    type(image_t), intent(in) :: image             !! through which they are seen
+    type(image_t), intent(in) :: image             !! image through which they are seen
     integer(int64) :: n
     integer(int32) :: k, crowded
 
@@ -89,13 +89,13 @@ contains
     end do
   end subroutine scan_cells
 
-  !> Contacts with the chained disks of a crowded cell.
+  !> Finds contacts with disks in the list of a crowded cell.
   pure subroutine scan_chain(cells, sim, c, near, image)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: c
     type(prospect_t), intent(inout) :: near
-    type(image_t), intent(in), optional :: image   !! through which the cell is seen
+    type(image_t), intent(in), optional :: image   !! image through which the cell is seen
     integer(int32) :: j
 
     j = cells%chain(c)
@@ -110,7 +110,7 @@ contains
     end do
   end subroutine scan_chain
 
-  !> Contacts with the chained disks of the nine cells around a disk.
+  !> Finds contacts with disks in the lists of the nine cells around a disk.
   pure subroutine scan_chains_around(cells, sim, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
@@ -124,9 +124,9 @@ contains
     end do
   end subroutine scan_chains_around
 
-  !> Contacts where some of the nine cells are images beyond a periodic side, cells of one image together. If the images
-  !> above and below slide, they are more columns, all that come near until they have slid by one: disks two columns apart
-  !> never touch.
+  !> Finds contacts where some of the nine cells are images across a periodic side; cells of one image are treated together. If
+  !> the images above and below move along x, more columns are included: all that can be reached before the images have moved by one
+  !> column. Disks two columns apart cannot touch.
   pure subroutine scan_around_seam(cells, patch, sim, images, near)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch

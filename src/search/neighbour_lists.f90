@@ -1,12 +1,12 @@
-!> Neighbour lists: for each disk those that it can touch while all stay within their neighbourhoods.
+!> Neighbour lists: for each disk the disks that it can touch while both stay in their neighbourhoods.
 !>
-!> A neighbourhood is a square around the position where a disk was listed last, clipped at the faces of its cell and at
-!> the sides of the box. Two disks are in each other's list if they can touch somewhere in their neighbourhoods. A disk
-!> that leaves its neighbourhood, which is an event, searches the nine cells around it, lies in a new neighbourhood and
-!> is listed anew. So a prediction tests a few neighbours, however many disks the cells hold (Donev, Torquato and
-!> Stillinger, J. Comput. Phys. 202, 737 (2005)).
+!> A neighbourhood is a square around the position at which the disk was listed, clipped at the faces of its cell and at the sides
+!> of the box. Two disks are in each other's lists if they can touch somewhere in their neighbourhoods. Leaving a neighbourhood is
+!> an event: the disk then searches the nine cells around it and gets a new neighbourhood and a new list. A prediction therefore
+!> tests only a few neighbours, however many disks the cells contain (Donev, Torquato and Stillinger, J. Comput. Phys. 202, 737
+!> (2005)).
 !>
-!> Lists are a cache. If one is full, it counts as incomplete until its disk is listed again, and the disk searches cells.
+!> Lists are a cache. A full list counts as incomplete until its disk is listed again; until then the disk searches the cells.
 module neighbour_lists
   use, intrinsic :: iso_fortran_env, only: real32
   use kinds, only: int16, int32, int64, pi, real64
@@ -20,31 +20,34 @@ module neighbour_lists
   private
   public :: neighbour_lists_t
 
-  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! instead of a number of entries
-  integer(int32), parameter :: always_copied = 15                !! entries, without a branch on how many there are
-  integer(int32), parameter :: image_unit = 2**27                !! more than disks
-  integer(int32), parameter :: most_listed = image_unit/4        !! disks, so that places in all lists are int32
+  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! values in place of the number of entries
+  integer(int32), parameter :: always_copied = 15  !! number of entries that are always copied, without a branch on their actual
+                                                   !! number
+  integer(int32), parameter :: image_unit = 2**27                !! larger than the number of disks
+  integer(int32), parameter :: most_listed = image_unit/4  !! largest number of disks for which positions in all lists fit into 32
+                                                           !! bits
 
-  !> The positions that the centre of a disk may take until it is listed again.
+  !> The region in which the centre of a disk stays until it is listed again.
   type :: neighbourhood_t
-    type(line_t) :: column(0:1), row(0:1)          !! left and right, lower and upper line, with the events there
+    type(line_t) :: column(0:1), row(0:1)          !! left and right, lower and upper line, with their events
   end type neighbourhood_t
 
   type :: neighbour_lists_t
     logical :: used = .false.
-    real(real64) :: least_candidates = 30.0_real64 !! in nine cells of dilute disks, from which lists pay
-    integer(int32) :: capacity = 16                !! of the list of a small disk; larger ones have more neighbours
+    real(real64) :: least_candidates = 30.0_real64 !! number of dilute disks in nine cells from which lists pay
+    integer(int32) :: capacity = 16                !! capacity of the list of a small disk; larger disks have more neighbours
     real(real64) :: mean_radius = 0.0_real64       !! [length]
-    real(real64) :: margin = 0.0_real64            !! half the width of a neighbourhood, for the mean radius [length]
-    real(real64) :: origin(2) = 0.0_real64         !! [length]
-    real(real64) :: period(2) = 0.0_real64         !! [length]
-    real(real32) :: rounding = 0.0_real32          !! above all errors in `extent` [length]
+    real(real64) :: margin = 0.0_real64            !! half the width of the neighbourhood of a disk with the mean radius [length]
+    real(real64) :: origin(2) = 0.0_real64         !! lower left corner of the box [length]
+    real(real64) :: period(2) = 0.0_real64         !! edges of the box [length]
+    real(real32) :: rounding = 0.0_real32          !! bound on the errors in `extent` [length]
     type(neighbourhood_t), allocatable :: neighbourhood(:)   !! (disks)
-    !> (4,disks) x, y of the centre from the origin, radius of the disk with `rounding`, half the width: of squares not clipped
+    !> (4,disks) x and y of the centre relative to `origin`, radius plus `rounding`, half the width of the unclipped square
     real(real32), allocatable :: extent(:, :)
-    integer(int32), allocatable :: first(:)        !! (disks+1) where the list of a disk begins, with the number of its entries
-    integer(int32), allocatable :: entry(:)        !! (0:) all lists: disk, from 0, + image_unit*image
-    integer(int32), allocatable :: back(:)         !! (0:) for each entry, the place of this disk in the list of that one
+    integer(int32), allocatable :: first(:)  !! (disks+1) position of the list of each disk, which begins with the number of its
+                                             !! entries
+    integer(int32), allocatable :: entry(:)        !! (0:) all lists: index of a disk, counted from 0, plus image_unit*image
+    integer(int32), allocatable :: back(:)         !! (0:) for each entry, the position of this disk in the list of the other one
   contains
     procedure :: prepare
     procedure, private :: make_room
@@ -61,8 +64,8 @@ module neighbour_lists
 
 contains
 
-  !> Decides whether lists pay, and makes room for them. A collision tests fewer disks with lists, but disks are listed again and
-  !> again: the more often, the less dense they are. Limits and margin were measured with disks of many sizes.
+  !> Decides whether lists pay, and allocates them. With lists a collision tests fewer disks, but disks have to be listed again;
+  !> this happens more often the less dense they are. The limit and the margin were measured for polydisperse disks.
   subroutine prepare(self, disk, tag, lower, edges, patch)
     class(neighbour_lists_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -77,7 +80,7 @@ contains
     if (n > most_listed .or. .not. patch%small > 0) return
     area = product(patch%n*patch%width)
     candidates = min(9*product(patch%width)/area, 1.0_real64)*n
-    packing = min(n*pi*patch%small**2/area, 0.9_real64)            ! at most so much
+    packing = min(n*pi*patch%small**2/area, 0.9_real64)            ! an upper bound
     if (candidates < self%least_candidates - 27*packing) return
     n = 0
     radii = 0
@@ -94,12 +97,12 @@ contains
     call self%make_room(disk, lower, edges)
   end subroutine prepare
 
-  !> Makes room for the lists of all disks, which are not listed yet. A larger disk has more neighbours.
+  !> Allocates the lists of all disks, which are not listed yet. Larger disks get longer lists, because they have more neighbours.
   subroutine make_room(self, disk, lower, edges)
     class(neighbour_lists_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
     real(real64), intent(in) :: lower(2), edges(2) !! of the box [length]
-    real(real64) :: sizes                          ! the mean one is 1
+    real(real64) :: sizes                          ! radius relative to the mean one
     integer(int32) :: i, n
 
     n = size(disk, kind=int32)
@@ -111,7 +114,7 @@ contains
     end if
     if (.not. allocated(self%first)) then
       allocate (self%first(n + 1), self%neighbourhood(n))
-      allocate (self%extent(4, n), source=0.0_real32)           ! candidates may be unlisted
+      allocate (self%extent(4, n), source=0.0_real32)           ! unlisted disks may be candidates
     end if
     self%first(1) = 0
     do i = 1, n
@@ -126,7 +129,7 @@ contains
     self%entry(self%first(:n)) = unlisted
   end subroutine make_room
 
-  !> Lays a new neighbourhood around disk i, which is at x.
+  !> Sets up a new neighbourhood around disk i, which is at x.
   pure subroutine lay(self, i, radius, x, faces, cell)
     class(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -142,7 +145,7 @@ contains
     self%neighbourhood(i)%row = clipped(faces%row(:, cell(2)), 2)
   contains
 
-    !> The lines of a cell across an axis, moved to the neighbourhood's if these come before.
+    !> The faces of a cell along an axis, replaced by the lines of the neighbourhood where these are closer.
     pure function clipped(line, axis) result(nearer)
       type(line_t), intent(in) :: line(0:1)
       integer(int32), intent(in) :: axis
@@ -154,7 +157,7 @@ contains
       do up = 0, 1
         place = x(axis) + (2*up - 1)*margin
         if ((2*up - 1)*(line(up)%place + line(up)%inset*radius - place) <= 0 &
-          .and. .not. (line(up)%struck .and. is_wall(line(up)%code))) cycle    ! a side that moves is no end
+          .and. .not. (line(up)%struck .and. is_wall(line(up)%code))) cycle    ! a moving side does not limit the neighbourhood
         nearer(up)%place = place
         nearer(up)%inset = 0
         nearer(up)%code = looks_again - up
@@ -162,14 +165,14 @@ contains
     end function clipped
   end subroutine lay
 
-  !> Enters disk i, which has a new neighbourhood, into the lists of the disks that it can touch, and those into its list.
-  !> They are among those in the nine cells around it. A disk that is not listed yet will enter the pair when it is.
+  !> Adds disk i, which has a new neighbourhood, to the lists of the disks in the nine cells around it that it can touch, and these
+  !> to its list. A disk that is not listed yet will add the pair later.
   subroutine enter(self, i, cells, patch, cell)
     class(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
-    integer(int16), intent(in) :: cell(2)          !! of disk i
+    integer(int16), intent(in) :: cell(2)          !! cell of disk i
     integer(int32) :: candidate(list_capacity), around(9), image(9), c, k, row
     integer(int64) :: n                            ! number of candidates
 
@@ -198,7 +201,7 @@ contains
     end if
   contains
 
-    !> Adds the chained disks of a crowded cell; the first one was in its last slot.
+    !> Adds the disks in the list of a crowded cell, except the first one, which was in the last slot.
     subroutine add_chain(c, image)
       integer(int32), intent(in) :: c, image
       integer(int32) :: j
@@ -213,9 +216,9 @@ contains
       end do
     end subroutine add_chain
 
-    !> Enters those of the candidates that are near enough. Which ones is a toss-up: no branch on it.
+    !> Adds the candidates that are close enough. The condition is unpredictable and is evaluated without a branch.
     subroutine test_candidates(image)
-      integer(int32), intent(in) :: image          !! through which they are seen
+      integer(int32), intent(in) :: image          !! image through which they are seen
       integer(int32) :: j, k, found(list_capacity + 1), n_found
       real(real32) :: x, y, reach, margin, dx, dy
 
@@ -243,7 +246,7 @@ contains
     end subroutine test_candidates
   end subroutine enter
 
-  !> Enters disk j, which is seen through an image, into the list of disk i, and the reverse, unless it is not listed yet.
+  !> Adds disk j, seen through an image, to the list of disk i, and disk i to the list of disk j, unless j is not listed yet.
   pure subroutine add_pair(self, i, j, image)
     type(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i, j, image
@@ -255,7 +258,7 @@ contains
     n_j = self%entry(at_j) + 1
     if (n_j == unlisted + 1) return
     if (n_i > 0) then
-      if (at_i + n_i == self%first(i + 1)) n_i = incomplete    ! it is full
+      if (at_i + n_i == self%first(i + 1)) n_i = incomplete    ! the list is full
       self%entry(at_i) = n_i
     end if
     if (n_j > 0) then
@@ -268,13 +271,13 @@ contains
     if (n_j > 0) self%back(at_j + n_j) = max(n_i, 0)
   end subroutine add_pair
 
-  !> Removes disk i from the lists of all others.
+  !> Removes disk i from the lists of all other disks.
   pure subroutine leave(self, i, cells, patch, cell)
     class(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
-    integer(int16), intent(in) :: cell(2)          !! of disk i
+    integer(int16), intent(in) :: cell(2)          !! cell of disk i
     integer(int32) :: at, k, m, around(9), image(9), j, n
 
     at = self%first(i)
@@ -298,7 +301,7 @@ contains
     end do
   end subroutine leave
 
-  !> Removes an entry from the list of disk i; the last one takes its place.
+  !> Removes an entry from the list of disk i; the last entry takes its position.
   pure subroutine remove(self, i, place)
     type(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i, place
@@ -309,7 +312,7 @@ contains
     last = self%entry(at + n)
     self%entry(at + place) = last
     self%back(at + place) = self%back(at + n)
-    self%back(self%first(iand(last, image_unit - 1) + 1) + self%back(at + n)) = place    ! unused, if that list is incomplete
+    self%back(self%first(iand(last, image_unit - 1) + 1) + self%back(at + n)) = place    ! not used if that list is incomplete
     self%entry(at) = n - 1
   end subroutine remove
 
@@ -326,7 +329,7 @@ contains
     end do
   end subroutine remove_disk
 
-  !> The nine cells around a cell, with the images through which they are seen.
+  !> The nine cells around a cell, and the images through which they are seen.
   pure subroutine find_cells(cells, patch, cell, around, image)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
@@ -342,7 +345,7 @@ contains
     end do
   end subroutine find_cells
 
-  !> The image through which a disk is seen by the one that it sees through an image.
+  !> The image through which disk i is seen from disk j, if `image` is the one through which j is seen from i.
   elemental function reverse(image)
     integer(int32), intent(in) :: image
     integer(int32) :: reverse
@@ -350,7 +353,7 @@ contains
     reverse = merge(9 - image, 0, image > 0)
   end function reverse
 
-  !> The number of an image by axis, each -1, 0 or 1. As a part of an entry it is x + 3 y, modulo 9.
+  !> Index of an image along each axis, -1, 0 or 1. In an entry it is encoded as x + 3 y, modulo 9.
   pure function periods(image) result(number)
     integer(int32), intent(in) :: image
     real(real64) :: number(2)
@@ -358,7 +361,7 @@ contains
     number = [modulo(image + 4, 3) - 1, modulo(image + 4, 9)/3 - 1]
   end function periods
 
-  !> Whether all disks that disk i can touch in its neighbourhood are in its list.
+  !> Whether the list of disk i contains all disks that it can touch in its neighbourhood.
   pure function is_complete(self, i) result(yes)
     class(neighbour_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -367,7 +370,7 @@ contains
     yes = self%entry(self%first(i)) >= 0
   end function is_complete
 
-  !> Whether the list is complete and can be copied as a whole.
+  !> Whether the list of disk i is complete and fits into the list of candidates.
   pure function is_short(self, i) result(yes)
     class(neighbour_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -376,7 +379,7 @@ contains
     yes = self%is_complete(i) .and. self%entry(self%first(i)) <= list_capacity
   end function is_short
 
-  !> Copies the list of a disk that sees no images.
+  !> Copies the list of a disk whose neighbours are not seen through images.
   pure subroutine copy_list(self, near)
     class(neighbour_lists_t), intent(in) :: self
     type(prospect_t), intent(inout) :: near
@@ -399,7 +402,7 @@ contains
     n = max(self%entry(self%first(i)), 0)
   end function n_entries
 
-  !> The k-th neighbour in the list of disk i, counted from 0, and the number of the image through which it is seen.
+  !> The k-th neighbour in the list of disk i, counted from 0, and the index of the image through which it is seen.
   pure subroutine neighbour(self, i, k, j, image)
     class(neighbour_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i, k
@@ -412,8 +415,8 @@ contains
     end associate
   end subroutine neighbour
 
-  !> Prefetches what predictions for some disks will read, stage by stage: their records, their lists, the disks in those;
-  !> and, one stage later, the record and the list of their partners.
+  !> Prefetches data for predictions of some disks, in stages: their records, their lists, and the disks in these lists. For
+  !> their partners this happens one stage later.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(neighbour_lists_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -439,7 +442,7 @@ contains
     end do
   contains
 
-    !> The record and tag of a disk, and where its list begins.
+    !> Prefetches the record and tag of a disk, and the position of its list.
     subroutine fetch_record(i)
       integer(int32), intent(in) :: i
 
@@ -448,7 +451,7 @@ contains
       call prefetch(self%first(i))
     end subroutine fetch_record
 
-    !> The neighbourhood and the list of a disk.
+    !> Prefetches the neighbourhood and the list of a disk.
     subroutine fetch_list(i)
       integer(int32), intent(in) :: i
 

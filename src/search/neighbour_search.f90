@@ -1,4 +1,4 @@
-!> The seam between the dynamics and the ways to find what a disk meets next; and the kernel that they share.
+!> Types for predicted events, and the kernel that predicts contacts of disks, which all search methods share.
 module neighbour_search
   use images, only: image_t
   use kinds, only: int32, never, real64
@@ -9,55 +9,55 @@ module neighbour_search
   public :: event_t, prospect_t, earliest_contact, event_of, list_capacity, latest_clock, no_gravity, wins
 
   integer(int32), parameter :: list_capacity = 64
-  !> What a caller knows beforehand, as a sum, so that the compiler makes a version of the kernel without the rest:
-  !> no disk has a later clock than the one in question, which is now; nothing falls.
+  !> Conditions that a caller guarantees, as a sum of flags. The compiler generates versions of the kernel that omit the
+  !> corresponding parts: no candidate has a later clock than the disk, whose clock is `now`; there is no gravity.
   integer(int32), parameter :: latest_clock = 1, no_gravity = 2
-  real(real64), parameter :: margin_of_times = 32*epsilon(1.0_real64)    !! above all rounding in the kernel
+  real(real64), parameter :: margin_of_times = 32*epsilon(1.0_real64)    !! larger than all rounding errors in the kernel
 
-  !> An event that a disk expects.
+  !> A predicted event.
   type :: event_t
     real(real64) :: time = 0.0_real64         !! since the epoch [time]
-    integer(int32) :: disk = 0                !! who expects it
-    integer(int32) :: partner = 0             !! whom it meets: a disk (> 0) or a code (<= 0)
+    integer(int32) :: disk = 0                !! disk that stores the event
+    integer(int32) :: partner = 0             !! its partner: a disk (> 0) or a code (<= 0)
   end type event_t
 
-  !> What a disk may meet next: the earliest event known, and other disks that might come before it. Not
-  !> initialised, as one is made for each prediction.
+  !> The prospect of a disk: its earliest known event, and candidates that it may touch before. Not initialised, because one is
+  !> created in each prediction.
   type :: prospect_t
-    real(real64) :: time                      !! of the earliest event [time]
-    integer(int32) :: partner                 !! whom it meets then
-    integer(int32) :: disk                    !! whose prospect this is
-    integer(int32) :: cell                    !! number of the disk's cell
+    real(real64) :: time                      !! time of the earliest event [time]
+    integer(int32) :: partner                 !! partner in this event
+    integer(int32) :: disk                    !! disk for which the prediction is made
+    integer(int32) :: cell                    !! number of its cell
     integer(int32) :: n                       !! number of candidates
     integer(int32) :: list(list_capacity)     !! (n) candidates, counted from 0
   end type prospect_t
 
 contains
 
-  !> The earliest contact of a disk with the candidates, if it precedes the event known so far.
+  !> Finds the earliest contact of a disk with the candidates, if it precedes the earliest event known so far.
   !>
-  !> The time is a pure function of the states of the two disks: both are advanced to the later of their clocks,
-  !> and every term keeps its value, or changes sign, when they trade places. So it is the same to the last bit
-  !> whenever, and for whichever of the two, it is predicted. Of simultaneous contacts one `wins`. A
-  !> contact time before `now` is a rounding artefact: after a perfectly inelastic collision two disks stay in contact
-  !> to the last bits, and shifting one by a period can change those bits. Then the contact is now or never, and as the
-  !> shift is an event with a prediction, that is decided then, whoever looks at the pair later.
+  !> The time is a pure function of the states of the two disks: both are advanced to the later of their clocks, and each term keeps
+  !> its value, or changes its sign, if the disks are exchanged. The result is therefore bit-identical, whenever and for whichever
+  !> of the two disks it is predicted. The order of simultaneous contacts is defined by `wins`. A contact time before `now` results
+  !> from rounding: after a perfectly inelastic collision two disks stay in contact to the last bits, and a shift of one disk by a
+  !> period can change these bits. The contact then occurs either now or never. As the shift is an event with a prediction, this is
+  !> decided at once, and later predictions do not change it.
   !>
-  !> The root of |dx + dv s| = sigma is c/(sqrt(disc) - b), which does not cancel near contact, and the discriminant
-  !> sigma**2 dv**2 - (dx x dv)**2, which does not cancel for distant grazing pairs. Disks that touch, or overlap by
-  !> rounding, and approach collide now.
+  !> The root of |dx + dv s| = sigma is c/(sqrt(disc) - b), which is free of cancellation near contact. The discriminant sigma**2
+  !> dv**2 - (dx x dv)**2 is free of cancellation for distant grazing pairs. Disks that touch, or overlap by rounding, and approach
+  !> collide now.
   !>
-  !> Most candidates fail one combined test: the root is not real, or not before the best so far, or not before the
-  !> candidate's own event, when the candidate will predict again with the disk among its candidates. A root before t
-  !> needs c < -2 b (t - late), here with a margin above rounding.
+  !> Most candidates fail one combined test: the root is not real, or not before the best one so far, or not before the event of the
+  !> candidate. (In the last case the candidate predicts again after its event, with the disk among its candidates.) A root before t
+  !> requires c < -2 b (t - late), which is tested with a margin above rounding errors.
   pure subroutine earliest_contact(disk, tag, near, now, gravity, known, image)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, counted from 0
     type(tag_t), intent(in) :: tag(*)
-    type(prospect_t), intent(inout) :: near   !! the disk itself is harmless among the candidates
+    type(prospect_t), intent(inout) :: near   !! the disk itself may be among the candidates
     real(real64), value :: now                !! [time]
     real(real64), intent(in) :: gravity(2)
     integer(int32), value :: known            !! 0, `latest_clock`, `no_gravity`, or their sum
-    type(image_t), intent(in), optional :: image   !! through which the candidates are seen
+    type(image_t), intent(in), optional :: image   !! image through which the candidates are seen
     real(real64) :: xi, yi, ui, vi, clock, ri, x, y, u, v, xj, yj, uj, vj, clock_j, rj, late, si, sj, dx, dy, du, dv
     real(real64) :: sigma2, b, c, disc, t_j, best, latest, from, margin, in_time
     integer(int32) :: k, n, j, partner
@@ -72,7 +72,7 @@ contains
     do k = 1, n
       j = near%list(k)
       call read_state(disk(j), xj, yj, uj, vj, clock_j, rj)
-      if (.not. fresh) then                   ! else the same numbers come out, with si = 0
+      if (.not. fresh) then                   ! with si = 0 the results would be the same
         late = merge(clock, clock_j, clock > clock_j)
         from = 2*late - margin
         si = late - clock
@@ -98,12 +98,12 @@ contains
       in_time = merge(in_time, disc, in_time < disc)
       if (in_time > 0 .and. b < 0) then
         t_j = late + max(c, 0.0_real64)/(sqrt(min(disc, b*b)) - b)
-        if (t_j < now .and. .not. fresh) then ! by rounding: the contact is over, or else it is now
+        if (t_j < now .and. .not. fresh) then ! by rounding: the contact is over, or occurs now
           t_j = merge(2*never, now, b + (du*du + dv*dv)*(now - late) >= 0)
         end if
         if (t_j < best) then
           best = t_j; partner = j + 1
-        else if (.not. t_j > best) then       ! seldom
+        else if (.not. t_j > best) then       ! rare
           if (wins(event_t(t_j, near%disk, j + 1), event_t(t_j, near%disk, partner), tag)) partner = j + 1
         end if
       end if
@@ -111,7 +111,7 @@ contains
     near%time = best; near%partner = partner
   end subroutine earliest_contact
 
-  !> The state of a disk as scalars.
+  !> Returns the state of a disk as scalars.
   pure subroutine read_state(d, x, y, u, v, clock, radius)
     type(disk_t), intent(in) :: d
     real(real64), intent(out) :: x, y, u, v, clock, radius
@@ -121,10 +121,10 @@ contains
     clock = d%clock; radius = d%radius
   end subroutine read_state
 
-  !> A coordinate after the time s; a straight line takes fewer operations and gives the same number.
+  !> A coordinate after the time s. On a straight line fewer operations give the same result.
   elemental function moved(x, v, g, s, falling) result(there)
     real(real64), intent(in) :: x, v, g, s
-    logical, intent(in) :: falling            !! otherwise g is zero
+    logical, intent(in) :: falling            !! .false.: g is zero
     real(real64) :: there
 
     if (falling) then
@@ -134,7 +134,7 @@ contains
     end if
   end function moved
 
-  !> The velocity after the time s, likewise.
+  !> A velocity component after the time s, likewise.
   elemental function sped_up(v, g, s, falling) result(after)
     real(real64), intent(in) :: v, g, s
     logical, intent(in) :: falling
@@ -144,7 +144,7 @@ contains
     if (falling) after = flight_velocity(v, g, s)
   end function sped_up
 
-  !> The event of disk i.
+  !> The event that disk i stores.
   pure function event_of(disk, i) result(event)
     type(disk_t), intent(in) :: disk(*)
     integer(int32), intent(in) :: i
@@ -153,8 +153,8 @@ contains
     event = event_t(disk(i)%event_time, i, disk(i)%partner)
   end function event_of
 
-  !> Whether, of two simultaneous events, the first comes first, wherever one has to: by the lower id of the disks concerned,
-  !> then by the higher one, which is 0 for a single disk.
+  !> Whether event a precedes the simultaneous event b: the order is by the lower id of the disks involved,
+  !> then by the higher id, which is 0 for a single disk.
   pure function wins(a, b, tag) result(yes)
     type(event_t), intent(in) :: a, b
     type(tag_t), intent(in) :: tag(*)
@@ -166,7 +166,7 @@ contains
     yes = ids_a(1) < ids_b(1) .or. (ids_a(1) == ids_b(1) .and. ids_a(2) < ids_b(2))
   contains
 
-    !> The lower and the higher id.
+    !> The lower and the higher id of the disks in an event.
     pure function ids_of(event) result(ids)
       type(event_t), intent(in) :: event
       integer(int32) :: ids(2)

@@ -1,5 +1,5 @@
-!> Which disks a piston may strike before long. It may strike any disk sooner or later, but until it has moved by the width of
-!> a cell only those in a strip of columns or rows (`cell_faces: find_strips`): no other disk has to be tested against it.
+!> The disks that a piston may touch in the near future. In the long run it may touch any disk, but until it has moved by the width
+!> of a cell only those in a strip of columns or rows (`cell_faces: find_strips`). Only these are tested against it.
 module piston_strips
   use kinds, only: int16, int32
   use cell_grid, only: cell_grid_t
@@ -12,10 +12,10 @@ module piston_strips
 
 contains
 
-  !> The disks that a piston may strike before it leaves its strip.
+  !> Lists the disks that a piston may touch before it leaves its strip.
   function near_piston(self, k) result(disks)
     class(cell_grid_t), intent(in) :: self
-    integer, intent(in) :: k                       !! number of the side
+    integer, intent(in) :: k                       !! index of the side
     integer(int32), allocatable :: disks(:)
     integer(int32) :: n, across, along, i, c, m
     integer :: axis, high
@@ -35,7 +35,7 @@ contains
         do m = 1, self%cells%cell(c)%in_slots()
           call add(self%cells%cell(c)%slot(m) + 1)
         end do
-        i = self%cells%chain(c)                    ! which is in a slot as well
+        i = self%cells%chain(c)                    ! the first one is also in a slot
         if (i > 0) i = self%cells%next(i)
         do while (i > 0)
           call add(i)
@@ -59,7 +59,7 @@ contains
     end subroutine add
   end function near_piston
 
-  !> A piston leaves its strip: finds the next one, and the disks in both, which are to be predicted.
+  !> Finds the next strip of a piston that leaves its strip, and the disks in both strips, which have to be predicted again.
   subroutine change_strips(self, sim, disks)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

@@ -1,8 +1,8 @@
-!> What may reach into which cell, besides the small disks around it: obstacles, and a few big disks among many small ones.
+!> Objects that reach into cells besides the small disks: obstacles, and a few big disks among many small ones.
 !>
-!> The cells are made for the small disks. A big one is listed in every cell from which a small one could touch it while
-!> it stays within a margin of where it was then. So a small disk finds big ones in its own cell, and a big disk searches
-!> the cells along its rim: no disk pays for sizes that do not occur nearby.
+!> The width of the cells is chosen for the small disks. A big disk is listed in each cell from which a small disk could touch it
+!> while it stays within a margin around its listed position. A small disk therefore finds big ones in its own cell, and a big disk
+!> searches the cells along its boundary. The cost for a disk depends only on the sizes of disks near it.
 module reach_lists
   use kinds, only: int16, int32, real64
   use cell_faces, only: cell_faces_t, patch_t
@@ -15,35 +15,36 @@ module reach_lists
   private
   public :: largest_small_radius, place_t, reach_lists_t
 
-  integer(int32), parameter :: most_big_disks = 256    !! they test each other all with all
+  integer(int32), parameter :: most_big_disks = 256    !! each of them is tested against all others
 
-  !> A cell that something reaches into.
+  !> A cell into which an object reaches.
   type :: place_t
-    integer(int32) :: cell(2) = 0                !! column, row
-    integer(int32) :: image(2) = 0               !! periods from there to where it is seen from the cell
+    integer(int32) :: cell(2) = 0                !! column and row
+    integer(int32) :: image(2) = 0               !! displacement in periods of the object as seen from the cell
   end type place_t
 
-  !> Something in the list of a cell.
+  !> An object in the list of a cell.
   type :: entry_t
-    integer(int32) :: code = 0                   !! a big disk (> 0) or an obstacle (<= 0)
+    integer(int32) :: code = 0                   !! index of a big disk (> 0), or code of an obstacle (<= 0)
     integer(int32) :: image(2) = 0
-    integer(int32) :: next = 0                   !! entry in the same list; 0: none
+    integer(int32) :: next = 0                   !! next entry in the same list; 0: none
   end type entry_t
 
   type :: big_disk_t
-    integer(int32) :: disk = 0                   !! which disk it is
-    real(real64) :: centre(2) = 0.0_real64       !! where it was when it was listed [length]
+    integer(int32) :: disk = 0                   !! index of the disk
+    real(real64) :: centre(2) = 0.0_real64       !! listed position [length]
     type(place_t), allocatable :: rim(:)
   end type big_disk_t
 
   type :: reach_lists_t
     type(big_disk_t), allocatable :: big(:)
-    real(real64) :: margin = 0.0_real64          !! of big disks [length]
-    integer(int32), allocatable :: first(:, :)   !! (columns,rows) first entry of a cell; 0: none. Not there if nothing reaches
+    real(real64) :: margin = 0.0_real64          !! margin around the listed positions of big disks [length]
+    integer(int32), allocatable :: first(:, :)  !! (columns,rows) first entry of each cell; 0: none. Not allocated if there are no
+                                                !! such objects
     type(entry_t), allocatable :: entry(:)
-    integer(int32), private :: vacant = 0        !! first of the entries not in use
-    type(patch_t), private :: patch              !! the cells for which obstacles are listed
-    real(real64), private :: span(2, 2) = 0.0_real64     !! of these cells together [length]
+    integer(int32), private :: vacant = 0        !! head of the list of free entries
+    type(patch_t), private :: patch              !! cells for which obstacles are listed
+    real(real64), private :: span(2, 2) = 0.0_real64     !! corners of these cells together [length]
   contains
     procedure :: serves
     procedure :: renew
@@ -56,7 +57,7 @@ module reach_lists
 
 contains
 
-  !> The largest radius among the disks that cells should be made for: all, unless a few are much bigger.
+  !> The radius for which the cells are made: the largest one, unless a few disks are much bigger than the others.
   pure function largest_small_radius(disk) result(radius)
     type(disk_t), intent(in) :: disk(:)
     real(real64) :: radius, next
@@ -71,7 +72,7 @@ contains
     end do
   end function largest_small_radius
 
-  !> Whether obstacles are listed, for these cells.
+  !> Whether the obstacles are already listed for these cells.
   pure function serves(self, patch, faces) result(yes)
     class(reach_lists_t), intent(in) :: self
     type(patch_t), intent(in) :: patch
@@ -82,7 +83,7 @@ contains
     if (yes) yes = self%patch%equals(patch) .and. all(abs(span_of(patch, faces) - self%span) <= 0)
   end function serves
 
-  !> The lower left and upper right corner of all cells.
+  !> The lower left and the upper right corner of all cells together.
   pure function span_of(patch, faces) result(span)
     type(patch_t), intent(in) :: patch
     type(cell_faces_t), intent(in) :: faces
@@ -92,7 +93,7 @@ contains
     call faces%rectangle(patch%whole, patch%whole, other, span(:, 2))
   end function span_of
 
-  !> Lists the obstacles, and the disks bigger than those that the cells are made for.
+  !> Lists the obstacles, and the disks that are bigger than those for which the cells are made.
   subroutine renew(self, sim, patch, faces)
     class(reach_lists_t), intent(out) :: self
     type(simulation_t), intent(in) :: sim
@@ -115,7 +116,7 @@ contains
     call self%renew_big(sim, patch, faces)
   end subroutine renew
 
-  !> Lists the big disks anew, whose numbers may have changed.
+  !> Lists the big disks again. Their indices may have changed.
   subroutine renew_big(self, sim, patch, faces)
     class(reach_lists_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -139,7 +140,7 @@ contains
     end do
   end subroutine renew_big
 
-  !> The cells in which small disks may touch big ones.
+  !> The cells in which small disks may touch big disks.
   pure function rims(self) result(places)
     class(reach_lists_t), intent(in) :: self
     type(place_t), allocatable :: places(:)
@@ -151,17 +152,17 @@ contains
     end do
   end function rims
 
-  !> Whether anything reaches into a cell.
+  !> Whether an object reaches into a cell.
   pure function has_any(self, cell) result(yes)
     class(reach_lists_t), intent(in) :: self
-    integer(int16), intent(in) :: cell(2)          !! column and row, from 1
+    integer(int16), intent(in) :: cell(2)          !! column and row, counted from 1
     logical :: yes
 
     yes = allocated(self%first)
     if (yes) yes = self%first(cell(1), cell(2)) > 0
   end function has_any
 
-  !> Which of the big disks disk i is; 0 if none.
+  !> Index of disk i among the big disks; 0 if it is not big.
   pure function number_of(self, i) result(k)
     class(reach_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -172,7 +173,7 @@ contains
     end do
   end function number_of
 
-  !> Lists the k-th big disk where it is now.
+  !> Lists the k-th big disk at its present position.
   subroutine follow(self, sim, k, patch, faces)
     class(reach_lists_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -188,7 +189,7 @@ contains
     end associate
   end subroutine follow
 
-  !> Finds the cells in which a small disk can be that touches an outline, wherever it has moved within a margin.
+  !> Finds the cells in which a small disk may touch an outline that has moved by up to a margin.
   subroutine find_places(shape, margin, patch, faces, places)
     class(shape_t), intent(in) :: shape
     real(real64), intent(in) :: margin             !! [length]
@@ -215,7 +216,8 @@ contains
 
   contains
 
-    !> Finds the cells in a block of them, which is halved until the outline does not pass through it, or it is one cell.
+    !> Finds such cells in a block of cells, which is halved recursively until the outline does not cross it, or it is a single
+    !> cell.
     recursive subroutine search_block(low, high)
       integer(int32), intent(in) :: low(2), high(2)  !! first and last column and row
       real(real64) :: lower(2), upper(2), beyond(2), half(2), d(2)
@@ -244,7 +246,7 @@ contains
     end subroutine search_block
   end subroutine find_places
 
-  !> Enters something into the lists of some cells, behind what is there: obstacles come first, in their order.
+  !> Appends an object to the lists of some cells. Obstacles come first, in their order.
   pure subroutine enter(self, code, places)
     class(reach_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: code
@@ -276,7 +278,7 @@ contains
     end do
   end subroutine enter
 
-  !> Takes it out of the lists of these cells.
+  !> Removes an object from the lists of some cells.
   pure subroutine leave(self, code, places)
     class(reach_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: code
