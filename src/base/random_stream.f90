@@ -1,9 +1,9 @@
-!> Reproducible random numbers: xoshiro256** (Blackman and Vigna, ACM Trans. Math. Softw. 47, 36
-!> (2021)), seeded by SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), so that consecutive seeds give
-!> unrelated streams. A stream is a value: a copy continues with the same numbers as the original.
+!> Reproducible random numbers: xoshiro256** (Blackman and Vigna, ACM Trans. Math. Softw. 47, 36 (2021)), seeded by SplitMix64
+!> (Steele, Lea and Flood, OOPSLA 2014), so that consecutive seeds give unrelated streams. A stream is a value: a copy continues
+!> with the same numbers as the original.
 !>
-!> Both generators work modulo 2**64. Fortran has no unsigned integers, and overflow of signed ones is
-!> not allowed, so sums and products are formed in a longer integer.
+!> Both generators work modulo 2**64. Fortran has no unsigned integers, and overflow of signed ones is not allowed, so sums and
+!> products are formed in a longer integer.
 module random_stream
   use kinds, only: int32, int64, int128, real64
   implicit none
@@ -137,9 +137,8 @@ contains
     e = e/sqrt(s)
   end subroutine draw_direction
 
-  !> Two independent Gaussian deviates of mean 0 and variance 1, by the polar method (Marsaglia and
-  !> Bray, SIAM Rev. 6, 260 (1964)). Their last bit may depend on the mathematical library, because a
-  !> logarithm is taken.
+  !> Two independent Gaussian deviates of mean 0 and variance 1, by the polar method (Marsaglia and Bray, SIAM Rev. 6, 260 (1964)).
+  !> Their last bit may depend on the mathematical library, because a logarithm is taken.
   pure subroutine draw_normals(self, z)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: z(2)

@@ -1,6 +1,5 @@
-!> Services of the operating system that Fortran lacks: a monotonic clock, terminals, file locks,
-!> atomic renames, free disk space, and an exit that prints nothing. Parts that need a C header are in
-!> `system_calls.c`.
+!> Services of the operating system that Fortran lacks: a monotonic clock, terminals, file locks, atomic renames, free disk space,
+!> and an exit that prints nothing. Parts that need a C header are in `system_calls.c`.
 module system
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_double, c_int, c_int64_t, c_null_char, c_size_t
   use, intrinsic :: iso_fortran_env, only: error_unit
@@ -326,8 +325,7 @@ contains
     text = buffer(:index(buffer, c_null_char) - 1)
   end function last_problem
 
-  !> Acquires the lock file `path` for this process. On a file system without locks the run
-  !> continues without one.
+  !> Acquires the lock file `path` for this process. On a file system without locks the run continues without one.
   subroutine acquire(self, path, problem)
     class(lock_t), intent(inout) :: self
     character(len=*), intent(in) :: path

@@ -24,8 +24,7 @@ module epochs
 
 contains
 
-  !> Chooses the length of the first epoch from an estimate of the event rate, and the time within which no disk moves
-  !> noticeably.
+  !> Chooses the length of the first epoch from an estimate of the event rate, and the time within which no disk moves noticeably.
   pure subroutine begin_first_epoch(sim)
     type(simulation_t), intent(inout) :: sim
     real(real64) :: fastest, mean

@@ -1,8 +1,8 @@
 !> Event-driven dynamics: exact trajectories from event to event. Each disk stores one event, its earliest. When it is due, the
 !> disks involved collide, and their next events are predicted.
 !>
-!> An event becomes stale when its partner collides with another disk first. Stale events are not searched for. They are
-!> recognised by the collision counter of the partner when they are due; the disk then only predicts its next event.
+!> An event becomes stale when its partner collides with another disk first. Stale events are not searched for. They are recognised
+!> by the collision counter of the partner when they are due; the disk then only predicts its next event.
 module event_driven
   use kinds, only: int32, int64, never, real64
   use box_sides, only: side_time

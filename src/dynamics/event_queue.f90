@@ -1,9 +1,8 @@
 !> The event queue: a calendar combined with a heap (G. Paul, J. Comput. Phys. 221, 615 (2007)).
 !>
 !> Events of the current time window are in a short sorted list; if it grows too long, the heap is used until the window is done.
-!> Later events are in the calendar, or in the heap if their bucket is full. Single entries are never searched or
-!> removed: an entry is valid only if it still equals the event that its disk stores. Without the calendar all events are in
-!> the heap.
+!> Later events are in the calendar, or in the heap if their bucket is full. Single entries are never searched or removed: an entry
+!> is valid only if it still equals the event that its disk stores. Without the calendar all events are in the heap.
 module event_queue
   use kinds, only: int32, int64, never, real64
   use calendar, only: bucket_capacity, bucket_t, calendar_t, events_per_window, most_coming, window_none

@@ -1,9 +1,9 @@
 !> Decides when a run ends: when the first rule in the input is met, or when rounding errors dominate.
 !>
-!> In a periodic box inelastic disks cool until they all move with the common velocity that rounding has
-!> left. The temperature loses its precision long before that; the run then ends. This
-!> is tested when the epoch has moved, so that the end depends on the trajectory alone. The energy is compared with that
-!> of the velocities that were set last, because precision is lost only from then on.
+!> In a periodic box inelastic disks cool until they all move with the common velocity that rounding has left. The temperature loses
+!> its precision long before that; the run then ends. This is tested when the epoch has moved, so that the end depends on the
+!> trajectory alone. The energy is compared with that of the velocities that were set last, because precision is lost only from then
+!> on.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use epochs, only: is_at_rest, stands_still

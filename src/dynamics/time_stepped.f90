@@ -1,6 +1,6 @@
-!> Time-stepped dynamics: exact free flight over a fixed step; then each disk beyond a wall is reflected, and each
-!> pair that overlaps and approaches collides once. A contact is detected up to one step late, and a short one not at all.
-!> The method serves for comparisons with event-driven dynamics.
+!> Time-stepped dynamics: exact free flight over a fixed step; then each disk beyond a wall is reflected, and each pair that
+!> overlaps and approaches collides once. A contact is detected up to one step late, and a short one not at all. The method serves
+!> for comparisons with event-driven dynamics.
 !>
 !> As in event-driven dynamics the state of a disk changes only in its own collisions, so that errors of steps do not accumulate.
 module time_stepped

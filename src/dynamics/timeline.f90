@@ -196,8 +196,7 @@ contains
   end function passed_collapse
 
   !> The advice to set a contact duration: much longer than a collapse, and much shorter than the mean time between collisions, as
-  !> far
-  !> as it is known.
+  !> far as it is known.
   pure function longer_contacts(sim) result(text)
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text

@@ -1,7 +1,7 @@
 !> An open HDF5 file: creating, opening, renaming, flushing and closing it, groups in it, and hard links.
 !>
-!> The first failed call is recorded, and all later calls do nothing. A writer therefore need not test every
-!> call: `report` returns the recorded failure at the end.
+!> The first failed call is recorded, and all later calls do nothing. A writer therefore need not test every call: `report` returns
+!> the recorded failure at the end.
 module hdf5_handle
   use, intrinsic :: iso_c_binding, only: c_int
   use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, &
@@ -80,8 +80,7 @@ contains
     end if
   end subroutine check
 
-  !> Returns the recorded failure, if any, as an error. It names the file, the action, and the reason or the free space
-  !> on the disk.
+  !> Returns the recorded failure, if any, as an error. It names the file, the action, and the reason or the free space on the disk.
   subroutine report(self, error)
     class(hdf5_handle_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error

@@ -20,8 +20,7 @@ module hdf5_objects
 
   integer, parameter :: scalar(0) = [integer ::]  !! extents of a single value
 
-  ! Limits on the texts in a file. No output of this program exceeds them; the sizes that a damaged file states are not
-  ! trusted.
+  ! Limits on the texts in a file. No output of this program exceeds them; the sizes that a damaged file states are not trusted.
   integer(int64), parameter :: most_texts = 10000
   integer(size_t), parameter :: longest_text = 67108864      !! [bytes]
 

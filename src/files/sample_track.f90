@@ -1,8 +1,8 @@
-!> Series that are filled together: frames, observables, or events. A counter in the file holds the number of complete
-!> samples. It is written after the values have been flushed; readers and resumed runs rely on it.
+!> Series that are filled together: frames, observables, or events. A counter in the file holds the number of complete samples. It
+!> is written after the values have been flushed; readers and resumed runs rely on it.
 !>
-!> A sample is an array of reals that contains the values of all series in turn. Integers are exact up to
-!> 2**53. Small samples are buffered, because one HDF5 call costs as much time as writing a hundred kilobytes.
+!> A sample is an array of reals that contains the values of all series in turn. Integers are exact up to 2**53. Small samples are
+!> buffered, because one HDF5 call costs as much time as writing a hundred kilobytes.
 module sample_track
   use kinds, only: int64, real64
   use hdf5_objects, only: hdf5_file_t, scalar

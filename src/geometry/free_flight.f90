@@ -88,10 +88,10 @@ contains
     end if
   end function time_to_circle
 
-  !> The same on a parabola. F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic. It is monotonic between the roots of F',
-  !> which in turn are bracketed by the roots of the quadratic F''. Each root is therefore
-  !> found by bisection in an interval that contains exactly one root, and the first contact cannot be missed. F itself is evaluated
-  !> from the actual position, so that a small circle is not lost in the square of its distance.
+  !> The same on a parabola. F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic. It is monotonic between the roots of F', which in
+  !> turn are bracketed by the roots of the quadratic F''. Each root is therefore found by bisection in an interval that contains
+  !> exactly one root, and the first contact cannot be missed. F itself is evaluated from the actual position, so that a small
+  !> circle is not lost in the square of its distance.
   pure function time_to_circle_falling(d, v, g, rho, inside) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside

@@ -1,8 +1,8 @@
 !> Periodic images of the box: their displacements and velocities. Used by the search, the start, obstacles and collisions.
 !>
-!> In a sheared box (Lees and Edwards, J. Phys. C 5, 1921 (1972)) the image above moves along x. The position of an image
-!> depends on the time alone: it follows from its displacement at the epoch and its velocity. The separation of two disks through an
-!> image is therefore a function of their states and of the time.
+!> In a sheared box (Lees and Edwards, J. Phys. C 5, 1921 (1972)) the image above moves along x. The position of an image depends on
+!> the time alone: it follows from its displacement at the epoch and its velocity. The separation of two disks through an image is
+!> therefore a function of their states and of the time.
 module images
   use kinds, only: never, real64
   implicit none

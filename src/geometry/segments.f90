@@ -1,8 +1,8 @@
 !> Straight walls between two points, impenetrable from both sides. Disks also collide with their ends.
 !>
-!> A disk touches the wall when its centre reaches the stadium around it: two straight sides at the distance of
-!> the radius, and two half circles around the ends. The stadium is convex. Its straight sides are therefore only
-!> entered from outside, and a disk that misses them by rounding touches a half circle at the same time.
+!> A disk touches the wall when its centre reaches the stadium around it: two straight sides at the distance of the radius, and two
+!> half circles around the ends. The stadium is convex. Its straight sides are therefore only entered from outside, and a disk that
+!> misses them by rounding touches a half circle at the same time.
 module segments
   use free_flight, only: flight, time_to_circle, time_to_line
   use images, only: images_t

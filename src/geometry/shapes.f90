@@ -95,8 +95,7 @@ contains
   end function magnitude
 
   !> Vector from the middle of the nearest image to x. Obstacles that enclose disks have no images. If x is in the middle between
-  !> two
-  !> images, both of which a disk may touch, `heading` selects the image from which it points away.
+  !> two images, both of which a disk may touch, `heading` selects the image from which it points away.
   pure function from_nearest(self, x, images, heading) result(d)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]

@@ -1,9 +1,9 @@
 !> Motion of a side of the box, and the time when it touches a disk in free flight. All quantities are components along the inner
 !> normal of the side.
 !>
-!> Where the acceleration of a disk relative to the side has a constant sign, their gap is a convex or concave function of time,
-!> and its first zero can be bracketed. A period consists of a few such intervals. No contact can therefore be missed, however long
-!> the side and the disk stay close together.
+!> Where the acceleration of a disk relative to the side has a constant sign, their gap is a convex or concave function of time, and
+!> its first zero can be bracketed. A period consists of a few such intervals. No contact can therefore be missed, however long the
+!> side and the disk stay close together.
 module side_motion
   use free_flight, only: flight, flight_velocity, time_to_line
   use kinds, only: never, pi, real64

@@ -1,10 +1,10 @@
-!> Checkpoints: the variable state of a simulation and the progress of its output, stored in the output file. A resumed run
-!> yields data that are bit-identical to those of an uninterrupted run.
+!> Checkpoints: the variable state of a simulation and the progress of its output, stored in the output file. A resumed run yields
+!> data that are bit-identical to those of an uninterrupted run.
 !>
-!> During a run its file has two slots for checkpoints. One of them is valid, the next checkpoint is written to the other. When
-!> it has reached the disk completely, a number in the file is changed and makes it the valid one. A complete checkpoint
-!> therefore exists at every moment. Each has a checksum. A finished file keeps one slot. The file of a run that broke off
-!> has no valid checkpoint.
+!> During a run its file has two slots for checkpoints. One of them is valid, the next checkpoint is written to the other. When it
+!> has reached the disk completely, a number in the file is changed and makes it the valid one. A complete checkpoint therefore
+!> exists at every moment. Each has a checksum. A finished file keeps one slot. The file of a run that broke off has no valid
+!> checkpoint.
 module checkpoint
   use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int8

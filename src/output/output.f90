@@ -1,5 +1,5 @@
-!> Output of a run: decides when something is written, and manages the file. During the run its name is OUT.h5.part, and a lock
-!> file keeps other runs away; the name OUT.h5 means that the run has finished.
+!> Output of a run: decides when something is written, and manages the file. During the run its name is OUT.h5.part, and a lock file
+!> keeps other runs away; the name OUT.h5 means that the run has finished.
 !>
 !> The layout of a file never changes. If the number of samples is known at the start, the file has space for exactly these.
 !> Otherwise a new file replaces it, by an atomic renaming, when the space is used up and at the end.

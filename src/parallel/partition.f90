@@ -125,11 +125,11 @@ contains
     end do
   end function tally_now
 
-  !> Runs successive windows in all domains while they are valid, until a limit is reached or the caller has waited long
-  !> enough. A window ends early at the limit of a count. `good` is .true. if all windows are valid.
+  !> Runs successive windows in all domains while they are valid, until a limit is reached or the caller has waited long enough. A
+  !> window ends early at the limit of a count. `good` is .true. if all windows are valid.
   !>
-  !> The threads synchronise twice in each window: before the domains are compared, and before the states used in the comparison
-  !> are changed.
+  !> The threads synchronise twice in each window: before the domains are compared, and before the states used in the comparison are
+  !> changed.
   subroutine run_windows(self, sim, limits, most, t, windows, good)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

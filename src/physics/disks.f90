@@ -16,8 +16,7 @@ module disks
     real(real64) :: v(2) = 0.0_real64           !! velocity at `clock` [length/time]
     real(real64) :: clock = 0.0_real64          !! time at which x and v were set, since the epoch [time]
     real(real64) :: radius = 0.0_real64         !! [length]
-    ! Derived data. The collision counter (changes of x and v in this epoch), by which stale events are recognised, and the
-    ! next
+    ! Derived data. The collision counter (changes of x and v in this epoch), by which stale events are recognised, and the next
     ! event, as predicted by the search.
     integer(int32) :: stamp = 0
     integer(int32) :: partner = 0               !! index of a disk (> 0), or another code of `partners`

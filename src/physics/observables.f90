@@ -1,5 +1,4 @@
-!> Observables other than frames: averages over disks, totals, and the counters and sums over
-!> collisions.
+!> Observables other than frames: averages over disks, totals, and the counters and sums over collisions.
 module observables
   use kinds, only: int32, real64
   use box_geometry, only: box_t, free_area

@@ -89,8 +89,7 @@ contains
       v = sim%box%side_velocity(1 - code, t)
       given = dot_product(disk%v - before, normal)*mass/(mass + motion%mass)
       disk%v = disk%v - given*normal
-      ! The piston is placed at the disk, as computed in `side_time`; otherwise rounding would separate it from a disk at
-      ! rest.
+      ! The piston is placed at the disk, as computed in `side_time`; otherwise rounding would separate it from a disk at rest.
       side%position = merge(disk%x(axis) - (sim%box%lower(axis) + disk%radius), &
         (sim%box%upper(axis) - disk%radius) - disk%x(axis), sense_of(code) < 0)
       side%velocity = min(v - given, dot_product(disk%v, normal))       ! not faster than the disk by rounding

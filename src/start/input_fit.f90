@@ -29,8 +29,7 @@ module input_fit
 
 contains
 
-  !> Completes the settings with values from starting files and with drawn radii, and selects the features of
-  !> the run.
+  !> Completes the settings with values from starting files and with drawn radii, and selects the features of the run.
   subroutine complete_settings(settings, groups, problems, complete)
     type(settings_t), intent(inout) :: settings
     type(group_t), intent(inout) :: groups(:)

@@ -11,8 +11,7 @@ module memory
   private
   public :: check_memory, free_memory, room_for_domains
 
-  ! Memory per disk with the serial engine, per disk with domains, and independent of disks, measured with 100 000 to a
-  ! million
+  ! Memory per disk with the serial engine, per disk with domains, and independent of disks, measured with 100 000 to a million
   ! disks. [bytes]
   integer(int64), parameter :: per_disk = 410, per_shared_disk = 540, besides = 25000000
   integer(int64), parameter :: per_list = 270    !! neighbour list of a disk, used where sizes differ

@@ -216,8 +216,7 @@ contains
     end subroutine append_cells
   end subroutine list_neighbours
 
-  !> Whether a single disk or obstacle excludes disks of this radius from the whole rectangle
-  !> `centre` +- `half`.
+  !> Whether a single disk or obstacle excludes disks of this radius from the whole rectangle `centre` +- `half`.
   pure function covers(self, by, centre, half, radius) result(yes)
     class(packing_t), intent(in) :: self
     integer(int32), intent(in) :: by                !! index of a disk (> 0), or code of an obstacle

@@ -1,8 +1,8 @@
 !> Placement of all disks.
 !>
-!> Species with fixed positions ('explicit', 'file', 'grid', 'lattice') come first, in the order of the
-!> input. Then follow 'random' species, the largest disks first, and finally 'dense' and 'grown' species. Species
-!> with the same region grow together, around the disks that have been placed before.
+!> Species with fixed positions ('explicit', 'file', 'grid', 'lattice') come first, in the order of the input. Then follow 'random'
+!> species, the largest disks first, and finally 'dense' and 'grown' species. Species with the same region grow together, around the
+!> disks that have been placed before.
 module placement
   use images, only: images_t
   use kinds, only: int32, int64, pi, real64

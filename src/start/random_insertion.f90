@@ -1,10 +1,9 @@
-!> Random sequential insertion: each disk is inserted at a point that is uniform among all points where it fits between
-!> the previous disks. Attempts are drawn only from voxels (small rectangles) of the region
-!> that no single disk covers completely, and voxels are halved when attempts fail too often. Attempts outside of these voxels
-!> would always be rejected, so that the distribution is that of simple insertion, up to
-!> saturation (Zhang and Torquato, Phys. Rev. E 88, 053312 (2013)).
-!> If radii differ, the largest disks come first. A voxel without space for one disk may have space for a smaller one:
-!> voxels are then not eliminated, and insertion ends when a disk does not fit in many attempts.
+!> Random sequential insertion: each disk is inserted at a point that is uniform among all points where it fits between the previous
+!> disks. Attempts are drawn only from voxels (small rectangles) of the region that no single disk covers completely, and voxels are
+!> halved when attempts fail too often. Attempts outside of these voxels would always be rejected, so that the distribution is that
+!> of simple insertion, up to saturation (Zhang and Torquato, Phys. Rev. E 88, 053312 (2013)). If radii differ, the largest disks
+!> come first. A voxel without space for one disk may have space for a smaller one: voxels are then not eliminated, and insertion
+!> ends when a disk does not fit in many attempts.
 module random_insertion
   use kinds, only: int32, real64
   use packing, only: packing_t
@@ -90,8 +89,7 @@ contains
     end do
   end subroutine insert_at_random
 
-  !> Order of disks by decreasing radius, with a resolution of a thousandth of the range of radii. Equal disks keep their
-  !> order.
+  !> Order of disks by decreasing radius, with a resolution of a thousandth of the range of radii. Equal disks keep their order.
   pure function largest_first(radius) result(order)
     real(real64), intent(in) :: radius(:)           !! [length]
     integer(int32), parameter :: classes = 1000
