@@ -23,6 +23,7 @@ from ricochet.analysis.crater import (
     crater,
     ended_by_time,
     energy_fraction,
+    enough_disks,
     projectile,
 )
 from ricochet.analysis.statistics import (
@@ -52,6 +53,7 @@ EXTENTS = {"width": "width of the displaced", "depth": "depth of the displaced"}
 EXTENTS |= {"hole_width": "width of the hole", "hole_depth": "depth of the hole"}
 ALL = SIZES | EXTENTS
 MARKERS = "osDv"
+FEWEST_POINTS = 3  # of a fit
 
 
 class Point(NamedTuple):
@@ -119,6 +121,33 @@ def unused(points: list[Point], scans: Scans) -> list[str]:
     ]
 
 
+def fitted_values(curve: list[Point], axis: str) -> int:
+    """Return the number of different parameters of the points that a fit can use."""
+    return len({p.values[axis] for p in curve if p.free})
+
+
+def unfitted(scans: Scans, runs: list[Run]) -> list[str]:
+    """Return why curves have no fit, and the beds that would have one."""
+    notes, fraction = [], energy_fraction(runs[0])
+    for axis, curve in ((axis, curve) for axis, scan in scans.items() for curve in scan):
+        cut = [p for p in curve if not p.free]
+        if fitted_values(curve, axis) >= FEWEST_POINTS or not cut:
+            continue
+        what = f"no fit against {axis}: {len(cut)} of {len(curve)} points are cut short"
+        if timed := sum(p.by_time for p in cut):
+            what += f"; {timed} ended by time: raise stop.time"
+        by_box = [p.values for p in cut if not p.by_time]
+        sizes = [enough_disks(v["mass"], v["restitution"], fraction) for v in by_box]
+        if sizes and np.isfinite(max(sizes)):
+            number = 100 * int(np.ceil(max(sizes) / 100))
+            what += f"; the crater reaches the box in {len(sizes)}: take about {number} disks"
+            what += f" instead of {span(np.array([run.n_disks - 1 for run in runs]))}"
+        elif sizes:
+            what += f"; the crater reaches the box in {len(sizes)}, as it would in any bed"
+        notes.append(what)
+    return notes
+
+
 def fewest(curve: list[Point]) -> int:
     """Return the smallest number of runs of a point that is fitted."""
     return min(p.runs for p in curve if p.free)
@@ -164,8 +193,11 @@ def draw_size(
         axes.plot(inside, fit(abscissa(axis, inside)), color=style["color"], lw=1)
     else:
         axes.plot(x, y, color=style["color"], lw=0.8, alpha=0.4)
-    axes.errorbar(x[free], y[free], error[free], ls="", **style)
-    axes.errorbar(x[~free], y[~free], error[~free], ls="", **{**style, "label": ""}, mfc="white")
+    open_style = style | {"mfc": "white"}
+    if free.any():  # the legend has the symbol of most points
+        axes.errorbar(x[free], y[free], error[free], ls="", **style)
+        open_style["label"] = ""
+    axes.errorbar(x[~free], y[~free], error[~free], ls="", **open_style)
 
 
 def draw_sizes(axes: plt.Axes, axis: str, scan: list[list[Point]], names: dict, own: list) -> None:
@@ -247,7 +279,8 @@ def main() -> None:
     points = [point(*one) for one in grouped(args.runs, key_of)]
     scans = scanned(points)
     *results, missed = tables(scans)
-    report(args, draw(args.runs, scans), *results, notes=[*unused(points, scans), *missed])
+    notes = [*unfitted(scans, args.runs), *unused(points, scans), *missed]
+    report(args, draw(args.runs, scans), *results, notes=notes)
 
 
 if __name__ == "__main__":

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import cooling as cooling_figure
-from ricochet import read_run, script
-from synthetic_run import run_script, write_run
+from ricochet import crater, read_run, script
+from synthetic_run import ROOT, run_script, write_run
 
 
 @pytest.fixture
@@ -114,3 +114,23 @@ def test_the_total_energy_has_a_linear_panel_for_each_time_step(tmp_path, rng, f
     assert first.get_ylabel() == "energy of all disks (J)" and len(figure.axes) == 3 + 2 + 1
     assert species.get_xscale() == "linear" and figure.axes[4].get_xscale() == "log"
     assert "only rounding is left" in changes.get_title(loc="left") + changes.get_title()
+
+
+# --- craters ---
+
+
+def test_a_bed_that_is_large_enough_keeps_the_crater_from_the_box(simulated, rng):
+    """Of random projectiles: free in a bed of the estimated size, not in one of half of it."""
+    for _ in range(3):
+        mass, xi = rng.uniform(4, 12), rng.uniform(0.3, 0.7)
+        size = crater.enough_disks(mass, xi, 0.1)
+        for share, taken in ((1.1, False), (0.5, True)):
+            run = simulated(
+                ROOT / "input/crater.nml",
+                f"species.bed.count={round(share * size)}",
+                f"species.projectile.mass={mass}",
+                f"contact.restitution={xi}",
+                f"run.seed={rng.integers(1000)}",
+            )
+            hits = crater.crater(run).side_collisions
+            assert crater.box_takes_part(run, hits) == taken, (mass, xi, share, hits)

@@ -22,6 +22,7 @@ __all__ = [
     "displaced",
     "ended_by_time",
     "energy_fraction",
+    "enough_disks",
     "hole",
     "projectile",
 ]
@@ -56,6 +57,8 @@ QUIET = (
 )
 QUIET += ("time_stepped",)
 FEW_HITS = 0.01  # collisions with walls per disk, up to which the box has no influence
+HIT_OVER_LEAST = 3.4  # disks hit over M (1/f - 1) / (1 - xi^2)
+BED_OVER_HIT = 2.2  # disks of a bed that is large enough over those that are hit
 
 
 def energy_fraction(run: Run) -> float:
@@ -123,6 +126,39 @@ def box_takes_part(run: Run, side_collisions: float) -> bool:
     False
     """
     return side_collisions > FEW_HITS * run.n_disks
+
+
+def enough_disks(mass_ratio: float, restitution: float, fraction: float) -> float:
+    """Estimate how many disks a bed must have for the crater not to reach the box.
+
+    The projectile hits about 3.4 M (1/f - 1) / (1 - xi^2) disks of a bed that is large enough, and
+    the bed must have 2.2 times as many.  Both factors are measured: beds in the lower half of a
+    square box at a packing of 0.5, M from 10 to 50, xi from 0.3 to 0.8, radius ratios from 2 to 10
+    and f = 0.1.
+
+    Parameters
+    ----------
+    mass_ratio : float
+        M, mass of the projectile over that of a bed disk
+    restitution : float
+        xi, below 1
+    fraction : float
+        f, share of the energy at which the run ends
+
+    Returns
+    -------
+    float
+        number of disks; infinite for elastic disks, or where the run does not end by its energy
+
+    Examples
+    --------
+    >>> round(enough_disks(25, 0.5, 0.1))
+    2244
+    """
+    if restitution >= 1 or fraction <= 0:
+        return float("inf")
+    hit = HIT_OVER_LEAST * mass_ratio * (1 / fraction - 1) / (1 - restitution**2)
+    return BED_OVER_HIT * hit
 
 
 def projectile(run: Run) -> int:
