@@ -2,7 +2,8 @@
 
     python post/gravity.py runs/gravity/long.h5 -o gravity.png --csv gravity.csv
 
-kT is the mean of the kinetic energy in equilibrium, which is found or begins after --equilibration.
+kT is the mean of the kinetic energy in equilibrium, which is found or begins after --equilibration;
+the figure and the second table say why the frames before it are left out.
 The solid laws are P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT) for the height
 h of the centre above its lowest position.  They hold for many disks without size.  The dashed laws
 include two effects.  N disks that share a fixed energy have (1 - e / (2 N kT))^(2 N - 2) instead of
@@ -165,8 +166,11 @@ def draw_histogram(panels, values: np.ndarray, top: float, colour: str, label: s
         bars(axes, height, bins, color=colour, fill=True, alpha=0.3, label=label)
 
 
-def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> plt.Figure:
-    """Draw squared speeds above and heights below; linear left, logarithmic right."""
+def draw(run: Run, species: list[Samples], result: list[dict], began: tuple) -> plt.Figure:
+    """Draw squared speeds above and heights below; linear left, logarithmic right.
+
+    `began` is the time of the first frame, and why those before it are left out.
+    """
     figure, panels = plt.subplots(2, 2, figsize=(11, 8), sharex="row")
     kt, g = result[0]["kT"], float(np.abs(run.gravity[1]))
     squares = np.linspace(0, 18 * kt / min(s.mass for s in species), 1000)
@@ -218,8 +222,11 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
                 [], [], color="black", lw=1, ls="--", label="finite number and size of disks"
             )
             row[1].legend(*(part[-2:] for part in row[1].get_legend_handles_labels()))
-    when, found = f"t = {start:.4g} to {run.time[-1]:g}", (kt, result[0]["kT_error"])
-    figure.suptitle(f"{caption([run])},  {when},  kT = {' ± '.join(rounded_to_error(*found))}")
+    when, found = f"t = {began[0]:.4g} to {run.time[-1]:g}", (kt, result[0]["kT_error"])
+    figure.suptitle(
+        f"{caption([run])},  {when},  kT = {' ± '.join(rounded_to_error(*found))}\n"
+        f"left out before: {began[1]}"
+    )
     return figure
 
 
@@ -228,7 +235,7 @@ def main() -> None:
     (run,) = args.runs
     known = "walls", "gravity", "mixture", "thermal_walls", "thermostatted", "time_stepped"
     allow(run, "it follows no exponential laws", *known)
-    start = thermodynamics.start_of_equilibrium(run, args.equilibration)
+    start, reason = thermodynamics.explained_start(run, args.equilibration)
     frames = thermodynamics.frames_from(run, start)
     if not run.gravity[1] or not frames:
         raise RunError(f"{run.path}: needs gravity along y and frames in equilibrium")
@@ -239,7 +246,9 @@ def main() -> None:
         notes += statistics.diagnostics(f"height of {kind.label}", [mean])
     if (share := crowding(run, species, result[0]["kT"])) > CROWDED:
         notes.append(f"points would take {share:.2g} of the area at the floor: no law of heights")
-    report(args, draw(run, species, result, run.time[frames[0]]), result, notes=notes)
+    began = float(run.time[frames[0]]), reason
+    told = [{"equilibrium_from": began[0], "frames": len(frames), "left_out_before": reason}]
+    report(args, draw(run, species, result, began), result, told, notes=notes)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cooling as cooling_figure
-from ricochet import crater, read_run, script
+from ricochet import crater, read_run, script, thermodynamics
 from synthetic_run import ROOT, run_script, write_run
 
 
@@ -134,3 +134,28 @@ def test_a_bed_that_is_large_enough_keeps_the_crater_from_the_box(simulated, rng
             )
             hits = crater.crater(run).side_collisions
             assert crater.box_takes_part(run, hits) == taken, (mass, xi, share, hits)
+
+
+# --- where equilibrium begins ---
+
+
+def test_the_reason_of_the_start_names_what_drifts(tmp_path, rng):
+    """Each quantity in turn relaxes for longer than speeds remember, all else is steady."""
+    time, names = np.arange(2001.0), ("a", "b")
+    found = {
+        f"{k}/{e}_energy": 1 + 0.01 * rng.normal(size=2001)
+        for k in names
+        for e in ("kinetic", "potential")
+    }
+    v = rng.normal(size=(2, 4, 2))
+    for late in sorted(found):
+        slow = found | {late: found[late] + np.exp(-time / 100)}
+        slow |= {"collisions": 2 * time}
+        more = {"observables": slow, "observable_time": time, "species": [1, 1, 2, 2]}
+        more |= {"names": names, "parameters": {"box": {"gravity": [0.0, -1.0]}}}
+        run = read_run(write_run(tmp_path / "run.h5", 0 * v + 0.5, v, time=time[[0, -1]], **more))
+        start, why = thermodynamics.explained_start(run)
+        name, kind = late.removesuffix("_energy").split("/")
+        assert start > 200 and f"the {kind} energy of {name} drifts" in why
+        assert start == thermodynamics.start_of_steady_state(run)
+    assert thermodynamics.explained_start(run, 20.0) == (20.0, "--equilibration 20")

@@ -120,24 +120,52 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
     >>> bool(0 < start < run.time[-1])
     True
     """
-    if skip is not None or run.nature.cooling:
-        return after_start(run, skip)
+    return explained_start(run, skip)[0]
+
+
+def explained_start(run: Run, skip: float | None = None) -> tuple[float, str]:
+    """Return the time from which a run is steady, and why the samples before it are left out."""
+    forgets = f"{SPEEDS_FORGET:g} collisions per disk, by which speeds forget the start"
+    if skip is not None:
+        return after_start(run, skip), f"--equilibration {skip:g}"
+    if run.nature.cooling:
+        return after_start(run), forgets
+    time, series = examined(run)
+    if not series:
+        later = max(float(time[-1] / 2), after_start(run))
+        return later, "half of the time: too few samples to see a drift"
+    last = {name: equilibration(values) for name, values in series.items()}
+    slowest = max(last, key=last.__getitem__)
+    drifts, early = float(time[last[slowest]]), after_start(run)
+    if drifts <= early:
+        return early, forgets
+    return drifts, f"the {slowest} drifts until then, or fluctuates so slowly that it may"
+
+
+def examined(run: Run) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return times (T,), and by name the series (T - 1,) that show whether a run is steady.
+
+    There are none if samples are few.
+    """
     few = has_few_observables(run)
     time = run.time if few else run.collisions_per_disk.time
     if len(time) < 2 * FEWEST:
-        return max(float(time[-1] / 2), after_start(run))
+        return time, {}
     apart = np.maximum(np.diff(time), 1e-9 * np.mean(np.diff(time)))  # two samples at one time
-    series = [np.diff(run.collisions_per_disk_at(time)) / apart]
-    if len(run.names) > 1 or not run.nature.keeps_kinetic_energy:
-        if few:
-            energy = np.array([run.kinetic_energy(frame) for frame in range(1, run.n_frames)])
-            series += [energy[:, kind.disks].mean(axis=1) for kind in run.by_species]
-        else:
-            kinds = ("kinetic_energy", "rotational_energy", "potential_energy")
-            known = {f"{name}/{kind}" for name in run.names for kind in kinds} & {*run.observables}
-            series += [run.observable(name).value[1:] for name in sorted(known)]
-    first = max(equilibration(values) for values in series)
-    return max(float(time[first]), after_start(run))
+    series = {"collision rate": np.diff(run.collisions_per_disk_at(time)) / apart}
+    if len(run.names) == 1 and run.nature.keeps_kinetic_energy:
+        return time, series
+    if few:
+        energy = np.array([run.kinetic_energy(frame) for frame in range(1, run.n_frames)])
+        return time, series | {
+            f"kinetic energy of {kind.name}": energy[:, kind.disks].mean(axis=1)
+            for kind in run.by_species
+        }
+    for name in sorted(run.names):
+        for kind in ("kinetic", "potential", "rotational"):
+            if (known := f"{name}/{kind}_energy") in run.observables:
+                series[f"{kind} energy of {name}"] = run.observable(known).value[1:]
+    return time, series
 
 
 def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
