@@ -1,5 +1,5 @@
-!> The engine for other programs, in C: `ricochet.h` is the contract, and says what each function does. A handle is a
-!> simulation at work. Nothing here prints, ends the process, or is shared by two handles.
+!> The C interface for other programs. `ricochet.h` is its contract and describes each function. A handle is an open simulation. The
+!> functions print nothing, do not end the process, and share no data between handles.
 module library
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_int64_t, c_loc, &
@@ -32,15 +32,16 @@ module library
   private
   public :: answer, begin, session_of, session_t, text_of
 
-  integer(c_int), parameter :: going_on = 1          !! the answer of `advance` that is no exit code
-  integer(int64), parameter :: longest_look = 2000000 !! ahead, for what may never come [events, kicks of a disk]
+  integer(c_int), parameter :: going_on = 1          !! the only result of `advance` that is not an exit code
+  integer(int64), parameter :: longest_look = 2000000 !! largest number of events, and of kicks of a disk, for which future
+                                                      !! collisions are searched
 
   type :: session_t
     type(run_input_t) :: input
     type(simulation_t) :: sim
     class(evolution_t), allocatable :: evolution
     type(stop_rule_t) :: rule
-    integer(int64) :: turns = 1                       !! between two looks at the clock
+    integer(int64) :: turns = 1                       !! number of iterations between two checks of the clock
   end type session_t
 
 contains
@@ -65,10 +66,10 @@ contains
     code = answer(error, message, room)
   end function open_simulation
 
-  !> Starts the engine of a simulation that is there, and hands it over; after an error it takes it away.
+  !> Starts the engine of a new simulation and returns its handle; after an error the simulation is deallocated.
   function begin(session, threads, error) result(handle)
     type(session_t), pointer, intent(inout) :: session
-    integer(c_int), intent(in) :: threads             !! 0: as in the input, or one
+    integer(c_int), intent(in) :: threads             !! number of threads; 0: the value of the input, or one
     type(error_t), allocatable, intent(in) :: error
     type(c_ptr) :: handle
     character(len=:), allocatable :: warning
@@ -138,7 +139,7 @@ contains
     code = answer(error, message, room)
   end function advance
 
-  !> See ricochet.h. The changed input has a text of its own, which the next change and a saved file start from.
+  !> See ricochet.h. The changed input is stored as a new text, on which later changes and saved files are based.
   function change(handle, overrides, message, room) bind(C, name="ricochet_change") result(code)
     type(c_ptr), value :: handle
     character(kind=c_char), intent(in) :: overrides(*)
@@ -191,12 +192,11 @@ contains
     code = answer(error, message, room)
   end function change
 
-  !> Whether no value differs between the present input and a changed one. A side that the present one does not name has
-  !> the defaults.
+  !> Whether a changed input has the same values as the present one. A side that is not in the present input has the default values.
   function changes_nothing(session, lines, input) result(yes)
     type(session_t), intent(in) :: session
-    type(text_t), intent(in) :: lines(:)              !! GROUP.VARIABLE=VALUE
-    type(run_input_t), intent(in) :: input            !! the changed one
+    type(text_t), intent(in) :: lines(:)              !! changes as GROUP.VARIABLE=VALUE
+    type(run_input_t), intent(in) :: input            !! changed input
     logical :: yes, complete, new(size(lines))
     type(run_input_t) :: present
     type(problem_list_t) :: problems
@@ -214,7 +214,7 @@ contains
     present%overrides = pack(lines, new)
     do k = 1, size(present%overrides)
       associate (override => present%overrides(k))
-        override%text = override%text(:index(override%text, "="))      ! without a value
+        override%text = override%text(:index(override%text, "="))      ! without a value: the default
       end associate
     end do
     call read_groups(input_of(session%input%groups), present%overrides, present%groups, problems, complete)
@@ -223,12 +223,12 @@ contains
     if (yes) yes = same_values(present%groups, input%groups)
   end function changes_nothing
 
-  !> Gives sides whose motion changes the position from which the new motion continues where the old one is now.
+  !> Sets the positions of sides whose motion changes, such that the new motion continues from the present position.
   subroutine keep_sides(session, groups)
     type(session_t), intent(in) :: session
-    type(group_t), intent(inout) :: groups(:)         !! of the changed input
+    type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
     character(len=10), parameter :: of_motion(4) = [character(len=10) :: "motion", "velocity", "start_time", "end_time"]
-    real(real64) :: at(2, 2), x, start, passed        ! (axis, lower or upper), of the side [length]; [time]
+    real(real64) :: at(2, 2), x, start, passed        ! position (axis, lower or upper) and position of one side [length]; [time]
     integer :: g, k, old, side, inwards
     logical :: same
 
@@ -248,7 +248,7 @@ contains
           end associate
         end do
         if (same) cycle
-        inwards = 2*modulo(side, 2) - 1               ! along the axis
+        inwards = 2*modulo(side, 2) - 1               ! direction along the axis
         x = at((side + 1)/2, merge(1, 2, inwards > 0))
         position%given = any(group%text_of("motion") == [character(len=17) :: "still", "constant_velocity", "piston"])
         call position%clear()
@@ -298,7 +298,7 @@ contains
     code = answer(error, message, room)
   end function give_velocities
 
-  !> The changes so far.
+  !> The list of changes so far.
   function changes_of(session) result(list)
     type(session_t), intent(in) :: session
     character(len=:), allocatable :: list
@@ -310,7 +310,7 @@ contains
   !> Reports speeds and energies that are out of range after a change.
   subroutine check_motion(sim, path, error)
     type(simulation_t), intent(in) :: sim
-    character(len=*), intent(in) :: path              !! of the input
+    character(len=*), intent(in) :: path              !! path of the input
     type(error_t), allocatable, intent(out) :: error
     type(problem_list_t) :: problems
 
@@ -318,7 +318,7 @@ contains
     call problems%report(path, error)
   end subroutine check_motion
 
-  !> Continues with a changed state.
+  !> Continues the simulation with a changed state.
   subroutine renew(session, sim)
     type(session_t), intent(inout) :: session
     type(simulation_t), intent(in) :: sim
@@ -381,7 +381,7 @@ contains
       if (size(list) == 0) return
       width = list(1)%width
       sample = frame_sample(sim, 0_int64, list)
-      values(:width*n) = sample(3:, 1)                ! behind step and time
+      values(:width*n) = sample(3:, 1)                ! the first two numbers are step and time
     end associate
   end function copy_column
 
@@ -433,7 +433,8 @@ contains
           do k = 1, size(groups(g)%values)
             if (.not. groups(g)%values(k)%is_set()) cycle
             most = most_written
-            if (any(obstacle_groups == groups(g)%name)) most = huge(most)          ! the geometry of a file, as a whole
+            ! All values, because they describe the geometry from a file.
+            if (any(obstacle_groups == groups(g)%name)) most = huge(most)
             call growing%add(groups(g)%value_line(k, most)//eol)
           end do
         end do
@@ -449,7 +450,7 @@ contains
     if (room > length) call give(words, text, room)
   end function copy_text
 
-  !> See ricochet.h. What comes is found by a copy that goes on: a disk may collide twice, and a kick may come between.
+  !> See ricochet.h. The collisions are found by advancing a copy, because a disk may collide twice, or be kicked in between.
   function next_events(handle, most, records) bind(C, name="ricochet_next_events") result(n)
     type(c_ptr), value :: handle
     integer(c_int), value :: most
@@ -489,7 +490,7 @@ contains
     call c_f_pointer(handle, session)
   end function session_of
 
-  !> The exit code of an error, with its message; 0 if there is none.
+  !> Copies the message of an error and returns its exit code; 0 if there is no error.
   function answer(error, message, room) result(code)
     type(error_t), allocatable, intent(in) :: error
     character(kind=c_char), intent(inout) :: message(*)
@@ -503,11 +504,11 @@ contains
     call give(error%message, message, room)
   end function answer
 
-  !> Hands a text over, cut if there is no room for it.
+  !> Copies a text into a C buffer; it is cut if the buffer is too short.
   subroutine give(text, buffer, room)
     character(len=*), intent(in) :: text
     character(kind=c_char), intent(inout) :: buffer(*)
-    integer(c_int), intent(in) :: room                !! with the end mark [bytes]
+    integer(c_int), intent(in) :: room                !! size of the buffer, including the terminating zero [bytes]
     integer :: k
 
     if (room < 1) return
@@ -517,7 +518,7 @@ contains
     buffer(min(len(text), room - 1) + 1) = c_null_char
   end subroutine give
 
-  !> A text of C.
+  !> Converts a C string to a Fortran text.
   function text_of(bytes) result(text)
     character(kind=c_char), intent(in) :: bytes(*)
     character(len=:), allocatable :: text

@@ -12,8 +12,8 @@ program main
 
 contains
 
-  !> Answers a question or performs a run. All variables live here, not in the main program, so that they
-  !> are freed.
+  !> Answers a question or performs a run. All variables are local to this procedure and not to the main program, so that they are
+  !> deallocated.
   subroutine serve()
     type(command_t) :: command
     type(run_input_t) :: input

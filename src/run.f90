@@ -1,4 +1,4 @@
-!> One run, from the input file to the finished output.
+!> Performs one run, from the input file to the finished output.
 module run
   use, intrinsic :: iso_fortran_env, only: error_unit
   use cadence, only: progress_t
@@ -27,8 +27,8 @@ module run
   private
   public :: perform_run
 
-  integer, parameter :: most_unwritten = 4096              !! collisions in the event log
-  integer(int64), parameter :: much = 250000000             !! of output, to say so before it is written [bytes]
+  integer, parameter :: most_unwritten = 4096              !! capacity of the event log [collisions]
+  integer(int64), parameter :: much = 250000000             !! size of the output above which it is announced [bytes]
 
   type :: run_t
     type(command_t) :: command
@@ -39,14 +39,14 @@ module run
     type(stop_rule_t) :: stop_rule
     type(output_t) :: output
     type(progress_line_t) :: line
-    real(real64) :: started = 0.0_real64                   !! by the clock of `seconds` [s]
+    real(real64) :: started = 0.0_real64                   !! time when the program started, by the clock `seconds` [s]
     real(real64) :: rate = 0.0_real64                      !! collisions per processor time of this part [1/s]
-    integer(int64) :: alone = 0                            !! events of this part on one core, where there are more
+    integer(int64) :: alone = 0  !! number of events of this part executed by the serial engine of a parallel run
   end type run_t
 
 contains
 
-  !> Reads the input and runs it; `error` carries the exit status also of a run that was stopped.
+  !> Reads the input and performs the run. `error` also carries the exit status of a run that was stopped.
   subroutine perform_run(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
@@ -88,7 +88,7 @@ contains
     call run%output%release()
   end subroutine perform_run
 
-  !> Creates the state of a new run and opens its output; with --check says only that all is well.
+  !> Creates the state of a new run and opens its output. With --check it only reports that the input is valid.
   subroutine begin(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
@@ -118,7 +118,7 @@ contains
     end associate
   end subroutine begin
 
-  !> Restores the state of a run and opens its output; with --check says only that it can go on.
+  !> Restores the state of a run and opens its output. With --check it only reports that the run can be resumed.
   subroutine go_on(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
@@ -145,7 +145,7 @@ contains
     end associate
   end subroutine go_on
 
-  !> Warns of what is legal but rarely meant.
+  !> Prints warnings about settings that are legal but rarely sensible.
   subroutine warn(run)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
@@ -156,7 +156,7 @@ contains
       "warning: nothing moves at the start: stop.energy_fraction is met at once"
   end subroutine warn
 
-  !> Follows the simulation to its end, and measures how fast it is.
+  !> Advances the simulation to its end and measures the speed.
   subroutine follow(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
@@ -170,10 +170,10 @@ contains
     call cpu_time(cpu(2))
     run%rate = (run%sim%tally%collisions - collisions)/max(cpu(2) - cpu(1), 1.0e-9_real64)
     run%alone = run%evolution%alone
-    deallocate (run%evolution)                             ! the end of the output needs room
+    deallocate (run%evolution)                             ! releases memory for the end of the output
   end subroutine follow
 
-  !> What the output says of this part of the run: see `write_end`.
+  !> Cost of this part of the run, for the output: see `write_end`.
   function cost_of(run) result(cost)
     type(run_t), intent(in) :: run
     real(real64) :: cost(3)
@@ -181,7 +181,7 @@ contains
     cost = [seconds() - run%started, run%rate, real(run%alone, real64)]
   end function cost_of
 
-  !> Advances the simulation from one thing that is due to the next, until its end.
+  !> Main loop: advances the simulation from one sample, checkpoint or check to the next, until its end.
   subroutine main_loop(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
@@ -190,7 +190,7 @@ contains
     integer :: requests, requests_served
     logical :: stopping
     real(real64) :: now, next_checkpoint              ! [s]
-    real(real64) :: first_time                        ! of the simulation [time]
+    real(real64) :: first_time                        ! time of the simulation at the beginning of this part [time]
 
     turns = 1
     requests_served = 0
@@ -199,7 +199,8 @@ contains
     call run%line%start(run%sim, run%stop_rule, run%started)
     limits%time = run%sim%time()
     call run%output%tighten(limits)
-    ! Where nothing can happen any more a run ends with a sample; one that was stopped right after it has to know.
+    ! If no event can occur any more, the run ends with a sample. A run that was stopped just after this sample detects it
+    ! here.
     if (run%sim%settled .and. limits%sampled >= run%sim%time()) call advance_once(run%evolution, run%sim, limits, error)
     do while (.not. (run%stop_rule%is_over(run%sim, run%evolution) .or. allocated(error)))
       limits = run%stop_rule%limits
@@ -214,28 +215,28 @@ contains
       if (allocated(error)) exit
       now = seconds()
       stopping = stop_requested()
-      ! However short the wall clock, each part of a run makes some progress.
+      ! Each part of a run makes some progress, however short the wall-clock limit is.
       if (run%sim%time() > first_time .and. now - run%started > run%stop_rule%wall_clock) stopping = .true.
       requests = checkpoint_requests()
       if (stopping .or. requests > requests_served .or. now > next_checkpoint) then
         requests_served = requests
         call run%output%save(run%sim, error)
-        if (stop_requested()) stopping = .true.            ! while it was written
+        if (stop_requested()) stopping = .true.            ! requested during the write
         if (stopping .and. .not. allocated(error)) call fail(error, exit_stopped, "stopped at time "// &
           written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to go on")
         if (allocated(error)) exit
-        next_checkpoint = seconds() + run%input%settings%output%checkpoint_every     ! after a write, however slow
+        next_checkpoint = seconds() + run%input%settings%output%checkpoint_every     ! counted from the end of the write
       end if
       call run%line%report(run%sim, run%stop_rule)
     end do
     call run%line%clear()
   end subroutine main_loop
 
-  !> The results, as lines `key = value`.
+  !> The results as lines `key = value`.
   function summary(run) result(text)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
-    real(real64) :: energy(3)                         ! of translation, of rotation, total
+    real(real64) :: energy(3)                         ! translational, rotational, total [energy]
 
     associate (sim => run%sim)
       energy = energies(sim)
@@ -259,7 +260,7 @@ contains
     if (note(run) /= "") text = text//eol//"note = "//note(run)
   end function summary
 
-  !> What a reader of the results should know: a collapse, and why the run ended if no stop rule was met; else empty.
+  !> A note about the results: collapses, and the reason of the end if no stop rule was met; empty if there is none.
   function note(run) result(text)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text

@@ -1,5 +1,5 @@
-!> From the command line's file to a run: reads and checks the input, builds the state, turns words of the
-!> input into types, and starts the threads. The only place that knows every search and every dynamics.
+!> Sets up a run from an input file: reads and checks the input, creates the initial state, translates words of the input into
+!> types, and starts the threads. Only this module depends on all searches and all kinds of dynamics.
 module run_setup
   use errors, only: error_t
   use event_driven, only: event_driven_t
@@ -29,11 +29,11 @@ module run_setup
 
 contains
 
-  !> Reads the file `path`, applies the overrides and checks everything. If it is to be printed, it is as far as it could be
-  !> understood, right or wrong.
+  !> Reads the file `path`, applies the overrides and checks everything. With `printed` the input is printed as far as it could be
+  !> interpreted, even if it is invalid.
   subroutine read_input(path, overrides, input, error, printed)
     character(len=*), intent(in) :: path
-    type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
+    type(text_t), intent(in) :: overrides(:)                        !! overrides as GROUP.VARIABLE=VALUE
     type(run_input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error
     logical, intent(in), optional :: printed
@@ -43,7 +43,7 @@ contains
     if (.not. allocated(error)) call input_from_text(text, path, overrides, input, error, printed)
   end subroutine read_input
 
-  !> The same for a text; `path` only names it in messages. All problems become one error.
+  !> The same for a text; `path` is used only in messages. All problems are collected in one error.
   subroutine input_from_text(text, path, overrides, input, error, printed, stepped)
     character(len=*), intent(in) :: text
     character(len=*), intent(in) :: path
@@ -63,15 +63,15 @@ contains
     if (.not. allocated(error)) call resolve_input(input, complete, problems, error, stepped)
   end subroutine input_from_text
 
-  !> From the groups of an input to its settings; all problems become one error.
+  !> Converts the groups of an input to settings. All problems are collected in one error.
   subroutine resolve_input(input, complete, problems, error, stepped)
     type(run_input_t), intent(inout) :: input
     logical, intent(inout) :: complete                              !! .false.: parts of the text were skipped
-    type(problem_list_t), intent(inout) :: problems                 !! so far
+    type(problem_list_t), intent(inout) :: problems                 !! in: problems found so far
     type(error_t), allocatable, intent(out) :: error
     logical, intent(in), optional :: stepped                        !! see `resolve_settings`
 
-    if (complete) then                                    ! else what would be missing is there, in parts that were skipped
+    if (complete) then                                    ! otherwise values in skipped parts would be reported as missing
       call resolve_settings(input%groups, input%settings, problems, stepped)
       call complete_settings(input%settings, input%groups, problems, complete)
       if (complete) call check_fit(input%settings, input%groups, problems)
@@ -79,7 +79,7 @@ contains
     call problems%report(input%path, error, input%overrides)
   end subroutine resolve_input
 
-  !> The state at the start of a run, the disks in an order that suits the memory.
+  !> The initial state of a run, with disks sorted for memory access.
   subroutine new_simulation(input, line, sim, error)
     type(run_input_t), intent(inout) :: input
     class(status_line_t), intent(inout) :: line
@@ -90,7 +90,7 @@ contains
     if (.not. allocated(error)) call renumber(sim)
   end subroutine new_simulation
 
-  !> The dynamics that the input names, with its search and queue.
+  !> Creates the dynamics that the input selects, with its search and queue.
   subroutine choose_evolution(settings, evolution)
     type(settings_t), intent(in) :: settings
     class(evolution_t), allocatable, intent(out) :: evolution
@@ -123,10 +123,11 @@ contains
     end if
   end subroutine choose_evolution
 
-  !> Starts the threads of a run, which then has them until it ends. A run that one core does alone takes none.
+  !> Starts the threads of a run, which exist until it ends. A run that uses the serial engine has a single thread.
   subroutine start_threads(settings, warning)
     type(settings_t), intent(inout) :: settings
-    character(len=:), allocatable, intent(out) :: warning  !! of what the user may not have meant; empty if there is nothing
+    character(len=:), allocatable, intent(out) :: warning  !! warning about settings that are probably unintended; empty if there
+                                                           !! are none
     character(len=:), allocatable :: name
     integer :: cores
     type(parallel_events_t) :: usual
@@ -151,9 +152,9 @@ contains
     call make_team(settings%run%threads)
   end subroutine start_threads
 
-  !> How many threads are asked for, and where: in the input, or in the environment. Else it is one.
+  !> Determines the number of threads from the input or the environment; default: one.
   subroutine ask(threads, name)
-    integer, intent(inout) :: threads                      !! in: as in the input; 0: it does not say
+    integer, intent(inout) :: threads                      !! in: number of threads in the input; 0: not given
     character(len=:), allocatable, intent(out) :: name
     character(len=16) :: value
     integer :: status
