@@ -1,65 +1,138 @@
-/* Ricochet for other programs: event-driven simulation of hard disks.
+/* C interface of Ricochet, an event-driven simulation of hard disks.
 
-   A handle is a simulation at work. Any number may be open; each belongs to one thread at a time. No function prints,
-   ends the process (but for memory that the system refuses), or handles signals. A message is the program's own, of up
-   to `room` bytes with the zero at its end; a code is 0 or the program's exit code: 2 bad input, 3 files, 4 broken off.
-   A count or a room below 0 counts as 0.
-   Lengths, times and energies are in the units of the input. Disks are in the order of the input.
+   A complete program, to be compiled with `cc gas.c -lricochet -lm`:
 
-   libricochet.so needs no HDF5. libricochet_files.so has the same functions, its ricochet_open accepts species that start
-   from the file of a run, and it has the functions at the end of this page. A handle of the one is good for the other. */
+       #include <math.h>
+       #include <stdio.h>
+       #include "ricochet.h"
+
+       int main(void)
+       {
+           const char *input = "&box boundary = 'periodic', 'periodic' /\n"
+                               "&species name = 'gas' count = 100 packing_fraction = 0.3 temperature = 1 /\n";
+           char message[400];
+           int code, status;
+           int64_t counts[3];
+           double position[100][2];
+           ricochet *gas = ricochet_open(input, "run.seed=4\n", 1, message, sizeof message, &code);
+
+           if (!gas) {
+               fprintf(stderr, "%s\n", message);
+               return code;
+           }
+           do      // until each disk has had ten collisions on average, in slices of at most 0.1 s
+               status = ricochet_advance(gas, INFINITY, 500, INT64_MAX, 0.1, message, sizeof message);
+           while (status == 1);
+           if (status == 0) {
+               ricochet_count(gas, counts);
+               ricochet_column(gas, "position", position[0]);
+               printf("time %.3f, %lld collisions, first disk at %.3f, %.3f\n", ricochet_time(gas),
+                      (long long)counts[1], position[0][0], position[0][1]);
+           } else {
+               fprintf(stderr, "%s\n", message);
+           }
+           ricochet_close(gas);
+           return status;
+       }
+
+   A handle is an open simulation. Any number of simulations may be open; each of them may be used by one thread at a
+   time. The functions print nothing and do not handle signals. They do not end the process, except when the system has
+   no memory left.
+
+   Lengths, times, masses and energies are in the units of the input. Disks are in the order of the input.
+
+   `message` is a buffer of `room` bytes for an error message, including the zero at its end; a longer message is cut.
+   An exit code is 0 for success, 2 for invalid input, 3 for a file that cannot be read or written, and 4 for a
+   simulation that broke off. Negative values of counts and of `room` are treated as 0.
+
+   libricochet.so does not need HDF5. libricochet_files.so has the same functions and those at the end of this file, and
+   its ricochet_open also accepts species that start from the file of a run. Handles can be passed from one library to
+   the other. */
 #ifndef RICOCHET_H
 #define RICOCHET_H
 #include <stdint.h>
 
 typedef struct ricochet ricochet;
 
-/* A simulation at its start: the text of an input file, which needs no &stop, and overrides GROUP.VARIABLE=VALUE, a line for
-   each. `threads`: 0 takes what the input says, or one. NULL after a failure. */
+/* Opens a simulation in its initial state.
+   text:       contents of an input file; the group &stop may be missing
+   overrides:  lines GROUP.VARIABLE=VALUE, which have precedence over the text; may be empty
+   threads:    number of threads; 0: the value of the input, or one
+   code:       exit code
+   Returns a handle, or NULL after a failure. */
 ricochet *ricochet_open(const char *text, const char *overrides, int threads, char *message, int room, int *code);
 
-/* Frees a simulation; NULL is allowed. */
+/* Closes a simulation and frees its memory. NULL is allowed. */
 void ricochet_close(ricochet *);
 
-/* Goes on until the first of these values is reached, counted from the start of the run: those not wanted are INFINITY
-   and INT64_MAX, and without any the stop rule of the input counts, if it has one. After `patience` seconds it returns 1: call
-   it again. In what parts a simulation advances leaves no trace in it. A time that is NAN is refused with 2; after another
-   code above 1 it cannot go on. */
+/* Advances a simulation until the first of three values is reached, each counted from the start of the run: a time, a number of
+   collisions of disks, or a number of events. INFINITY and INT64_MAX stand for no limit. Without any limit the stop rule of
+   the input is used, if there is one. The results do not depend on the number of calls in which a simulation is advanced.
+   Returns 0 when a limit is reached, 1 if `patience` seconds have passed before (call it again), or an exit code: 2 if `time` is
+   NAN, other codes if the simulation cannot be continued. */
 int ricochet_advance(ricochet *, double time, int64_t collisions, int64_t events, double patience, char *message, int room);
 
+/* Time since the start of the run. */
 double ricochet_time(ricochet *);
-void ricochet_count(ricochet *, int64_t counts[3]);            /* disks; collisions of pairs; of pairs and with surfaces */
 
-/* Copies what frames hold (position, velocity, collisions, image, angular_velocity, orientation), or radius, mass,
-   species: `width` numbers for each disk, one disk after the other. Returns the width, at most 2; 0: it is not there. */
+/* Stores the number of disks, the number of collisions of disks with disks, and the number of events, which includes collisions
+   with sides and obstacles. */
+void ricochet_count(ricochet *, int64_t counts[3]);
+
+/* Copies one property of all disks.
+   name:    position, velocity, event_count, image, angular_velocity, orientation, radius, mass or species
+   values:  array of WIDTH numbers for each disk
+   Returns the width: 2 for position, velocity and image, 1 for the others, or 0 if the disks do not have this property. */
 int ricochet_column(ricochet *, const char *name, double *values);
 
-/* Copies the observables of this moment, at most 4 numbers each, and a line `name width` for each of them; a count has a
-   negative width. Returns the bytes of the names without the zero at their end; without room for all nothing is copied. */
+/* Copies all observables at the present time.
+   names:   buffer of `room` bytes for a line `NAME WIDTH` per observable; the width of an integer observable is negative
+   values:  array of |WIDTH| numbers for each observable, at most 4
+   Returns the length of the names in bytes, without the zero at the end. If `room` is not larger than that, nothing is
+   copied. */
 int ricochet_observables(ricochet *, char *names, int room, double *values);
 
-/* Changes, now, what acts on disks: GROUP.VARIABLE=VALUE, a line for each, of box.gravity, drive, and the laws of contacts,
-   surfaces and their motions. What the change does to the total energy counts as work. Nothing changes after a code. */
+/* Changes forces, contact laws and motions at the present time.
+   overrides:  lines GROUP.VARIABLE=VALUE of box.gravity, drive, contact, side, wall and obstacle
+   The change of the total energy counts as work. Returns an exit code; unless it is 0, nothing is changed. */
 int ricochet_change(ricochet *, const char *overrides, char *message, int room);
 
-/* Gives the disks other velocities, now: x and y of one disk after the other. Likewise. */
+/* Sets the velocities of all disks at the present time.
+   velocities:  x and y component for each disk
+   The change of the total energy counts as work. Returns an exit code; unless it is 0, nothing is changed. */
 int ricochet_set_velocities(ricochet *, const double *velocities, char *message, int room);
 
-/* Copies a text about this moment: `input`, a file with overrides and changes; `parameters`, GROUP.VARIABLE = JSON for each
-   that has a value; `changes`, TIME GROUP.VARIABLE=VALUE for each; `note`, of a collapse that was passed, or of a gas too cold to go on. Returns its bytes
-   without the zero at its end; without room for all nothing is copied. */
+/* Copies a text that describes the simulation at the present time.
+   what:  "input": an input file that includes overrides and changes
+          "parameters": a line GROUP.VARIABLE = JSON for each variable that has a value
+          "changes": a line TIME GROUP.VARIABLE=VALUE for each change
+          "note": a note about inelastic collapses, or about a gas that is too cold to continue; may be empty
+   text:  buffer of `room` bytes
+   Returns the length of the text in bytes, without the zero at the end. If `room` is not larger than that, nothing is
+   copied. */
 int ricochet_text(ricochet *, const char *what, char *text, int room);
 
-/* The next collisions, at most `most`, as in the event log: time, i, j, size and components of the change of momentum.
-   Returns how many there are, fewer if nothing happens for long; -1: time steps do not know. The simulation stays as it is. */
+/* Predicts the next events without changing the simulation.
+   most:     largest number of events
+   records:  for each event the time, i and j, and the magnitude and two components of the momentum change of disk i, as in the
+             event log of a run
+   Returns the number of events, which is smaller than `most` if no event occurs for a long time, or -1 for time-stepped
+   dynamics, which cannot predict events. */
 int ricochet_next_events(ricochet *, int most, double records[][6]);
 
-/* --- libricochet_files.so --- */
+/* --- Only in libricochet_files.so --- */
 
-/* Writes OUT.h5.part, as a run of this input would have left it that was stopped now, but with samples of its start only,
-   or after a change with samples of now only: `ricochet INPUT -o OUT.h5 --resume` goes on from it. `path` is OUT.h5. */
+/* Saves a simulation as the unfinished output of a run that was stopped at the present time. `ricochet INPUT -o OUT.h5 --resume`
+   continues it. The file contains samples of the initial state only or, after a change, of the present state only.
+   path:   path of the finished output, OUT.h5; the file that is written is OUT.h5.part
+   force:  nonzero to replace an existing output
+   Returns an exit code. */
 int ricochet_save(ricochet *, const char *path, int force, char *message, int room);
 
-/* The simulation of the last checkpoint of a run, finished or not. */
+/* Opens a simulation in the state of the last checkpoint of a run, finished or not.
+   path:     output of the run
+   threads:  number of threads; 0: the value of the input, or one
+   code:     exit code
+   Returns a handle, or NULL after a failure. */
 ricochet *ricochet_load(const char *path, int threads, char *message, int room, int *code);
 #endif

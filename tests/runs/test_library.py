@@ -14,6 +14,7 @@ import re
 import signal
 import subprocess
 import sys
+import textwrap
 import threading
 import time
 from pathlib import Path
@@ -481,7 +482,21 @@ def test_the_library_needs_no_hdf5_and_shows_its_functions_only():
     assert "hdf5" not in ran("ldd", path, check=True).stdout
     listed = ran("nm", "-D", "--defined-only", path, check=True).stdout.split()[2::3]
     header = (Path(__file__).resolve().parents[2] / "src/ricochet.h").read_text().split("/* ---")[0]
-    assert sorted(listed) == sorted(re.findall(r"\b(ricochet_\w+)\(", header))
+    assert sorted(listed) == sorted({*re.findall(r"\b(ricochet_\w+)\(", header)})
+
+
+def test_the_example_in_the_header_is_a_complete_program(tmp_path):
+    """It compiles without warnings, and its simulation stops at the number of collisions."""
+    header = Path(__file__).resolve().parents[2] / "src/ricochet.h"
+    folder = Path(library()._name).parent
+    example = re.search(r"^ {7}#include .*?^ {7}\}$", header.read_text(), re.MULTILINE | re.DOTALL)
+    source = tmp_path / "gas.c"
+    source.write_text(textwrap.dedent(example[0]) + "\n")
+    strict = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{header.parent}"]
+    link = [f"-L{folder}", f"-Wl,-rpath,{folder}", "-lricochet", "-lm"]
+    ran("cc", *strict, str(source), "-o", "gas", *link, cwd=tmp_path, check=True)
+    shown = ran(tmp_path / "gas", check=True).stdout
+    assert re.fullmatch(r"time [\d.]+, 500 collisions, first disk at -?[\d.]+, -?[\d.]+\n", shown)
 
 
 def test_a_fork_and_an_interpreter_that_ends_do_no_harm():
