@@ -8,61 +8,67 @@ import subprocess
 import sys
 from pathlib import Path
 
-LAW = "the law of a wall"
+LAW = "Collision rules of boundaries"
 GROUPS = {
-    "run": "What is run, and by which method.",
-    "box": "The box and the gravity in it.",
-    "side": "A side of the box that is a wall, with its motion; repeated for each.",
-    "obstacle": "A circular wall; repeated for each.",
-    "wall": "A straight wall, solid on both sides; disks bounce off its ends as off points. "
-    "Repeated for each.",
-    LAW: "What each `&side`, `&obstacle` and `&wall` may have of its own.",
-    "species": "Disks of one kind; repeated for each.",
-    "contact": "What happens at a contact.",
-    "drive": "Kicks: random changes of velocity at fixed intervals.",
-    "stop": "When the run ends: at the first of these that is met. At least one is needed. Where "
-    "nothing can happen any more and no `time` is given, it ends at the last collision, or at the "
-    "sample that is due after it.",
-    "output": "What is written, and when. The initial and the final state are always written. "
-    "Averages over samples by collisions or events differ from those over time by a part of the "
-    "order 1/N ([output](output.md#observables)).",
+    "run": "Seed, method and number of threads of the run.",
+    "box": "Size of the box, its boundaries, gravity and shear.",
+    "side": "A side of the box that is a wall, with its motion; one group for each side that is "
+    "described. Its collision rule is described [below](#collision-rules-of-boundaries).",
+    "obstacle": "A circular obstacle, or many of them from a file; repeated for each.",
+    "wall": "A straight wall, a polyline, or many walls from a file; repeated for each. Disks "
+    "bounce off both faces and off the end points.",
+    LAW: "Each group `&side`, `&obstacle` and `&wall` may contain these variables. Where they "
+    "are not given, the `wall_...` variables of [`&contact`](#contact) apply.",
+    "species": "Disks of one kind; repeated for each species. At least one is needed.",
+    "contact": "Collision rules of disks, and of boundaries that have none of their own "
+    "([theory](theory.md#contact)).",
+    "drive": "Driving: changes of velocities (kicks) at fixed intervals "
+    "([theory](theory.md#kicks)).",
+    "stop": "End of the run, at the first of these rules that is met. At least one is needed. If "
+    "no further event can occur and no `time` is given, the run ends at the last collision, or "
+    "at the sample that is due after it.",
+    "output": "Contents of the output file, and the times at which they are written. The initial "
+    "and the final state are always written. Averages over samples by collisions or events "
+    "differ from averages over time by a relative amount of order 1/N "
+    "([output](output.md#observables)).",
 }
 
 HEAD = """\
 # Input: every variable
 
-A file consists of groups `&name ... /` with lines `variable = value`; only what differs from the
-default is needed. [input/README](../input/README.md) has the rules, and the ways to describe disks;
-[input/reference.nml](../input/reference.nml) is a file with all variables. `docs/input_page.py`
-writes this page from what the program says of itself.
+This page is the reference for all variables of an input file. [input/README](../input/README.md)
+explains the rules of the format and shows how to describe a system;
+[input/reference.nml](../input/reference.nml) is a file with all variables. The same text for one
+variable is printed by `ricochet --explain VARIABLE`; `--explain WORD` searches names, choices and
+explanations. `docs/input_page.py` generates this page from the table in the program.
 
-On the command line: `--set GROUP.VARIABLE=VALUE`; a species, an obstacle or a wall is addressed by
-its name, as in `--set species.projectile.mass=50`. The file chooses the units of length, time and
-mass. What has no default has an example instead: *e.g.*
+A file consists of groups `&name ... /` with lines `variable = value`. Only values that differ from
+the default are needed. On the command line `--set GROUP.VARIABLE=VALUE` replaces a value. A
+species, an obstacle or a wall is addressed by its name, as in `--set species.projectile.mass=50`,
+and one element of a vector by its number, as in `--set 'box.gravity(2)=-5'`. The file chooses the
+units of length, time and mass.
 
-The last column says when a variable may have another value than at the start: when a run continues
-(`--resume`), because it has no effect on the trajectory; or while a simulation runs, in Python and
-on the laboratory page. All other variables make another run.
+For each variable the page lists the values that are *allowed*, the *default* (if there is none, an
+example), the choice of another variable with which it *applies*, and variables of its group with
+which it may *not* be given *together*. A variable *may change* when a run is continued
+(`--resume`), because it has no effect on the trajectory, or while a simulation runs (in Python and
+on the laboratory page). All other variables are fixed during a run.
 """
 
 
 def said(program: Path, *words: str) -> str:
-    """What the program answers to an option."""
+    """Return the answer of the program to an option."""
     return subprocess.run([program, *words], check=True, capture_output=True, text=True).stdout
 
 
 def variables(program: Path) -> dict[str, dict[str, dict]]:
-    """Group of `GROUPS` -> variable -> all about it, numbers as the program writes them.
+    """Return for each group of `GROUPS` its variables, with numbers as the program writes them.
 
-    What all kinds of walls share stands there once.
+    The variables that all kinds of boundaries share are a group of their own.
     """
     table = json.loads(said(program, "--print-variables"), parse_float=str, parse_int=str)
     walls = [table[group] for group in ("side", "obstacle", "wall")]
-    law = {
-        name: entry
-        for name, entry in walls[0].items()
-        if all(wall.get(name) == entry for wall in walls)
-    }
+    law = {name: entry for name, entry in walls[1].items() if shared(walls, name)}
     for wall in walls:
         for name in law:
             del wall[name]
@@ -78,26 +84,65 @@ def written(entry: dict) -> str:
     return ", ".join(how.format(word.replace("'", "''")) for word in words)
 
 
-def row(name: str, entry: dict) -> str:
-    """A line of the table."""
-    value = "e.g. " * (entry["default"] is None) + f"`{written(entry)}`"
-    meaning = entry["help"] + (f" [{entry['unit']}]" if entry["unit"] else "")
-    change = "`--resume`" * entry["resumable"] + "while it runs" * entry["changeable"]
-    cells = (f"`{name}`", meaning, entry["allowed"], value, change)
-    return "| " + " | ".join(cell.replace("|", "\\|").replace("**", "^") for cell in cells) + " |"
+def shared(walls: list[dict[str, dict]], name: str) -> bool:
+    """Whether all kinds of boundaries have the variable, with the same meaning."""
+    return len({wall[name]["help"] for wall in walls if name in wall}) == 1 and all(
+        name in wall for wall in walls
+    )
+
+
+def condition(group: str, entry: dict) -> str:
+    """The choice with which a variable applies; empty if it always does."""
+    if not entry["goes_with"]:
+        return ""
+    [(choice, words)] = entry["goes_with"].items()
+    text = f"`{choice}` = " + ", ".join(f"`'{word}'`" for word in words)
+    if group == "species":
+        text += f" (if `{choice}` is not given, `'{words[0]}'` follows)"
+    return text
+
+
+def facts(group: str, entry: dict) -> list[str]:
+    """Statements about a variable: allowed values, default, condition, exclusions, changes."""
+    allowed = [f"Allowed: {entry['allowed']}" + f" [{entry['unit']}]" * bool(entry["unit"])]
+    if entry["default"] is not None:
+        default = f"Default: `{written(entry)}`"
+    else:
+        given = "none; must be given" + " where it applies" * bool(entry["goes_with"])
+        default = f"Default: {entry['otherwise'] or given}. Example: `{written(entry)}`"
+    applies = condition(group, entry)
+    excludes = ", ".join(f"`{name}`" for name in entry["excludes"] or [])
+    change = "on `--resume`" * entry["resumable"] + "while a simulation runs" * entry["changeable"]
+    return [
+        *allowed,
+        default,
+        *([f"Applies with: {applies}"] if applies else []),
+        *([f"Not together with: {excludes}"] if excludes else []),
+        *([f"May change: {change}"] if change else []),
+    ]
+
+
+def section(group: str, name: str, entry: dict) -> str:
+    """The section of one variable."""
+    title = name if group == LAW else f"{group}.{name}"
+    meanings = (entry["meanings"] or {}).items()
+    lines = [f"### `{title}`", "", plain(entry["help"]), ""]
+    lines += [f"- `'{word}'`: {plain(meaning)}" for word, meaning in meanings]
+    lines += [""] * bool(meanings) + [plain(". ".join(facts(group, entry)) + "."), ""]
+    return "\n".join(lines)
+
+
+def plain(text: str) -> str:
+    """Text in which Markdown sees no emphasis."""
+    return text.replace("**", "^")
 
 
 def page(program: Path) -> str:
     """The whole page."""
     lines = [HEAD]
     for group, entries in variables(program).items():
-        title = group.capitalize() if group == LAW else f"&{group}"
-        lines += [f"## {title}", "", GROUPS[group], ""]
-        lines += [
-            "| variable | meaning [unit] | allowed | default | may change |",
-            "|---|---|---|---|---|",
-        ]
-        lines += [*(row(*one) for one in entries.items()), ""]
+        lines += [f"## {group}" if group == LAW else f"## &{group}", "", GROUPS[group], ""]
+        lines += [section(group, *one) for one in entries.items()]
     return "\n".join(lines)
 
 

@@ -150,7 +150,7 @@ function buildVariable(key) {
   const menu = type === 'logical' ? ['.true.', '.false.'] : choices?.length && variableOf(key).size === 1 ? choices : null;
   const input = menu ? make('select', { id }, ...['', ...menu].map(word => new Option(word || `(${fallback})`, word))) : make('input', { id, placeholder: fallback, spellcheck: false });
   const row = make('div', { className: 'variable' }, make('label', { htmlFor: id, textContent: nameOf(key) + (unit ? ` [${unit}]` : '') }),
-    input, make('p', { id: id + '.help', textContent: `${help}; allowed: ${allowed}` }), make('p', { className: 'problem' }));
+    input, make('p', { id: id + '.help', textContent: `${help} Allowed: ${allowed}.` }), make('p', { className: 'problem' }));
   row.dataset.place = key;
   input.setAttribute('aria-describedby', id + '.help');
   input.addEventListener('change', () => set(key, input.value.trim()));

@@ -206,7 +206,7 @@ contains
 
     text = "ricochet: event-driven simulation of hard disks"//eol//eol// &
       "usage:  ricochet INPUT.nml [option]..."//eol// &
-      "        ricochet --help | --version | --print-defaults | --explain VARIABLE"//eol//eol// &
+      "        ricochet --help | --version | --print-defaults | --explain WORD"//eol//eol// &
       "  -o, --output FILE   where the results go; default runs/<input name>.h5"//eol// &
       "  --set NAME=VALUE    override a variable of the input, any number of times:"//eol// &
       "                      run.seed=7, box.upper=2,2, species.projectile.mass=50;"//eol// &
@@ -219,7 +219,7 @@ contains
       "  --print-defaults    an input file with every variable and its default"//eol// &
       "  --print-variables   all about every variable, as JSON for other programs"//eol// &
       "  --print-input       what the input and --set give, as JSON; run nothing"//eol// &
-      "  --explain VARIABLE  meaning, range and default of a variable or a group"//eol// &
+      "  --explain WORD      all about a variable or group, or the variables about it"//eol// &
       "  --version           version, commit, compiler, flags and HDF5 version"//eol// &
       "  --                  the next argument is a file name, even with a leading -"//eol//eol// &
       "exit:   0 finished; 2 wrong usage or bad input; 3 cannot read or write a file;"//eol// &

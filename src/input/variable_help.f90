@@ -1,11 +1,12 @@
-!> What the program says of its variables: the reference file, the answers to `--explain`, and JSON for other programs: the
-!> table of variables, and an input as the program has understood it.
+!> Texts about the input variables: the reference file, the answers to `--explain`, and JSON for other programs (the
+!> table of variables, and an input as the program has understood it).
 module variable_help
+  use choices, only: meaning_of
   use errors, only: error_t, exit_usage, fail
   use input_groups, only: group_t, json_text
   use old_names, only: present_names
-  use variables, only: allowed, group_names, in_motion, is_repeated, largest, name_length, on_resume, smallest, table, &
-    variable_t, wall_groups, words_of
+  use variables, only: allowed, either, excluded_by, first_sentence, group_names, in_motion, is_repeated, largest, name_length, &
+    on_resume, smallest, table, variable_t, wall_groups, words_of
   use texts, only: eol, growing_text_t, joined, lower_case, shown, suggestion, wrapped, written, written_exactly
   implicit none
   private
@@ -23,6 +24,7 @@ contains
 
     text = "! Every variable of Ricochet with its default; a file needs only what differs."//eol// &
       "! A variable that is commented out or called an example has no default, or not in all cases."//eol// &
+      "! ricochet --explain VARIABLE says more about each."//eol// &
       "! Groups may be in any order; &side, &obstacle, &wall and &species may be repeated."//eol
     do g = 1, size(group_names)
       text = text//eol//margin(group_names(g))//"&"//trim(group_names(g))//eol
@@ -42,7 +44,7 @@ contains
     if (any(wall_groups == group)) margin = "! "
   end function margin
 
-  !> A variable in the reference file. Its help continues in comment lines, and a choice has one more that lists its words.
+  !> A variable in the reference file, with the first sentence of its help, and its choices if there are any.
   pure function reference_line(row) result(line)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: line
@@ -52,8 +54,8 @@ contains
     if (row%status /= "default" .and. row%status /= "example") indent = "  ! "
     if (any(wall_groups == row%group)) indent = "!   "
     next = padded(margin(row%group))//" ! "
-    meaning = trim(row%help)
-    if (row%status == "example") meaning = "an example: "//meaning
+    meaning = first_sentence(row%help)
+    if (row%status == "example") meaning = "Example. "//meaning
     if (row%unit /= "") meaning = meaning//" ["//trim(row%unit)//"]"
     line = padded(indent//trim(row%name)//" = "//trim(row%value))//" ! "//wrapped(meaning, help_width, next)
     if (row%choices /= "") line = line//eol//next//allowed(row)
@@ -67,49 +69,146 @@ contains
     padded = text//repeat(" ", max(comment_column - len(text), 0))
   end function padded
 
-  !> Answers `--explain`: a variable with or without its group, or a whole group.
+  !> Answers `--explain`: a variable with or without its group, a whole group, or a word that names, choices and helps contain.
   pure subroutine explain(name, text, error)
     character(len=*), intent(in) :: name
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error
-    character(len=len(name)) :: wanted
+    character(len=:), allocatable :: wanted
     character(len=name_length + 9) :: full(size(table))
     integer :: k
 
-    wanted = lower_case(name)
+    wanted = bare(lower_case(trim(name)))
     text = ""
     do k = 1, size(table)
       full(k) = trim(table(k)%group)//"."//table(k)%name
       if (all([character(len=len(full)) :: table(k)%name, table(k)%group, full(k)] /= wanted)) cycle
       if (text /= "") text = text//eol
-      text = text//explanation(table(k))
+      text = text//explanation(k)
     end do
     if (text /= "") return
-    if (present_names(trim(wanted)) /= "") then
-      call fail(error, exit_usage, "--explain "//shown(name)//": is called "//present_names(trim(wanted))//" now")
+    if (present_names(wanted) /= "") then
+      call fail(error, exit_usage, "--explain "//shown(name)//": is called "//present_names(wanted)//" now")
       return
     end if
-    call fail(error, exit_usage, "--explain "//shown(name)//": unknown variable; " &
+    text = matches(wanted)
+    if (text == "") call fail(error, exit_usage, "--explain "//shown(name)//": no variable, choice or help contains this; " &
       //suggestion(wanted, [character(len=len(full)) :: table%name, full, group_names], group_names))
   end subroutine explain
 
-  !> Name and unit of a variable, its meaning, what is allowed, and its default or an example.
-  pure function explanation(row) result(text)
-    type(variable_t), intent(in) :: row
+  !> The name of a variable without the number of an element and the name of a species or boundary:
+  !> `species.velocity` of `species.gas.velocity(2)`.
+  pure function bare(name)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: bare
+    integer :: first, last
+
+    bare = name(:index(name//"(", "(") - 1)
+    first = index(bare, ".")
+    last = index(bare, ".", back=.true.)
+    if (last > first) bare = bare(:first)//bare(last + 1:)
+  end function bare
+
+  !> A line for each variable whose name or help contains a text, and for each such choice.
+  pure function matches(wanted) result(text)
+    character(len=*), intent(in) :: wanted                 !! in lower case
+    character(len=:), allocatable :: text
+    integer :: k, c
+
+    text = ""
+    do k = 1, size(table)
+      associate (row => table(k), full => trim(table(k)%group)//"."//trim(table(k)%name), words => words_of(table(k)%choices))
+        if (has(full) .or. has(row%help)) text = text//eol//full//": "//first_sentence(row%help)
+        do c = 1, size(words)
+          if (has(words(c)) .or. has(meaning_of(row%name, words(c)))) text = text//eol//full//" = '"//trim(words(c))//"': " &
+            //meaning_of(row%name, words(c))
+        end do
+      end associate
+    end do
+    text = text(len(eol) + 1:)
+  contains
+
+    !> Whether a text contains what is wanted; `packing_fraction` and `packing fraction` are the same.
+    pure function has(where) result(yes)
+      character(len=*), intent(in) :: where
+      logical :: yes
+
+      yes = index(spaced(lower_case(where)), spaced(wanted)) > 0
+    end function has
+
+    !> A text with blanks in place of underscores.
+    pure function spaced(name)
+      character(len=*), intent(in) :: name
+      character(len=len(name)) :: spaced
+      integer :: i
+
+      spaced = name
+      do i = 1, len(name)
+        if (name(i:i) == "_") spaced(i:i) = " "
+      end do
+    end function spaced
+  end function matches
+
+  !> All that the table knows about a variable, one fact a line.
+  pure function explanation(k) result(text)
+    integer, intent(in) :: k                               !! row of the table
     character(len=:), allocatable :: text
     character(len=*), parameter :: indent = eol//"    "
+    integer :: c
 
-    text = trim(row%group)//"."//trim(row%name)
-    if (row%unit /= "") text = text//"  ["//trim(row%unit)//"]"
-    text = text//indent//wrapped(row%help, help_width, indent(2:))//indent//"allowed: "//allowed(row)//indent
-    if (row%status == "default" .or. row%status == "fallback") then
-      text = text//"default: "//trim(row%value)
-    else
-      text = text//"example: "//trim(row%value)
-    end if
-    if (row%may_change == on_resume) text = text//indent//"may change on --resume"
-    if (row%may_change == in_motion) text = text//indent//"may change in a running simulation"
+    associate (row => table(k), words => words_of(table(k)%choices))
+      text = trim(row%group)//"."//trim(row%name)
+      if (row%unit /= "") text = text//"  ["//trim(row%unit)//"]"
+      text = text//indent//wrapped(row%help, help_width, indent(2:))//indent//"allowed: "//allowed(row)
+      do c = 1, size(words)
+        text = text//indent//"  "//wrapped("'"//trim(words(c))//"': "//meaning_of(row%name, words(c)), help_width, &
+          indent(2:)//"    ")
+      end do
+      text = text//indent//"default: "//default_of(row)
+      if (row%status /= "default" .and. row%status /= "fallback") text = text//indent//"example: "//trim(row%value)
+      if (condition_of(row) /= "") text = text//indent//"applies with: "//condition_of(row)
+      if (size(excluded_by(k)) > 0) text = text//indent//"not together with: "//joined(excluded_by(k), ", ")
+      text = text//indent//change_text(row)
+    end associate
   end function explanation
+
+  !> The default of a variable, or what applies without it.
+  pure function default_of(row) result(text)
+    type(variable_t), intent(in) :: row
+    character(len=:), allocatable :: text
+
+    if (row%status == "default" .or. row%status == "fallback") then
+      text = trim(row%value)
+    else if (row%otherwise /= "") then
+      text = trim(row%otherwise)
+    else
+      text = "none; must be given"
+      if (row%goes_with /= "") text = text//" where it applies"
+    end if
+  end function default_of
+
+  !> The choice with which a variable has an effect; empty if it always has. In &species the choice may follow from the variable.
+  pure function condition_of(row) result(text)
+    type(variable_t), intent(in) :: row
+    character(len=:), allocatable :: text
+
+    text = ""
+    if (row%goes_with == "") return
+    associate (words => words_of(row%goes_with))
+      text = trim(row%group)//"."//trim(words(1))//" = "//either(words(2:))
+      if (row%group == "species") text = text//"; if "//trim(words(1))//" is not given, '"//trim(words(2))//"' follows"
+    end associate
+  end function condition_of
+
+  !> When a variable may have another value than at the start of a run.
+  pure function change_text(row) result(text)
+    type(variable_t), intent(in) :: row
+    character(len=:), allocatable :: text
+
+    text = "fixed during a run: another value needs a new run"
+    if (row%may_change == on_resume) text = "may change on --resume"
+    if (row%may_change == in_motion) text = "may change in a running simulation (Python, laboratory page); fixed on --resume"
+  end function change_text
 
   !> The table: an object for each group, and in it one for each variable.
   pure function variables_text() result(text)
@@ -123,7 +222,7 @@ contains
       between = eol
       do k = 1, size(table)
         if (table(k)%group /= group_names(g)) cycle
-        text = text//between//"  "//json_text(table(k)%name)//": {"//row_text(table(k))//"}"
+        text = text//between//"  "//json_text(table(k)%name)//": {"//row_text(k)//"}"
         between = ","//eol
       end do
       text = text//"}"
@@ -132,13 +231,21 @@ contains
   end function variables_text
 
   !> A row of the table. Of a number `above` and `below` are excluded, `from` and `to` allowed.
-  pure function row_text(row) result(text)
-    type(variable_t), intent(in) :: row
-    character(len=:), allocatable :: text, value
-    character(len=len(row%goes_with)) :: words(size(words_of(row%goes_with)))
+  pure function row_text(k) result(text)
+    integer, intent(in) :: k                               !! row of the table
+    character(len=:), allocatable :: text, value, meanings
+    type(variable_t) :: row
+    character(len=len(table%goes_with)) :: words(size(words_of(table(k)%goes_with)))
+    character(len=len(table%choices)) :: choices(size(words_of(table(k)%choices)))
     logical :: has_default, is_example, positive
     integer :: i
 
+    row = table(k)
+    choices = words_of(row%choices)
+    meanings = ""
+    do i = 1, size(choices)
+      meanings = meanings//", "//json_text(choices(i))//": "//json_text(meaning_of(row%name, choices(i)))
+    end do
     value = trim(row%value)
     do i = 1, len(value)
       if (value(i:i) == "'") value(i:i) = """"
@@ -156,11 +263,13 @@ contains
         member("above", positive, "0")//member("from", low > -largest .and. .not. positive, written(low))// &
         member("below", high < 1, "1")//member("to", high >= 1 .and. high < largest, written(high))
     end associate
-    text = text//member("choices", row%choices /= "", list(words_of(row%choices)))// &
+    text = text//member("choices", row%choices /= "", list(choices))// &
+      member("meanings", row%choices /= "", "{"//meanings(min(3, len(meanings) + 1):)//"}")// &
+      member("otherwise", row%otherwise /= "", json_text(row%otherwise))// &
       member("unit", row%unit /= "", json_text(row%unit))//member("help", .true., json_text(row%help))// &
       member("allowed", .true., json_text(allowed(row)))//", ""goes_with"": {"
     if (size(words) > 0) text = text//json_text(words(1))//": "//list(words(2:))
-    text = text//"}"//member("excludes", row%excludes /= "", list(words_of(row%excludes)))// &
+    text = text//"}"//member("excludes", size(excluded_by(k)) > 0, list(excluded_by(k)))// &
       member("repeated", .true., trim(merge("true ", "false", is_repeated(row%group))))// &
       member("resumable", .true., trim(merge("true ", "false", row%may_change == on_resume)))// &
       member("changeable", .true., trim(merge("true ", "false", row%may_change == in_motion)))

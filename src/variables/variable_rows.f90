@@ -1,0 +1,64 @@
+!> The type of a row of the table of `variables`, ranges of numbers, and limits that the program shares with its users.
+module variable_rows
+  use kinds, only: real64
+  implicit none
+  private
+
+  integer, parameter, public :: name_length = 37, help_length = 1000
+  integer, parameter, public :: most_threads = 1024, most_disks = 100000000
+  real(real64), parameter, public :: smallest = 1.0e-100_real64    !! numbers beyond these would overflow when
+  real(real64), parameter, public :: largest = 1.0e100_real64      !! squared or multiplied
+
+  !> When a variable may have another value than at the start of a run: never; on `--resume`, because it has no effect on
+  !> the trajectory; or in a running simulation, because it acts on disks and neither places nor describes them.
+  character(len=9), parameter, public :: never = "never", on_resume = "on resume", in_motion = "running"
+
+  type, public :: range_t
+    real(real64) :: lower, upper             !! both belong to the range
+    character(len=24) :: words
+  end type range_t
+
+  !> Groups that describe obstacles.
+  character(len=8), parameter, public :: obstacle_groups(2) = [character(len=8) :: "obstacle", "wall"]
+  !> Groups that describe boundaries: sides of the box and obstacles. The reference file contains them as comments only.
+  character(len=8), parameter, public :: wall_groups(*) = [character(len=8) :: "side", obstacle_groups]
+
+  type(range_t), parameter, public :: anything = range_t(-largest, largest, "")
+  type(range_t), parameter, public :: positive = range_t(smallest, largest, "> 0")
+  type(range_t), parameter, public :: not_negative = range_t(0, largest, ">= 0")
+  type(range_t), parameter, public :: number_of_threads = range_t(0, most_threads, "from 0 to 1024")
+  type(range_t), parameter, public :: unit_interval = range_t(0, 1, "from 0 to 1")
+  type(range_t), parameter, public :: fraction = range_t(smallest, nearest(1.0_real64, -1.0), "> 0 and < 1")
+  type(range_t), parameter, public :: part_of_all = range_t(smallest, 1, "> 0 and <= 1")
+  type(range_t), parameter, public :: energy_left = range_t(1.0e-12_real64, fraction%upper, ">= 1e-12 and < 1")
+  type(range_t), parameter, public :: spread_of_radii = range_t(0, fraction%upper, ">= 0 and < 1")
+  type(range_t), parameter, public :: tangential = range_t(-1, 1, "from -1 to 1")
+  type(range_t), parameter, public :: moment = range_t(smallest, 1, "> 0 and <= 1")
+  type(range_t), parameter, public :: per_decade = range_t(1, 1000, "from 1 to 1000")
+  type(range_t), parameter, public :: count_of_disks = range_t(1, most_disks, "from 1 to 100000000")
+
+  type, public :: variable_t
+    character(len=8) :: group
+    character(len=name_length) :: name
+    character(len=8) :: kind                 !! "integer", "real", "logical" or "text"
+    integer :: size                          !! number of values; 0: any number
+    character(len=8) :: status               !! see below
+    character(len=24) :: value               !! as written in a file
+    character(len=help_length) :: help       !! full sentences; the first names the quantity
+    type(range_t) :: range = anything        !! of numbers
+    character(len=16) :: unit = ""
+    character(len=100) :: choices = ""       !! of texts, separated by blanks; none: free text. Their meanings are in `choices`
+    character(len=60) :: goes_with = ""      !! a choice, then its words with which this variable has an effect
+    character(len=80) :: excludes = ""       !! variables of the same group that are not given with it
+    character(len=9) :: may_change = never   !! when it may have another value than at the start
+    character(len=100) :: otherwise = ""     !! the default in words, where it is no constant
+  end type variable_t
+
+  ! status     value                           line in the reference file
+  ! default    the default                     as it is
+  ! fallback   the default where one applies   as a comment
+  ! example    an example, no default          as it is, because something must be given
+  ! required   an example, no default          as a comment; must be given with the choice that it goes with
+  ! optional   an example, no default          as a comment
+
+end module variable_rows

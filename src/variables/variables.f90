@@ -1,0 +1,157 @@
+!> The one table of input variables. It drives reading, checking, `--print-defaults`, `--explain`,
+!> `/parameters` in the output file and the reference page.
+module variables
+  use boundary_variables, only: boundary_rows
+  use disk_variables, only: disk_rows
+  use run_variables, only: output_rows, run_rows, stop_rows
+  use texts, only: joined, written
+  use variable_rows, only: in_motion, largest, most_disks, most_threads, name_length, never, obstacle_groups, on_resume, &
+    smallest, variable_t, wall_groups
+  implicit none
+  private
+  public :: variable_t, table, group_names, obstacle_groups, wall_groups, is_repeated, variables_of, row_of
+  public :: change_of, excluded_by, first_sentence, full_names, in_motion, on_resume
+  public :: track_of, words_of, excludes, allowed, either, smallest, largest, most_disks, most_threads, name_length
+
+  character(len=8), parameter :: group_names(10) = [character(len=8) :: &
+    "run", "box", "side", "obstacle", "wall", "species", "contact", "drive", "stop", "output"]
+
+  type(variable_t), parameter :: table(*) = [run_rows, boundary_rows, disk_rows, stop_rows, output_rows]
+
+contains
+
+  !> When a variable may have another value, by its full name, which may hold that of an instance: `side.left.velocity`.
+  pure function change_of(name) result(when)
+    character(len=*), intent(in) :: name
+    character(len=len(never)) :: when
+    integer :: k
+
+    when = never
+    do k = 1, size(table)
+      if (table(k)%group == name(:index(name, ".") - 1) .and. table(k)%name == name(index(name, ".", back=.true.) + 1:)) &
+        when = table(k)%may_change
+    end do
+  end function change_of
+
+  !> Whether a group may occur several times in a file, told apart by `name`.
+  elemental function is_repeated(group)
+    character(len=*), intent(in) :: group
+    logical :: is_repeated
+
+    is_repeated = any(wall_groups == group) .or. group == "species"
+  end function is_repeated
+
+  !> Names of the variables of a group, in order.
+  pure function variables_of(group) result(names)
+    character(len=*), intent(in) :: group
+    character(len=name_length), allocatable :: names(:)
+
+    names = pack(table%name, table%group == group)
+  end function variables_of
+
+  !> Row of a variable within its group, as in `variables_of`; 0 if there is none.
+  pure function row_of(group, name) result(row)
+    character(len=*), intent(in) :: group, name
+    integer :: row
+    integer :: k
+
+    row = 0
+    do k = 1, size(table)
+      if (table(k)%group /= group) cycle
+      row = row + 1
+      if (table(k)%name == name) return
+    end do
+    row = 0
+  end function row_of
+
+  !> The variable of this name in every group that has one: `obstacle.radius or species.radius`; else empty.
+  pure function full_names(name) result(text)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = ""
+    do k = 1, size(table)
+      if (table(k)%name /= name) cycle
+      if (text /= "") text = text//" or "
+      text = text//trim(table(k)%group)//"."//name
+    end do
+  end function full_names
+
+  !> Whether one variable is not given with another of its group; of those that time the same samples, one is.
+  pure function excludes(one, other) result(yes)
+    integer, intent(in) :: one, other        !! rows
+    logical :: yes
+
+    yes = any(words_of(table(one)%excludes) == table(other)%name)
+    if (other < one .and. track_of(table(one)%name) /= "") yes = track_of(table(one)%name) == track_of(table(other)%name)
+  end function excludes
+
+  !> Names of the variables of its group that must not be given together with a variable.
+  pure function excluded_by(row) result(names)
+    integer, intent(in) :: row
+    character(len=name_length), allocatable :: names(:)
+    integer :: k
+
+    names = pack(table%name, [(table(k)%group == table(row)%group .and. (excludes(row, k) .or. excludes(k, row)), &
+      k=1, size(table))])
+  end function excluded_by
+
+  !> The first sentence of a help.
+  pure function first_sentence(help) result(sentence)
+    character(len=*), intent(in) :: help
+    character(len=:), allocatable :: sentence
+
+    sentence = help(:index(trim(help)//" ", ". "))
+  end function first_sentence
+
+  !> Whose samples a variable times: `frames` of frames_every_time; empty if it is no cadence.
+  pure function track_of(name) result(track)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: track
+
+    track = name(:max(index(name, "_every_") - 1, 0))
+  end function track_of
+
+  !> The words of a line.
+  pure function words_of(line) result(words)
+    character(len=*), intent(in) :: line
+    character(len=len(line)), allocatable :: words(:)
+    integer :: i
+
+    allocate (words(count([(line(i:i) /= " " .and. line(i + 1:min(i + 1, len(line))) == " ", i=1, len(line))])))
+    if (size(words) > 0) read (line, *) words
+  end function words_of
+
+  !> What may be written: `a number > 0`, `'wall' or 'periodic'`.
+  pure function allowed(row) result(words)
+    type(variable_t), intent(in) :: row
+    character(len=:), allocatable :: words
+
+    select case (row%kind)
+    case ("logical")
+      words = ".true. or .false."
+    case ("integer")
+      words = trim(merge("an integer", "integers  ", row%size == 1))
+    case ("real")
+      words = trim(merge("a number", "numbers ", row%size == 1))
+    case default
+      words = "text in quotes"
+      if (row%choices /= "") words = either(words_of(row%choices))
+    end select
+    if (row%range%words /= "") words = words//" "//trim(row%range%words)
+    if (row%size /= 1 .and. row%kind == "text") words = "values, each "//words
+    if (row%size > 1) words = written(row%size)//" "//words
+  end function allowed
+
+  !> `'a', 'b' or 'c'`
+  pure function either(words) result(text)
+    character(len=*), intent(in) :: words(:)
+    character(len=:), allocatable :: text
+
+    text = "'"//joined(words(:size(words) - 1), "', '")
+    if (size(words) > 1) text = text//"' or '"
+    text = text//trim(words(size(words)))//"'"
+  end function either
+
+end module variables
