@@ -27,11 +27,20 @@ _ricochet_variables() { # program, input file or nothing
     }'
 }
 
-# What a variable can be, where that is a word from a list.
+# The values of a variable that has a list of choices.
 _ricochet_values() { # program, variable
-  local variable=$2
+  local variable=${2%%(*}
   if [[ $variable == *.*.* ]]; then variable=${variable%%.*}.${variable##*.}; fi
   "$1" --explain "$variable" 2>/dev/null | grep allowed: | grep -oE "'[a-z_]+'|\.(true|false)\." | tr -d "'"
+}
+
+# "box.gravity(1)=" "box.gravity(2)=": the elements of a vector of fixed size that begin with WORD.
+_ricochet_elements() { # program, WORD
+  local count k
+  count=$("$1" --explain "$2" 2>/dev/null | sed -n 's/^ *allowed: \([0-9]\{1,\}\) .*/\1/p' | head -n 1)
+  for ((k = 1; k <= ${count:-0}; k++)); do
+    if [[ "${2%%(*}($k)" == "$2"* ]]; then echo "${2%%(*}($k)="; fi
+  done
 }
 
 _ricochet() {
@@ -56,6 +65,9 @@ _ricochet() {
   --set | --scan)
     if [[ -n $variable ]]; then
       mapfile -t COMPREPLY < <(compgen -W "$(_ricochet_values "$program" "$variable")" -- "$word")
+    elif [[ $word == *'('* ]]; then
+      mapfile -t COMPREPLY < <(_ricochet_elements "$program" "${word#[\'\"]}")
+      compopt -o nospace 2>/dev/null
     else
       mapfile -t COMPREPLY < <(compgen -S = -W "$(_ricochet_variables "$program" "$input")" -- "$word")
       compopt -o nospace 2>/dev/null

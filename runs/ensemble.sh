@@ -13,15 +13,16 @@ usage:  $me INPUT.nml -d FOLDER [option]...
 
 members:
   --seeds LIST           run.seed of each member: 1-8 or 1,5,9 or 1-4,11
-  --scan VARIABLE=A,B,C  values of a variable; repeated: every combination.  Vectors hold commas,
+  --scan VARIABLE=A,B,C  values of a variable; repeated: every combination.  Vectors contain commas,
                          so separate them by semicolons: --scan 'species.ball.velocity=0,-1;0,-2'
+                         One element: --scan 'box.gravity(2)=-5,-10'
   --set VARIABLE=VALUE   the same for all members; may be repeated
   --manifest FILE        instead of --seeds and --scan: one member per line,
                              NAME <TAB or blank> --set VARIABLE=VALUE --set VARIABLE=VALUE ...
                          (a NAME with blanks needs the TAB; lines that begin with # are left out)
 running:
   -j N                   members at a time [all cores]
-  --dry-run              print the members and stop
+  --dry-run              print the members, check the input of the first, and stop
   --engine pool          who runs them: this script, on this machine [default],
            slurm         a Slurm job array, -j N members at a time in all; sbatch takes its options
                          from the environment: SBATCH_TIMELIMIT, SBATCH_PARTITION, ...
@@ -85,8 +86,8 @@ scan_seeds() {
   scans+=("run.seed=${list%,}")
 }
 
-# Every combination of the scans (first varies slowest) and the seeds; species.ball.mass, 5 becomes
-# ball.mass_5 in the name, without blanks and slashes.
+# Every combination of the scans (first varies slowest) and the seeds. The values become the name, without blanks and
+# slashes: ball.mass_5 of species.ball.mass=5, gravity_2_-5 of box.gravity(2)=-5.
 generate_members() {
   local scan variable list values separator value k short old_names old_overrides known=' '
   names=("") overrides=("")
@@ -99,6 +100,7 @@ generate_members() {
     mapfile -t -d "$separator" values < <(printf '%s' "$list")
     short=${variable#species.}
     [[ $short == *.*.* || $variable == species.* ]] || short=${short#*.}
+    short=${short/(/_} short=${short/)/}
     ((${#names[@]} * ${#values[@]} <= most)) || die "--scan $variable: more than $most members"
     old_names=("${names[@]}") old_overrides=("${overrides[@]}")
     names=() overrides=()
@@ -600,16 +602,20 @@ if [[ -n $share ]]; then
   ((${#names[@]} > 0)) || exit 0
 fi
 
-if [[ -n $dry ]]; then
-  for k in "${!names[@]}"; do printf '%s\t%s\n' "${names[k]}" "${overrides[k]}"; done
-  exit 0
-fi
-
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 program=${here%/*}/build/ricochet
 [[ ! -x $here/ricochet ]] || program=$here/ricochet # both are installed
 program=${RICOCHET:-$program}
 [[ -f $program && -x $program ]] || die "no program $program: run make, or set RICOCHET"
+if [[ -n $dry ]]; then
+  for k in "${!names[@]}"; do printf '%s\t%s\n' "${names[k]}" "${overrides[k]}"; done
+  arguments=("$input" --check --quiet) status=0
+  add_overrides 0
+  reason=$("$program" "${arguments[@]}" 2>&1 </dev/null) || status=$?
+  ((status != 2)) || die "member ${names[0]} cannot run: ${reason##*$'\n'}"
+  ((status == 0)) || printf '%s: note: member %s cannot run yet: %s\n' "$me" "${names[0]}" "${reason##*$'\n'}" >&2
+  exit 0 # a starting file may be a result that another ensemble will have
+fi
 command -v flock >/dev/null || die "needs flock (package util-linux)"
 reason=$(mkdir -p -- "$folder" 2>&1) || fail 3 "cannot make $folder: ${reason##*: }"
 [[ -n $share ]] || remember

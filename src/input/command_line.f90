@@ -107,6 +107,7 @@ contains
         call take_value(name, command%output)
       case ("--set")
         call take_value(name, override%text)
+        call expect_assignment(override%text)
         command%overrides = [command%overrides, override]    ! of a `text_t(...)` gfortran 12 would lose the memory
       case ("--explain")
         command%question = "explain"
@@ -142,6 +143,17 @@ contains
       end if
       if (value == "") call refuse("option "//name//" needs a value")
     end subroutine take_value
+
+    !> Refuses `--set NAME VALUE`, which would take the value for a file.
+    subroutine expect_assignment(text)
+      character(len=*), intent(in) :: text
+
+      if (index(text, "=") > 0 .or. k == size(arguments)) return
+      associate (next => arguments(k + 1)%text)
+        if (index(next, "-") /= 1 .and. index(next//"|", ".nml|") == 0) &
+          call refuse("--set "//text//": = is missing; did you mean --set "//text//"="//next//"?")
+      end associate
+    end subroutine expect_assignment
 
     !> The option may be misspelt, or a file name.
     subroutine report_unknown(name)
@@ -209,7 +221,7 @@ contains
       "        ricochet --help | --version | --print-defaults | --explain WORD"//eol//eol// &
       "  -o, --output FILE   where the results go; default runs/<input name>.h5"//eol// &
       "  --set NAME=VALUE    override a variable of the input, any number of times:"//eol// &
-      "                      run.seed=7, box.upper=2,2, species.projectile.mass=50;"//eol// &
+      "                      run.seed=7, species.gas.mass=50, 'box.gravity(2)=-5';"//eol// &
       "                      the last one for a variable counts, an empty VALUE"//eol// &
       "                      restores the default"//eol// &
       "  --resume            continue a stopped run, or a finished one to a later end"//eol// &

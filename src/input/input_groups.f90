@@ -26,6 +26,7 @@ module input_groups
     character(len=text_length), allocatable :: texts(:)
   contains
     procedure :: is_set
+    procedure :: length
     procedure :: integers
     procedure :: clear
     procedure :: json
@@ -58,6 +59,16 @@ contains
 
     is_set = allocated(self%reals) .or. allocated(self%texts)
   end function is_set
+
+  !> Number of values; 0 if the variable has none.
+  pure function length(self)
+    class(value_t), intent(in) :: self
+    integer :: length
+
+    length = 0
+    if (allocated(self%reals)) length = size(self%reals)
+    if (allocated(self%texts)) length = size(self%texts)
+  end function length
 
   !> The values of a variable of kind "integer".
   pure function integers(self) result(numbers)
@@ -308,9 +319,7 @@ contains
     type(growing_text_t) :: growing
     integer :: k, n, last
 
-    n = 0
-    if (allocated(self%reals)) n = size(self%reals)
-    if (allocated(self%texts)) n = size(self%texts)
+    n = self%length()
     last = n
     if (present(most)) last = min(n, most)
     do k = 1, last

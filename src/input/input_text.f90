@@ -74,7 +74,7 @@ contains
 
     bytes = file_size(path)
     if (bytes < 0) then
-      call fail(error, exit_files, path//": there is no such file")
+      call fail(error, exit_files, path//": there is no such file"//advice(path))
     else if (is_folder(path)) then
       call fail(error, exit_files, path//": is a folder, not an input file")
     else if (bytes == 0) then
@@ -93,6 +93,22 @@ contains
     if (odd > 0) call fail(error, exit_usage, path//": is not a text file: byte "//written(odd)// &
       " is a control character, code "//written(iachar(text(odd:odd))))
   end subroutine read_text
+
+  !> Names an input file that a path may mean: without its extension, or without the folder `input`.
+  function advice(path)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: advice
+    integer :: k
+
+    do k = 1, 3
+      advice = path
+      if (k > 1) advice = "input/"//advice
+      if (k /= 2) advice = advice//".nml"
+      if (file_size(advice) > 0) exit
+      advice = ""
+    end do
+    if (advice /= "") advice = "; did you mean "//advice//"?"
+  end function advice
 
   !> The text with line feeds as the only line ends, without byte order mark, ending in a line feed.
   pure function unix_lines(text) result(lines)

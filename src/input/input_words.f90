@@ -67,8 +67,10 @@ contains
     subroutine check_number()
       problem = ""
       if (assignment%element > 0) then
-        if (assignment%element > row%size .or. .not. slot%is_set()) then
-          problem = "it is set as a whole: name = "//trim(row%value)
+        if (.not. slot%is_set()) then
+          problem = "has no value yet, so that no element can be set; set it as a whole: name = "//trim(row%value)
+        else if (assignment%element > slot%length()) then
+          problem = "has "//counted(int(slot%length(), int64), "value")//"; there is no element "//written(assignment%element)
         else if (total /= 1) then
           problem = counted(total, "value")//" for one element; allowed: "//allowed(row)
         end if

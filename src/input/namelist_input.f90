@@ -40,7 +40,7 @@ contains
     n = 0
     do k = 1, size(table)
       defaults(k) = value_t(row=k, name=table(k)%name, kind=table(k)%kind)
-      if (table(k)%status == "default" .or. table(k)%status == "fallback") call assign_text(defaults(k), trim(table(k)%value), 0)
+      if (table(k)%status == "default" .or. table(k)%status == "fallback") call assign_text(defaults(k), trim(table(k)%value), 0, 0)
       defaults(k)%given = .false.
     end do
     allocate (found(size(group_names) + n_sides + min(count([(text(k:k) == "&", k=1, len(text))]), &
@@ -107,14 +107,16 @@ contains
     end subroutine add_group
 
     !> Stores a value that is not from the file: a default, or that of an override, where text needs no quotes.
-    subroutine assign_text(slot, text, line)
+    subroutine assign_text(slot, text, line, element)
       type(value_t), intent(inout) :: slot
       character(len=*), intent(in) :: text
       integer, intent(in) :: line                         !! -k: override k; 0: a default
+      integer, intent(in) :: element                      !! number of the value; 0: all values of the variable
       type(assignment_t) :: assignment
 
       call open_source(text//eol)
       assignment%line = line
+      assignment%element = element
       assignment%where = trim(table(slot%row)%group)//"."//slot%name
       if (slot%kind == "text" .and. table(slot%row)%size == 1 .and. scan(text, "'""") /= 1) then
         assignment%tokens = [token_t(word, 1, len(text), 0, 1)]
@@ -381,13 +383,13 @@ contains
       group%instance = group%text_of("name")
     end subroutine name_instance
 
-    !> Applies one `GROUP.VARIABLE=VALUE` or `GROUP.NAME.VARIABLE=VALUE`. Without a value the variable
-    !> gets its default back.
+    !> Applies one `GROUP.VARIABLE=VALUE` or `GROUP.NAME.VARIABLE=VALUE`; VARIABLE may be an element, as in `gravity(2)`.
+    !> Without a value the variable gets its default back.
     subroutine override(text, line)
       character(len=*), intent(in) :: text
       integer, intent(in) :: line                         !! -k for override k
       character(len=:), allocatable :: group, instance, name, advice
-      integer :: equals, first, last, row, g
+      integer :: equals, first, last, row, g, element
 
       equals = index(text, "=")
       first = index(text(:max(equals - 1, 0)), ".")
@@ -396,27 +398,47 @@ contains
       name = lower_case(trim(adjustl(text(last + 1:equals - 1))))
       instance = ""
       if (last > first) instance = text(first + 1:last - 1)
+      call split_element(name, element)
       row = row_of(group, name)
       if (group == "" .or. name == "") then
         advice = ", as in run.seed=7"
         if (full_names(name) /= "") advice = "; did you mean "//full_names(name)//"?"
         call problems%add(line, "override", "expects GROUP.VARIABLE=VALUE"//advice)
       else if (all(group_names /= group)) then
-        call problems%add(line, plain(group), "unknown group; "//suggestion(group, group_names))
+        advice = suggestion(group, group_names)
+        g = findloc(found(:n)%instance, text(:first - 1), dim=1)
+        if (g > 0) advice = "did you mean "//trim(found(g)%name)//"."//text(:equals - 1)//"?"
+        call problems%add(line, plain(group), "unknown group; "//advice)
       else if (row == 0) then
         call report_unknown(group, name, line)
       else
         call find_group(group, instance, line, g)
         if (g == 0) return
-        if (equals == len(text)) then
+        if (equals == len(text) .and. element == 0) then
           found(g)%values(row) = defaults(found(g)%values(row)%row)
         else
-          call assign_text(found(g)%values(row), text(equals + 1:), line)
+          call assign_text(found(g)%values(row), text(equals + 1:), line, element)
           call replace_cadence(found(g), name)
         end if
         call name_instance(found(g))
       end if
     end subroutine override
+
+    !> Separates the number of an element from the name of a variable. Brackets without a number stay part of the name.
+    subroutine split_element(name, element)
+      character(len=:), allocatable, intent(inout) :: name
+      integer, intent(out) :: element                     !! 0: no element is named
+      integer :: bracket
+
+      element = 0
+      bracket = index(name, "(")
+      if (bracket == 0 .or. index(name, ")") /= len(name)) return
+      associate (number => name(bracket + 1:len(name) - 1))
+        if (number == "" .or. verify(number, digits) > 0 .or. len(number) > 8) return
+        read (number, *) element
+      end associate
+      if (element > 0) name = name(:bracket - 1)
+    end subroutine split_element
 
     !> A cadence set by an override takes the place of that which the file has for the same samples.
     subroutine replace_cadence(group, name)
@@ -447,7 +469,7 @@ contains
       if (group == "side" .and. any(side_name == instance) .and. .not. any(matches)) then
         call add_group(group, 0, count(of_group) + 1)
         g = n
-        call assign_text(found(g)%values(row_of(group, "name")), instance, line)
+        call assign_text(found(g)%values(row_of(group, "name")), instance, line, 0)
         return
       end if
       g = 0

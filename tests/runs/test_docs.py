@@ -374,6 +374,9 @@ def test_completion_knows_options_variables_values_and_files(program):
     assert completed(program, "--set", "run.seed", "=") == []
     named = completed(program, "input/crater.nml", "--set", "species.projectile.v")
     assert named == ["species.projectile.velocities=", "species.projectile.velocity="]
+    assert completed(program, "--set", "box.gravity(") == ["box.gravity(1)=", "box.gravity(2)="]
+    assert completed(program, "--set", "'box.gravity(2") == ["box.gravity(2)="]
+    assert completed(program, "--set", "box.boundary(2)", "=", "p") == ["periodic"]
     placement = ["--set", "species.bed.placement", "="]
     assert completed(program, "input/crater.nml", *placement, "d") == ["dense"]
 

@@ -488,6 +488,23 @@ def test_dry_run_starts_nothing(lab):
     assert not (lab / "out").exists()
 
 
+def test_dry_run_checks_the_first_member(program, tmp_path):
+    """A wrong input is refused before anything runs; one element of a vector can be scanned."""
+    input_file = write_input(tmp_path, MIXTURE)
+
+    def dry(scan):
+        command = [SCRIPT, input_file, "-d", tmp_path / "out", "--scan", scan, "--dry-run"]
+        return ran(*command, env=environment(RICOCHET=program))
+
+    sound = dry("box.upper(2)=1,2")
+    assert (sound.returncode, sound.stderr) == (0, "")
+    assert sound.stdout.splitlines()[1] == "upper_2_2\t--set box.upper(2)=2"
+    wrong = dry("box.upper(3)=1,2")
+    assert wrong.returncode == 2 and "member upper_3_1 cannot run" in wrong.stderr
+    assert "box.upper: has 2 values" in wrong.stderr
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.fixture
 def real(program, tmp_path):
     """`real(folder, *options)` starts an ensemble of the program itself, six members by default."""

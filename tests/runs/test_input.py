@@ -188,6 +188,29 @@ def test_an_override_may_name_a_side_that_the_file_does_not(ricochet, tmp_path):
     assert run.returncode == USAGE and "roof" in run.stderr
 
 
+def test_an_override_may_set_one_element_of_a_vector(ricochet, tmp_path):
+    (tmp_path / "gas.nml").write_text(GOOD)
+    set_twice = [
+        "--set",
+        "box.upper(2)=3",
+        "--set",
+        "BOX.UPPER(1)=4",
+        "--set",
+        "box.boundary(1)=periodic",
+    ]
+    box = [g["values"] for g in groups_of(ricochet, "gas.nml", *set_twice) if g["group"] == "box"]
+    assert box == [{"upper": [4, 3], "boundary": ["periodic", "wall"]}]
+
+
+def test_a_file_that_is_not_there_may_be_meant_without_its_ending(ricochet, tmp_path):
+    (tmp_path / "input").mkdir()
+    (tmp_path / "input" / "gas.nml").write_text(GOOD)
+    for word in ("gas", "gas.nml", "input/gas"):
+        said = ricochet(word, "--check").stderr
+        assert said == f"{word}: there is no such file; did you mean input/gas.nml?\n"
+    assert ricochet("input/gsa").stderr == "input/gsa: there is no such file\n"
+
+
 def test_every_default_that_is_printed_may_be_written_into_a_file(ricochet, tmp_path):
     table = json.loads(ricochet("--print-variables").stdout)
     files = {name: {} for name in table}

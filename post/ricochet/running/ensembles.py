@@ -135,6 +135,7 @@ def combinations(values: Mapping[str, list[Any]]) -> dict[str, dict[str, object]
             short = variable.removeprefix("species.")
             if "." not in short.partition(".")[2] and not variable.startswith("species."):
                 short = short.partition(".")[2]
+            short = short.replace("(", "_").replace(")", "")  # box.gravity(2)
             word = "default" if value is None else value_text(variable, value).replace(", ", ",")
             parts.append(f"{short}_{re.sub('[^A-Za-z0-9.+-]', '_', word)}")
         members["_".join(parts)] = settings
