@@ -7,6 +7,7 @@ is one list of all of them; the kernel ends those of a laboratory that is killed
 
 import asyncio
 import json
+import os
 import re
 import struct
 import subprocess
@@ -99,7 +100,7 @@ class Lab:
             raise RunError("the laboratory ends")
         worker = await task
         self.prepare()
-        if worker.returncode is None:
+        if is_alive(worker):
             return worker
         self.workers.discard(worker)  # something has killed it
         return await self.worker()
@@ -206,6 +207,17 @@ def terminate(worker: Process) -> None:
     """End a worker; while it writes a file, wait until it has removed it."""
     with suppress(ProcessLookupError):
         worker.terminate()
+
+
+def is_alive(worker: Process) -> bool:
+    """Return whether a worker has not ended.
+
+    Its return code is set some time after the operating system has released its process.
+    """
+    with suppress(ProcessLookupError):
+        os.kill(worker.pid, 0)
+        return worker.returncode is None
+    return False
 
 
 def wrong(problem: object) -> dict:
