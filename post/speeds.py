@@ -4,11 +4,12 @@
 
 Speeds are given in u = v / sqrt(2 kT / m), kT = mean kinetic energy of the species, so that
 equilibrium is P(u) = 2 u exp(-u^2) for any mass; with m = 1 and all speeds 1 at the start u is v
-itself.  Runs of the same N are combined.  Equilibrium, or the steady state of a driven gas, is
-found, or begins after --equilibration; it takes the frames of --frames that are at least
---min-separation collisions per disk from each other, and their mean kT.  In a sheared box speeds
-are relative to its flow. A gas that only loses energy has no steady state: its histogram is of the
-frames after --equilibration, or else 15 collisions per disk, with the kT of each frame for itself.
+itself; --unscaled draws v in units of the input.  Runs of the same N are combined.  Equilibrium, or
+the steady state of a driven gas, is found, or begins after --equilibration; it takes the frames of
+--frames that are at least --min-separation collisions per disk from each other, and their mean kT.
+In a sheared box speeds are relative to its flow.  A gas that only loses energy has no steady state:
+its histogram is of the frames after --equilibration, or else 15 collisions per disk, with the kT of
+each frame for itself.
 So is that of a gas whose sides move, or whose kT drifts; `kT_first` and `kT_last` say how far.
 Tests: Kolmogorov-Smirnov (KS) and chi-square against the Maxwell law, KS against the exact law of N
 disks that share a fixed kinetic energy, which matters if they are few; none where that law is not
@@ -16,6 +17,8 @@ known: with gravity, losses, one periodic axis of two, or two and unequal masses
 its speed within 5 collisions: frames that are closer count for the tests as one frame every 5
 collisions per disk. a2 = <v^4> / (2 <v^2>^2) - 1.
 """
+
+from typing import NamedTuple
 
 from ricochet import Run, RunError
 from ricochet.analysis.speeds import (
@@ -51,6 +54,13 @@ BINS = np.linspace(0, 3, 51)  # u = 1 lies inside a bin
 EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
 COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each frame at its own kT"
 UNSTEADY = "No steady kT yet: each frame at its own"
+A2 = "second Sonine coefficient $a_2$"
+ABOUT_A2 = (
+    "$a_2 = \\langle v^4 \\rangle\\,/\\,2\\langle v^2 \\rangle^2 - 1$: "
+    "0 for Maxwell's speeds, $-1/2$ for equal speeds.\n"
+    "A point is one frame; a deviation lasts for some 2 collisions per disk,\n"
+    "so neighbouring points may lie outside the band together."
+)
 
 
 def state_of(run: Run) -> str:
@@ -108,15 +118,42 @@ def pooled(
     return binned(u, BINS, n), row
 
 
-def draw_histogram(axes: plt.Axes, heights: list[Estimate], labels: list[str]) -> None:
-    """Draw step histograms over the Maxwell curve."""
+class Scale(NamedTuple):
+    """What the reduced speed u = 1 is drawn as, and the label of the axis."""
+
+    thermal: float = 1.0  # sqrt(2 kT / m), or 1
+    label: str = "speed $u = v\\,/\\,\\sqrt{2kT/m}$"
+
+    @property
+    def law(self) -> str:
+        """Maxwell's density, for a legend."""
+        if self.thermal == 1.0 and "u" in self.label:
+            return "Maxwell, $P(u)=2u\\,e^{-u^2}$"
+        return "Maxwell, $P(v)=(mv/kT)\\,e^{-mv^2/2kT}$"
+
+
+def scale_of(run: Run, kt: float, unscaled: bool) -> Scale:
+    """Return the scale of speeds at a temperature, in units of the input if `unscaled`."""
+    if not unscaled:
+        return Scale()
+    return Scale(float(np.sqrt(2 * kt / run.mass[0])), run.units.label("speed v", "speed"))
+
+
+def draw_histogram(
+    axes: plt.Axes, heights: list[Estimate], labels: list[str], scales: list[Scale]
+) -> None:
+    """Draw step histograms over the Maxwell curve of each scale."""
     style = {"fill": True, "alpha": 0.45} if len(heights) == 1 else {"fill": False}
-    for height, label, colour in zip(heights, labels, colours(len(labels)), strict=True):
-        bars(axes, height, BINS, color=colour, label=label, lw=1.6, **style)
+    each = zip(heights, labels, scales, colours(len(labels)), strict=True)
+    for height, label, scale, colour in each:
+        density = Estimate(*(np.asarray(part) / scale.thermal for part in height))
+        bars(axes, density, BINS * scale.thermal, color=colour, label=label, lw=1.6, **style)
     fine = np.linspace(0, 3, 301)
-    axes.plot(fine, maxwell_pdf(fine), color="black", lw=1.2, label="Maxwell, $P(u)=2u\\,e^{-u^2}$")
-    axes.set(xlabel="speed $u = v\\,/\\,\\sqrt{2kT/m}$", xlim=(0, 3))
-    axes.set_ylabel("probability density $P(u)$")
+    for scale in dict.fromkeys(scales):
+        law = maxwell_pdf(fine) / scale.thermal
+        axes.plot(fine * scale.thermal, law, color="black", lw=1.2, label=scale.law)
+    axes.set(xlabel=scales[0].label, xlim=(0, 3 * max(scale.thermal for scale in scales)))
+    axes.set_ylabel(f"probability density $P({'u' if scales[0] == Scale() else 'v'})$")
     axes.legend()
 
 
@@ -133,15 +170,17 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
         a2 = estimate([track[:common] for _, track in tracks])
         error = a2.error if len(runs) > 1 else None
         axes.errorbar(tau, a2.mean, error, color=colour, marker=".", lw=1, label=f"N = {count}")
-        noise_band(axes, count * len(runs), colour)
+        noise_band(axes, count * len(runs), colour, "95 % in equilibrium")
         closed = all(run.nature <= {"obstacles", "rotating", "walls"} for run in runs)
         equal = equal and closed and max(a[0] for _, a in tracks) < -0.4
     if equal:
         dilute_limit(axes, RELAXATION)
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
-    axes.fill_between([], [], color="0.85", label="95 % of Maxwell's gases")
-    axes.set(xlabel="collisions per disk", ylabel="$a_2$ (0: Maxwell)")
-    axes.legend()
+    axes.set(xlabel="collisions per disk", ylabel=A2)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low - 0.25 * (high - low), high)  # room for the explanation
+    axes.text(0.98, 0.02, ABOUT_A2, ha="right", va="bottom", fontsize=8, transform=axes.transAxes)
+    axes.legend(loc="center right")
 
 
 def cooling(row: dict) -> str:
@@ -168,20 +207,31 @@ def chance(p: float) -> str:
     return "p < 0.0001" if p < 1e-4 else f"p = {min(p, 0.9999):.4f}"
 
 
-def draw(runs: list[Run], groups: list, pools: list, state: str) -> plt.Figure:
+def draw(
+    runs: list[Run], groups: list, pools: list, state: str, unscaled: bool = False
+) -> plt.Figure:
     """Draw four panels: start, last frame, late frames, relaxation."""
     figure, ((first, last), (late, way)) = plt.subplots(2, 2, figsize=(10, 7))
     largest = groups[-1][1][0]
     for axes, frame, when in ((first, 0, "first frame"), (last, -1, f"t = {largest.time[-1]:.4g}")):
         if all_move(largest, frame):
             height = binned(reduced_speeds(largest, [frame]), BINS)
-            draw_histogram(axes, [height], [f"{when}, N = {largest.n_disks}"])
+            kt = float(kt_of_frames(largest, [frame])[0])
+            scales = [scale_of(largest, kt, unscaled)]
+            draw_histogram(axes, [height], [f"{when}, N = {largest.n_disks}"], scales)
         else:
             axes.set_axis_off()
             axes.text(0.5, 0.5, f"{when}: disks at rest", ha="center", transform=axes.transAxes)
     densities, rows = zip(*pools, strict=True)
-    draw_histogram(late, densities, [label_of(row, state) for row in rows])
-    top = max(1.0, *(np.max(density.mean) for density in densities))
+    scales = [
+        scale_of(own[0], row.get("kT", 0.0), unscaled)
+        for (_, own), row in zip(groups, rows, strict=True)
+    ]
+    draw_histogram(late, densities, [label_of(row, state) for row in rows], scales)
+    top = max(
+        max(1.0, np.max(density.mean)) / scale.thermal
+        for density, scale in zip(densities, scales, strict=True)
+    )
     room = 0.1 + (0.4 if state in (EQUILIBRIUM, STEADY) else 0.6) * len(groups)
     late.set_ylim(0, top * (1 + room))
     draw_relaxation(way, groups)
@@ -193,10 +243,24 @@ def draw(runs: list[Run], groups: list, pools: list, state: str) -> plt.Figure:
     return figure
 
 
+def check_unscaled(runs: list[Run], state: str) -> None:
+    """Refuse --unscaled where the speeds of late frames are of several masses or temperatures."""
+    for run in runs:
+        if np.ptp(run.mass) > 0:
+            raise RunError(
+                f"{run.path}: has several masses; mixture.py draws each in its own speeds"
+            )
+        if state not in (EQUILIBRIUM, STEADY):
+            raise RunError(f"{run.path}: has no steady kT; --unscaled draws speeds of a single one")
+
+
 def main() -> None:
-    args = command_line(
+    parser = command_line(
         __doc__, "speeds.png", frames=None, equilibration=None, min_separation=5.0
-    ).parse_args()
+    )
+    meaning = "draw speeds v in units of the input instead of u; of disks of one mass"
+    parser.add_argument("--unscaled", action="store_true", help=meaning)
+    args = parser.parse_args()
     state, *others = map(state_of, args.runs)
     if any(other != state for other in others):
         odd = args.runs[1 + [other != state for other in others].index(True)]
@@ -217,7 +281,9 @@ def main() -> None:
             why = "loses energy, no equilibrium" if state == COOLING else "has no steady kT yet"
             notes.append(f"N = {count}: {why}; {cooling(row)}")
     data["maxwell"] = np.diff(maxwell_cdf(BINS)) / np.diff(BINS)
-    figure = draw(args.runs, groups, pools, state)
+    if args.unscaled:
+        check_unscaled(args.runs, state)
+    figure = draw(args.runs, groups, pools, state, args.unscaled)
     report(args, figure, [row for _, row in pools], data=data, notes=notes)
 
 

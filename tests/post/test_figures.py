@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from matplotlib import colors
 
 import cooling as cooling_figure
 from ricochet import crater, read_run, script, thermodynamics
@@ -159,3 +160,42 @@ def test_the_reason_of_the_start_names_what_drifts(tmp_path, rng):
         assert start > 200 and f"the {kind} energy of {name} drifts" in why
         assert start == thermodynamics.start_of_steady_state(run)
     assert thermodynamics.explained_start(run, 20.0) == (20.0, "--equilibration 20")
+
+
+# --- speeds ---
+
+
+def maxwellian(path, rng, mass=2.0, kt=3.0, count=400, frames=41):
+    """A gas in equilibrium at a temperature that is not 1/2, one collision per disk a frame."""
+    mass = np.broadcast_to(mass, count)
+    v = rng.normal(size=(frames, count, 2)) * np.sqrt(kt / mass)[:, None]
+    v *= np.sqrt(kt * 2 * count / np.sum(mass[:, None] * v**2, axis=(1, 2)))[:, None, None]
+    ends = {"collisions": np.arange(frames) * count // 2}
+    return write_run(path, rng.uniform(0.05, 0.95, v.shape), v, mass=mass, observables=ends)
+
+
+def test_speeds_are_drawn_in_units_of_the_input_on_request(tmp_path, rng, figures, capsys):
+    """Maxwell's curve has its maximum at sqrt(kT / m) and the area 1, and so has the histogram."""
+    path, out = maxwellian(tmp_path / "gas.h5", rng), tmp_path / "a.png"
+    assert run_script("speeds", path, "-o", out, "--unscaled", "--units", "length=m,time=s") == 0
+    for axes in figures[0].axes[:3]:
+        assert axes.get_xlabel() == "speed v (m/s)"
+        (curve,) = (line for line in axes.lines if "Maxwell" in line.get_label())
+        (v, law), steps = curve.get_data(), axes.patches[0].get_data()
+        assert v[np.argmax(law)] == pytest.approx(np.sqrt(3 / 2), rel=0.02)
+        assert np.trapezoid(law, v) == pytest.approx(1, abs=1e-3)
+        assert np.sum(steps.values * np.diff(steps.edges)) == pytest.approx(1, abs=0.02)
+    mixed = maxwellian(tmp_path / "mixed.h5", rng, mass=np.repeat([1.0, 4.0], 200))
+    assert run_script("speeds", mixed, "-o", out, "--unscaled") == 2
+    assert "mixed.h5: has several masses; mixture.py" in capsys.readouterr().err
+
+
+def test_the_coefficient_of_speeds_is_explained_beside_its_band(tmp_path, rng, figures):
+    """The legend has the colours of the band and of the curve."""
+    path = maxwellian(tmp_path / "gas.h5", rng)
+    assert run_script("speeds", path, "-o", tmp_path / "a.png") == 0
+    way = figures[0].axes[3]
+    assert "0 for Maxwell's speeds" in way.texts[0].get_text()
+    shown = dict(zip(*way.get_legend_handles_labels()[::-1], strict=True))
+    band = shown["95 % in equilibrium"].get_facecolor()
+    assert band[:3] == colors.to_rgb(shown["N = 400"][0].get_color())

@@ -289,10 +289,10 @@ def bars(axes: Axes, height: Estimate, bins: np.ndarray, **style: Any) -> None:
     axes.errorbar(middle, *height, fmt="none", color=style["color"], elinewidth=1)
 
 
-def noise_band(axes: Axes, count: int, colour: str) -> None:
+def noise_band(axes: Axes, count: int, colour: str, label: str = "") -> None:
     """Draw the band that contains a2 of Maxwellian speeds with a probability of 95 %."""
     reach = 2 * kurtosis_noise(count)
-    axes.axhspan(-reach, reach, color=colour, alpha=0.12, lw=0, zorder=0)
+    axes.axhspan(-reach, reach, color=colour, alpha=0.15, lw=0, zorder=0, label=label)
 
 
 def dilute_limit(axes: Axes, points: np.ndarray, of: str = "") -> None:
