@@ -238,7 +238,9 @@ contains
     else if (any(own_names() == name) .or. any(beside_species == name)) then
       call groups(k)%complain("name", shown(name)//" is reserved for the output file", problems)
     end if
-    j = place_of(name, groups%instance)
+    do j = 1, k - 1                                       ! without a copy of all names for each of them
+      if (groups(j)%instance == name) exit
+    end do
     if (j < k) call groups(k)%complain("name", shown(name)//" is already the name of the one in line "// &
       written(groups(j)%line), problems)
   end subroutine check_name

@@ -216,7 +216,7 @@ contains
         if (scale(i) >= cap) cycle
         associate (own => full(sim%tag(i)%id))
           call packing%list_neighbours(sim%disk(i)%x, own, list, n)
-          room = min(1.0_real64, wall_distance(sim%box, sim%disk(i)%x)/own)
+          room = min(1.0_real64, wall_distance(packing, sim%disk(i)%x)/own)
           do k = 1, n
             associate (j => list(k), other => full(sim%tag(list(k))%id))
               if (j == i) cycle
@@ -236,17 +236,21 @@ contains
     end subroutine grow
   end subroutine grow_disks
 
-  !> Distance from a point to the nearest side or obstacle; `never` if there is none.
-  pure function wall_distance(box, x) result(distance)
-    type(box_t), intent(in) :: box
+  !> Distance from a point to the nearest side or obstacle; `never`, or more than a radius, if none is nearer than a radius.
+  pure function wall_distance(packing, x) result(distance)
+    type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: x(2)                    !! [length]
     real(real64) :: distance
-    integer(int32) :: k
+    integer(int32) :: e
 
-    distance = min(never, minval([x - box%lower, box%upper - x], mask=.not. [box%periodic, box%periodic]))
-    do k = 1, box%n_obstacles()
-      distance = min(distance, obstacle_gap(box, k, x, 0.0_real64))
-    end do
+    associate (box => packing%box, near => packing%near)
+      distance = min(never, minval([x - box%lower, box%upper - x], mask=.not. [box%periodic, box%periodic]))
+      e = near%first_near(x)
+      do while (e > 0)
+        distance = min(distance, obstacle_gap(box, near%entry(e)%obstacle, x, 0.0_real64))
+        e = near%entry(e)%next
+      end do
+    end associate
   end function wall_distance
 
 end module dense_growth

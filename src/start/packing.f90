@@ -3,6 +3,7 @@
 module packing
   use images, only: images_t
   use kinds, only: int32, real64
+  use obstacle_cells, only: obstacle_cells_t
   use partners, only: obstacle_code, obstacle_number
   use box_geometry, only: box_t
   implicit none
@@ -31,6 +32,7 @@ module packing
     type(box_t) :: box
     type(placed_t), allocatable :: disk(:)          !! (n)
     type(layer_t), allocatable :: layer(:)          !! (number of species)
+    type(obstacle_cells_t) :: near                  !! obstacles, for the largest radius of an opened species
   contains
     procedure :: open_species
     procedure :: add
@@ -57,7 +59,7 @@ contains
   end function empty_packing
 
   !> Sets up the cells of a species. The side of a cell is the diameter, or larger where there are few disks.
-  pure subroutine open_species(self, s, radius, count, lower, upper)
+  subroutine open_species(self, s, radius, count, lower, upper)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: s
     real(real64), intent(in) :: radius              !! largest radius of its disks [length]
@@ -66,6 +68,7 @@ contains
     real(real64) :: side, extent(2), few
     integer :: n(2)
 
+    call self%near%serve(self%box, radius)
     extent = upper - lower
     few = 2.0_real64*count
     side = max(2*radius, sqrt(extent(1)*extent(2)/few), maxval(extent)/few)
@@ -104,13 +107,17 @@ contains
   pure subroutine find_blocker(self, centre, half, radius, blocker)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: centre(2), half(2)  !! [length]
-    real(real64), intent(in) :: radius              !! [length]
+    real(real64), intent(in) :: radius              !! at most that of a species that has been opened [length]
     integer(int32), intent(out) :: blocker
     real(real64) :: rho
+    integer(int32) :: e
     integer :: s, kx, ky, first(2), last(2)
 
-    do blocker = obstacle_code(1), obstacle_code(self%box%n_obstacles()), -1
+    e = self%near%first_near(centre)
+    do while (e > 0)
+      blocker = obstacle_code(self%near%entry(e)%obstacle)
       if (self%covers(blocker, centre, half, radius)) return
+      e = self%near%entry(e)%next
     end do
     blocker = 0
     do s = 1, size(self%layer)
