@@ -228,7 +228,7 @@ instructions() {
 # counted COMMAND...: instructions of the program that a command runs by `run_by`.
 counted() {
   run_by=(valgrind --tool=callgrind --callgrind-out-file=/dev/null)
-  run_by+=(--toggle-collect=__{event_driven_MOD_advance,event_driven_MOD_start,epochs_MOD_move_epoch}'*')
+  run_by+=(--toggle-collect=__{event_driven_MOD_{advance,start,renew},epochs_MOD_move_epoch,kicks_MOD_kick}'*')
   "$@" >/dev/null 2>"$work/count" || { cat "$work/count" >&2; return 1; }
   awk '/Collected/ { print $4 }' "$work/count"
 }
@@ -266,8 +266,16 @@ piston() {
     >"$work/piston_$1.nml"
 }
 
+# kicked NUMBER: a periodic gas of 1000 disks, all of which get a new velocity ten times per collision time, so many times.
+kicked() {
+  local interval=8.5e-4
+  "${run_by[@]}" "$program" "$work/gas_1000_0.3.nml" -o "$work/bench.h5" --force --quiet --set box.boundary=periodic,periodic \
+    --set drive.kind=brownian --set drive.temperature=1 --set drive.interval=$interval \
+    --set "stop.time=$(awk -v n="$1" -v dt=$interval 'BEGIN { print (n + 0.5)*dt }')"
+}
+
 check() {
-  local radii packing name disks limit options count verdict=0
+  local radii packing name disks limit options count driving=1494 verdict=0
   while read -r radii packing limit options; do
     # shellcheck disable=SC2086 # several options, or none
     count=$((($(instructions "$radii" "$packing" 100000 $options) - $(instructions "$radii" "$packing" 1 $options))/100000))
@@ -308,6 +316,10 @@ LIMITS
 2000 4375
 40000 4925
 LIMITS
+  gas 1000 0.3
+  count=$((($(counted kicked 104) - $(counted kicked 4))/100000))
+  printf 'driving: %s instructions per disk and kick of all, ten per collision time, at most %s\n' "$count" $driving
+  [ "$count" -gt 0 ] && [ "$count" -le $driving ] || verdict=1
   return $verdict
 }
 
