@@ -13,7 +13,7 @@ module library
   use input_groups, only: group_t, most_written, same_value, same_values
   use input_problems, only: problem_list_t
   use kinds, only: int32, int64, never, real64
-  use moments, only: frame_column_t, frame_columns, frame_sample
+  use sample_values, only: frame_column_t, frame_columns, frame_sample
   use observables, only: observable_list_t, observed
   use namelist_input, only: read_groups
   use partners, only: side_name

@@ -80,7 +80,7 @@ contains
     do i = 1, sim%n_disks()
       old = sim%disk(i)%v
       sim%disk(i)%v = v(:, sim%tag(i)%id)
-      call sim%note_change(i, old, sim%now)
+      call sim%record_velocity_change(i, old, sim%now)
     end do
     sim%given_energy = sim%kinetic_energy()
     call begin_anew(sim)

@@ -137,7 +137,7 @@ contains
     before = sim%disk(i)%v
     call sim%tally%sum(drive_energy)%add(0.5_real64*sim%mass_of(i)*dot_product(v - before, v + before))
     sim%disk(i)%v = v
-    call sim%note_change(i, before, sim%now)
+    call sim%record_velocity_change(i, before, sim%now)
   end subroutine change_velocity
 
   !> Sets the angular velocity of disk i and adds the energy change to the sum.

@@ -13,7 +13,7 @@ module output
   use evolution, only: limits_t
   use h5md_layout, only: changes_at_work, event_counter, frame_counter, replaced_file, sample_counter, saved_at, wall_time
   use hdf5_objects, only: hdf5_file_t, scalar
-  use moments, only: frame_column_t, frame_columns, frame_sample, observable_sample
+  use sample_values, only: frame_column_t, frame_columns, frame_sample, observable_sample
   use observables, only: observed
   use run_description, only: describe_end, describe_run, describes
   use run_files, only: check_places, check_replaced, is_file, lock, source_of, take_final_name, unfinished, unfinished_new

@@ -1,11 +1,11 @@
 !> The series in a frame, in a sample of the observables and in a sample of the event log. The order is the same
-!> as that of the values in `moments`.
+!> as that of the values in `sample_values`.
 module samples
   use kinds, only: int32, int64, most_exact
   use errors, only: error_t, exit_broken, fail
   use h5md_layout, only: disks_group, events_group, observables_group, position, step_of, time_of, value_of
   use hdf5_series, only: double_precision, long_integer, series_t, short_integer, single_precision
-  use moments, only: frame_column_t
+  use sample_values, only: frame_column_t
   use observables, only: observable_list_t
   use simulation_state, only: simulation_t
   implicit none

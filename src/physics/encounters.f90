@@ -71,9 +71,9 @@ contains
     end if
     if (.not. counts) return
     change = momentum_change(sim, first, second, v, w)
-    if (code > 0 .and. sim%with%stress) call book_pair(sim, first, second, change, handed(sim, first, second, v, w))
-    call sim%note_change(first, v, t)
-    if (code > 0) call sim%note_change(second, w, t)
+    if (code > 0 .and. sim%with%stress) call add_pair_sums(sim, first, second, change, transferred_energy(sim, first, second, v, w))
+    call sim%record_velocity_change(first, v, t)
+    if (code > 0) call sim%record_velocity_change(second, w, t)
     if (.not. present(log)) return
     ids = [sim%tag(first)%id, code]
     if (code > 0) ids(2) = sim%tag(second)%id
@@ -246,7 +246,7 @@ contains
   end function is_far_heavier
 
   !> Translational energy transferred from disk j to disk i: the mean of the energy gained by i and the energy lost by j.
-  pure function handed(sim, i, j, v, w) result(energy)
+  pure function transferred_energy(sim, i, j, v, w) result(energy)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: v(2), w(2)       !! velocities before the collision [length/time]
@@ -255,27 +255,27 @@ contains
     if (is_far_heavier(sim, i, j) .or. is_far_heavier(sim, j, i)) then
       energy = 0.25_real64*dot_product(momentum_change(sim, i, j, v, w), sim%disk(i)%v + v + sim%disk(j)%v + w)
     else
-      energy = 0.5_real64*(gain(sim, i, v) - gain(sim, j, w))
+      energy = 0.5_real64*(energy_gain(sim, i, v) - energy_gain(sim, j, w))
     end if
-  end function handed
+  end function transferred_energy
 
   !> Change of the translational kinetic energy of disk i.
-  pure function gain(sim, i, before)
+  pure function energy_gain(sim, i, before)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: before(2)        !! velocity before the collision [length/time]
-    real(real64) :: gain                         !! [energy]
+    real(real64) :: energy_gain                  !! [energy]
 
-    gain = 0.5_real64*sim%mass_of(i)*dot_product(sim%disk(i)%v - before, sim%disk(i)%v + before)
-  end function gain
+    energy_gain = 0.5_real64*sim%mass_of(i)*dot_product(sim%disk(i)%v - before, sim%disk(i)%v + before)
+  end function energy_gain
 
   !> Adds a collision of disks i and j to the virial tensor, to the collisional heat flux, and to the work of the shear. The
   !> latter is zero unless the disks collide across the lower or upper boundary.
-  subroutine book_pair(sim, i, j, change, handed)
+  subroutine add_pair_sums(sim, i, j, change, transferred_energy)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: change(2)        !! momentum change of disk i [mass length/time]
-    real(real64), intent(in) :: handed           !! energy transferred to disk i [energy]
+    real(real64), intent(in) :: transferred_energy  !! energy transferred to disk i [energy]
     real(real64) :: r(2), slip(2)
     integer :: a, b
 
@@ -287,11 +287,11 @@ contains
         call sim%tally%sum(stress + 2*(a - 1) + b - 1)%add(change(a)*r(b))
       end do
     end do
-    if (sim%with%helfand) call sim%tally%sum(heat_virial:heat_virial + 1)%add(handed*r)
+    if (sim%with%helfand) call sim%tally%sum(heat_virial:heat_virial + 1)%add(transferred_energy*r)
     if (.not. sim%box%is_sheared()) return
     call sim%tally%sum(work)%add(-slip(1)*change(1))
     call keep_apart(sim, i, j)
-  end subroutine book_pair
+  end subroutine add_pair_sums
 
   !> Replaces the separation and relative velocity of two disks at the time t by those to the nearest image of the second disk.
   pure subroutine see_nearest(sim, t, dx, dv)

@@ -6,7 +6,7 @@ module observables
   use drive, only: noise
   use partners, only: n_sides
   use simulation_state, only: simulation_t
-  use tally, only: carried, dissipated, drive_energy, flights, gain, heat, heat_virial, impulse, stress, virial, work
+  use tally, only: kinetic_flux, dissipated, drive_energy, flux_changes, gain, heat, heat_virial, impulse, stress, virial, work
   implicit none
   private
   public :: observable_list_t, observed, own_names, energies, total_energy
@@ -34,8 +34,8 @@ module observables
   integer, parameter :: kinetic = 6, potential = 7, rotational = 8         !! energies
   integer, parameter :: own_kinetic = 9, own_momentum = 10  !! relative to the velocity profile of a sheared box; momentum has two
                                                             !! components
-  integer, parameter :: flow = 12               !! five components: see `tally: carried`; relative to the profile as well
-  integer, parameter :: tensor(*) = flow + [0, 1, 1, 2]                    !! components xx, xy, yx, yy of the momentum flux
+  integer, parameter :: flux = 12               !! five components: see `tally: kinetic_flux`; relative to the profile as well
+  integer, parameter :: tensor(*) = flux + [0, 1, 1, 2]                    !! components xx, xy, yx, yy of the momentum flux
   !> Total energy and the rounding error of its sum, precise enough for an energy balance. Zero unless `is_driven`.
   integer, parameter :: energy = 17, lost = 18
 
@@ -47,7 +47,7 @@ contains
     type(observable_list_t) :: list
     real(real64) :: sums(lost, 0:size(sim%species))   ! by species; index 0: all disks
     character(len=:), allocatable :: path
-    real(real64) :: flown(5)                          ! time integrals of the fluxes [energy time], [energy length]
+    real(real64) :: flux_integral(5)                          ! time integrals of the fluxes [energy time], [energy length]
     real(real64) :: at(2, 2)                          ! positions of the lower and upper sides [length]
     integer :: s, k
 
@@ -75,9 +75,9 @@ contains
       call list%add("kinetic_tensor", sums(tensor, 0))
     end if
     if (sim%with%helfand) then
-      flown = sums(flow:flow + 4, 0)*sim%time() - sim%tally%total([(flights + k, k=0, 4)])
-      call list%add("helfand_stress", flown(tensor - flow + 1))
-      call list%add("helfand_heat", flown(4:))
+      flux_integral = sums(flux:flux + 4, 0)*sim%time() - sim%tally%total([(flux_changes + k, k=0, 4)])
+      call list%add("helfand_stress", flux_integral(tensor - flux + 1))
+      call list%add("helfand_heat", flux_integral(4:))
       call list%add("heat_virial", sim%tally%total([heat_virial, heat_virial + 1]))
     end if
     do k = 1, size(sim%box%surface)
@@ -224,7 +224,7 @@ contains
   pure subroutine add_up(sim, sums)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(out) :: sums(:, 0:)
-    real(real64) :: term(flow + 4), v(2), own_v(2)
+    real(real64) :: term(flux + 4), v(2), own_v(2)
     logical :: falling, sheared, driven
     integer(int32) :: i
     integer :: s, k
@@ -248,7 +248,7 @@ contains
       if (sim%with%rotation) term(rotational) = 0.5_real64*sim%inertia_of(i)*sim%spin(i)**2
       term(own_kinetic) = 0.5_real64*term(mass)*dot_product(own_v, own_v)
       term(own_momentum:own_momentum + 1) = term(mass)*own_v
-      if (sim%with%stress) term(flow:) = carried(term(mass), own_v)
+      if (sim%with%stress) term(flux:) = kinetic_flux(term(mass), own_v)
       sums(:size(term), s) = sums(:size(term), s) + term
       if (.not. driven) cycle
       do k = kinetic, rotational

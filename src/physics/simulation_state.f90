@@ -9,7 +9,7 @@ module simulation_state
   use features, only: features_t
   use free_flight, only: flight, flight_velocity
   use images, only: images_t
-  use tally, only: carried, flights, tally_t
+  use tally, only: kinetic_flux, flux_changes, tally_t
   implicit none
   private
   public :: given_t, simulation_t, system_t
@@ -75,7 +75,7 @@ module simulation_state
     procedure :: spin_up
     procedure :: turn
     procedure :: make_contact
-    procedure :: note_change
+    procedure :: record_velocity_change
     procedure :: inertia_of
     procedure :: kinetic_energy
     procedure :: is_driven
@@ -285,17 +285,17 @@ contains
 
   !> Registers that disk i had another velocity until the time t. The time integral of a flux is its present value times the time,
   !> minus the sum of its changes times the times at which they occurred. This is exact at every moment.
-  pure subroutine note_change(self, i, before, t)
+  pure subroutine record_velocity_change(self, i, before, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: before(2)         !! velocity before the change [length/time]
     real(real64), intent(in) :: t                 !! since the epoch [time]
 
     if (.not. self%with%helfand) return
-    associate (mass => self%mass_of(i), sums => self%tally%sum(flights:flights + 4))
-      call sums%add((carried(mass, self%disk(i)%v) - carried(mass, before))*(self%box%epoch + t))
+    associate (mass => self%mass_of(i), sums => self%tally%sum(flux_changes:flux_changes + 4))
+      call sums%add((kinetic_flux(mass, self%disk(i)%v) - kinetic_flux(mass, before))*(self%box%epoch + t))
     end associate
-  end subroutine note_change
+  end subroutine record_velocity_change
 
   !> Moment of inertia of disk i.
   pure function inertia_of(self, i) result(inertia)

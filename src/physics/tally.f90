@@ -5,31 +5,32 @@ module tally
   use kinds, only: int64, never, real64
   implicit none
   private
-  public :: carried, tally_t
+  public :: kinetic_flux, tally_t
 
   !> Kinds of terms, by their physical dimension, which determine the units of sums: see `simulation_state: choose_units`.
-  integer, parameter, public :: energies = 1, impulses = 2, moments = 3, transfers = 4, passages = 5
+  integer, parameter, public :: energies = 1, impulses = 2, virials = 3, energy_transfers = 4, momentum_transfers = 5
 
   type :: sum_t
     character(len=16) :: name
-    integer :: kind                                !! kind of its terms: energies, ...
+    integer :: kind                                !! kind of its terms: `energies`, ...
   end type sum_t
 
   !> Indices of the sums over collisions. Units, checkpoints and domains are all driven by the list `sums`.
   integer, parameter, public :: virial = 1, dissipated = 2, heat = 3, work = 4, drive_energy = 5, stress = 6
-  integer, parameter, public :: heat_virial = 10, flights = 12     ! behind four components of the stress and two of the heat virial
+  integer, parameter, public :: heat_virial = 10, flux_changes = 12  ! after the four of the stress, after the two of the heat
   type(sum_t), parameter :: sums(*) = [ &
-    sum_t("virial", moments), &                    ! impulse times distance, over collisions of disks [energy]
+    sum_t("virial", virials), &                    ! impulse times distance, over collisions of disks [energy time]
     sum_t("dissipated", energies), &               ! kinetic energy dissipated [energy]
     sum_t("heat", energies), &                     ! energy transferred to disks by thermal walls [energy]
     sum_t("work", energies), &                     ! work done on disks by moving boundaries [energy]
     sum_t("drive_energy", energies), &             ! energy transferred to disks by kicks [energy]
-    sum_t("stress_xx", moments), sum_t("stress_xy", moments), &  ! momentum change times distance, over collisions of disks [energy]
-    sum_t("stress_yx", moments), sum_t("stress_yy", moments), &
-    sum_t("heat_virial_x", transfers), sum_t("heat_virial_y", transfers), &      ! energy transfer times distance [energy length]
-    ! Changes of `carried` times time.
-    sum_t("flights_xx", passages), sum_t("flights_xy", passages), sum_t("flights_yy", passages), &
-    sum_t("flights_x", transfers), sum_t("flights_y", transfers)]
+    ! Momentum change times distance, over collisions of disks [energy time].
+    sum_t("stress_xx", virials), sum_t("stress_xy", virials), sum_t("stress_yx", virials), sum_t("stress_yy", virials), &
+    ! Energy transfer times distance, over collisions of disks [energy length].
+    sum_t("heat_virial_x", energy_transfers), sum_t("heat_virial_y", energy_transfers), &
+    ! Changes of `kinetic_flux` times time [energy time], [energy length].
+    sum_t("flux_xx", momentum_transfers), sum_t("flux_xy", momentum_transfers), sum_t("flux_yy", momentum_transfers), &
+    sum_t("flux_x", energy_transfers), sum_t("flux_y", energy_transfers)]
 
   !> Sums for each surface of the box: the impulse on the surface [mass length/time], and the energy gained by disks.
   integer, parameter, public :: impulse = 1, gain = 3
@@ -74,13 +75,13 @@ contains
 
   !> Fluxes of a disk in free flight: momentum, xx, xy and yy [energy]; kinetic energy along x and y [energy
   !> length/time]. Their time integrals are the kinetic parts of the Helfand moments (Phys. Rev. 119, 1 (1960)).
-  pure function carried(mass, v)
+  pure function kinetic_flux(mass, v)
     real(real64), intent(in) :: mass
     real(real64), intent(in) :: v(2)               !! [length/time]
-    real(real64) :: carried(5)
+    real(real64) :: kinetic_flux(5)
 
-    carried = mass*[v(1)*v(1), v(1)*v(2), v(2)*v(2), 0.5_real64*dot_product(v, v)*v]
-  end function carried
+    kinetic_flux = mass*[v(1)*v(1), v(1)*v(2), v(2)*v(2), 0.5_real64*dot_product(v, v)*v]
+  end function kinetic_flux
 
   !> The value of a sum.
   elemental function total(self, k)

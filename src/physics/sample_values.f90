@@ -1,5 +1,5 @@
 !> Values of a frame and of a sample of the observables at the present time, as flat arrays.
-module moments
+module sample_values
   use kinds, only: int32, int64, real64
   use observables, only: observable_list_t, observed
   use simulation_state, only: simulation_t
@@ -114,4 +114,4 @@ contains
     end associate
   end function observable_sample
 
-end module moments
+end module sample_values
