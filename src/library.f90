@@ -41,7 +41,7 @@ module library
     type(simulation_t) :: sim
     class(evolution_t), allocatable :: evolution
     type(stop_rule_t) :: rule
-    integer(int64) :: turns = 1                       !! number of iterations between two checks of the clock
+    integer(int64) :: iterations = 1                  !! number of iterations between two checks of the clock
   end type session_t
 
 contains
@@ -131,10 +131,10 @@ contains
       looked = seconds()
       if (.not. looked - began <= patience) return
       limits = rule%limits
-      limits%turns = session%turns
+      limits%iterations = session%iterations
       call advance_once(session%evolution, session%sim, limits, error)
       if (allocated(error)) exit
-      session%turns = adapted(session%turns, seconds() - looked, session%evolution%turns_left > 0)
+      session%iterations = adapted(session%iterations, seconds() - looked, session%evolution%iterations_left > 0)
     end do
     code = answer(error, message, room)
   end function advance
@@ -473,10 +473,10 @@ contains
     log%most = max(most, 0)
     looked = 0
     do while (log%n < most .and. looked < longest_look + 100_int64*most)
-      limits%turns = 1000
+      limits%iterations = 1000
       call advance_once(evolution, ahead, limits, error, log)
       if (allocated(error) .or. evolution%idle) exit
-      looked = looked + max(limits%turns - evolution%turns_left, int(ahead%n_disks(), int64))
+      looked = looked + max(limits%iterations - evolution%iterations_left, int(ahead%n_disks(), int64))
     end do
     n = min(log%n, log%most)
     if (n > 0) records(:, :n) = log%record(:, :n)

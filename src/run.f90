@@ -186,13 +186,13 @@ contains
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
     type(limits_t) :: limits
-    integer(int64) :: turns
+    integer(int64) :: iterations
     integer :: requests, requests_served
     logical :: stopping
     real(real64) :: now, next_checkpoint              ! [s]
     real(real64) :: first_time                        ! time of the simulation at the beginning of this part [time]
 
-    turns = 1
+    iterations = 1
     requests_served = 0
     first_time = run%sim%time()
     next_checkpoint = seconds() + run%input%settings%output%checkpoint_every
@@ -204,11 +204,11 @@ contains
     if (run%sim%settled .and. limits%sampled >= run%sim%time()) call advance_once(run%evolution, run%sim, limits, error)
     do while (.not. (run%stop_rule%is_over(run%sim, run%evolution) .or. allocated(error)))
       limits = run%stop_rule%limits
-      limits%turns = turns
+      limits%iterations = iterations
       call run%output%tighten(limits)
       now = seconds()
       call advance_once(run%evolution, run%sim, limits, error, run%log)
-      turns = adapted(turns, seconds() - now, run%evolution%turns_left > 0)
+      iterations = adapted(iterations, seconds() - now, run%evolution%iterations_left > 0)
       if (allocated(run%log)) call run%output%take_events(run%sim, run%log)
       if (allocated(error)) exit
       call run%output%take_due_samples(run%sim, error)

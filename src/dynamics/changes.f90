@@ -2,7 +2,7 @@
 !> disks at once. Their effect on the energy is counted as work.
 module changes
   use box_sides, only: bounds
-  use disks, only: land
+  use disks, only: advance_disk
   use epochs, only: begin_anew
   use kinds, only: int32, int64, real64
   use partners, only: n_sides
@@ -47,7 +47,7 @@ contains
     end if
     if (problem /= "") return
     before = total_energy(sim)
-    call land_all(sim)
+    call advance_all(sim)
     sim%system_t = other%system_t
     call count_kicks()
     call begin_anew(sim)
@@ -76,7 +76,7 @@ contains
     integer(int32) :: i
 
     before = total_energy(sim)
-    call land_all(sim)
+    call advance_all(sim)
     do i = 1, sim%n_disks()
       old = sim%disk(i)%v
       sim%disk(i)%v = v(:, sim%tag(i)%id)
@@ -90,16 +90,16 @@ contains
   !> Advances all disks to the present time under the old law. Their clocks are equal afterwards. The last partners are erased,
   !> because a disk may collide with its last partner again at once, as after a kick, and this must not be taken for a rounding
   !> error of the previous collision.
-  subroutine land_all(sim)
+  subroutine advance_all(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i
 
     do i = 1, sim%n_disks()
-      call sim%turn(i, sim%now)
-      call land(sim%disk(i), sim%box%gravity, sim%now)
+      call sim%rotate_to(i, sim%now)
+      call advance_disk(sim%disk(i), sim%box%gravity, sim%now)
       sim%tag(i)%met = 0
     end do
-  end subroutine land_all
+  end subroutine advance_all
 
   !> Adds the energy change to the work, in sums whose units are those of a run with the new system.
   subroutine book(sim, before)

@@ -118,30 +118,30 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(event_log_t), intent(inout), optional :: log
     type(event_t) :: event
-    integer(int64) :: turns, events
+    integer(int64) :: iterations, events
     real(real64) :: t_limit
 
-    turns = limits%turns
-    self%turns_left = turns
+    iterations = limits%iterations
+    self%iterations_left = iterations
     self%thorough = present(log) .or. sim%with%are_rare() .or. sim%law%by_speed%speed > 0
     self%arrived = .false.
-    do while (turns > 0)
+    do while (iterations > 0)
       if (limits%reached(sim%tally) .or. is_full(log)) return
       if (stop_requested()) return
       self%last_count = next_pause()
       t_limit = min(limits%time, self%search%faces%due)
       if (sim%n_disks() >= disks_in_cache) call read_ahead()
       events = sim%tally%events
-      call self%run_events(sim, t_limit, turns, event, log)
-      self%turns_left = turns
+      call self%run_events(sim, t_limit, iterations, event, log)
+      self%iterations_left = iterations
       self%last_event = [event%disk, event%partner]
-      if (turns == 0 .and. .not. sim%now < limits%time) turns = 1  ! a sample at this time requires that all events at this time
-                                                                   ! have been executed
+      ! A sample at this time requires that all events at this time have been executed.
+      if (iterations == 0 .and. .not. sim%now < limits%time) iterations = 1
       if (self%search%everyone .and. sim%tally%events > events) call self%predict_all(sim)
       if (event%time <= t_limit) cycle
       if (t_limit < limits%time .and. event%time > t_limit) then
-        turns = turns + 1                          ! no event has been executed
-        self%turns_left = turns
+        iterations = iterations + 1                ! no event has been executed
+        self%iterations_left = iterations
         call follow_piston(self, sim)
         cycle
       end if
@@ -191,18 +191,18 @@ contains
 
   !> Hot path: executes event after event, up to `last_count` events, a time limit, or a number of iterations. All
   !> rare work is left to the caller.
-  subroutine run_events(self, sim, t_limit, turns, event, log)
+  subroutine run_events(self, sim, t_limit, iterations, event, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: t_limit            !! since the epoch [time]
-    integer(int64), intent(inout) :: turns         !! number of iterations left
+    integer(int64), intent(inout) :: iterations    !! number of iterations left
     type(event_t), intent(out) :: event            !! the last event; not executed if it is later than the time limit
     type(event_log_t), intent(inout), optional :: log
     real(real64) :: t
     integer(int32) :: i, code
 
-    do while (turns > 0)
-      turns = turns - 1
+    do while (iterations > 0)
+      iterations = iterations - 1
       call self%queue%first(sim%disk, sim%tag, i)
       t = sim%disk(i)%event_time
       code = sim%disk(i)%partner

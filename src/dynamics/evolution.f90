@@ -16,7 +16,7 @@ module evolution
     integer(int64) :: events = huge(0_int64)
     real(real64) :: dissipated = huge(0.0_real64)        !! dissipated energy [energy]
     logical :: at_rest = .false.                         !! all disks are at rest
-    integer(int64) :: turns = huge(0_int64)              !! iterations of the loop, so that the caller can make other checks
+    integer(int64) :: iterations = huge(0_int64)         !! iterations of the loop, so that the caller can make other checks
     real(real64) :: sampled = 0.0_real64                 !! time of the latest sample; the run does not end before it
   contains
     procedure :: reached
@@ -27,7 +27,7 @@ module evolution
   type, abstract :: evolution_t
     logical :: idle = .false.     !! no event will ever occur again
     logical :: arrived = .false.  !! the last advance reached its time limit, and all events up to it have been executed
-    integer(int64) :: turns_left = 0       !! number of iterations left of those that the last advance was allowed
+    integer(int64) :: iterations_left = 0  !! number of iterations left of those that the last advance was allowed
     integer(int64) :: alone = 0            !! number of events executed by the serial engine of a parallel run
     integer(int32) :: last_event(2) = 0    !! disk and partner of the last event, or of the first one beyond the time limit
   contains

@@ -2,7 +2,7 @@
 !> alone, so that they depend neither on the order of the disks nor on the history of the run.
 module kicks
   use kinds, only: int32, pi, real64
-  use disks, only: land
+  use disks, only: advance_disk
   use drive, only: active, andersen, noise
   use exact_sums, only: exact_sum_t
   use random_stream, only: draws_of_kicks => kicks, orientations, random_stream_t
@@ -81,8 +81,8 @@ contains
         is_hit = u < drive%fraction
       end if
       if (.not. is_hit) return
-      call sim%turn(i, sim%now)
-      call land(sim%disk(i), sim%box%gravity, sim%now)
+      call sim%rotate_to(i, sim%now)
+      call advance_disk(sim%disk(i), sim%box%gravity, sim%now)
       sim%tag(i)%met = 0
       call stream%draw_normals(z)
       if (drive%kind == noise) then

@@ -89,9 +89,9 @@ contains
     integer(int64) :: k
 
     self%arrived = .not. sim%now < limits%time      ! the end of a step is a single moment, at which all limits are tested
-    self%turns_left = limits%turns
+    self%iterations_left = limits%iterations
     k = steps_taken(sim%now, self%dt)
-    do while (self%turns_left > 0)
+    do while (self%iterations_left > 0)
       if (limits%reached(sim%tally) .or. is_full(log)) return
       if (modulo(k, steps_per_look) == 0) self%idle = at_rest(sim)
       if (self%idle .or. (k + 1)*self%dt > limits%time) then
@@ -102,7 +102,7 @@ contains
       k = k + 1
       call take_step(self, sim, k*self%dt, error, log)
       if (allocated(error) .or. sim%now < k*self%dt) return
-      self%turns_left = self%turns_left - 1
+      self%iterations_left = self%iterations_left - 1
       self%arrived = .not. sim%now < limits%time
     end do
   end subroutine advance

@@ -108,15 +108,15 @@ contains
 
   !> Number of iterations that take about `pause_interval`. It grows only if all iterations were used. Otherwise it would grow
   !> without limit in a run with many samples, and after the last sample signals would not be checked for hours.
-  pure function adapted(turns, elapsed, cut_short) result(n)
-    integer(int64), intent(in) :: turns
+  pure function adapted(iterations, elapsed, cut_short) result(n)
+    integer(int64), intent(in) :: iterations
     real(real64), intent(in) :: elapsed               !! time for these iterations, or for some of them [s]
     logical, intent(in) :: cut_short                  !! a limit was reached before all iterations were used
     integer(int64) :: n
 
-    n = turns
-    if (elapsed < 0.5_real64*pause_interval .and. .not. cut_short) n = min(2*turns, 2_int64**40)
-    if (elapsed > 2*pause_interval) n = max(turns/2, 1_int64)
+    n = iterations
+    if (elapsed < 0.5_real64*pause_interval .and. .not. cut_short) n = min(2*iterations, 2_int64**40)
+    if (elapsed > 2*pause_interval) n = max(iterations/2, 1_int64)
   end function adapted
 
   !> Time of the next kick, which follows all collisions at that time and precedes everything else.

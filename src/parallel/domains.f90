@@ -20,7 +20,7 @@ module domains
   real(real64), parameter :: forever = 2.0e150_real64      !! later than any event
   real(real64), parameter :: longest_window = 5.0_real64  !! longest wall time for a window of one domain, after which the window is
                                                           !! given up [s]
-  integer(int64), parameter :: turns_to_look = 100000      !! number of iterations between two checks of signals and of the clock
+  integer(int64), parameter :: iterations_between_checks = 100000  !! between two checks of signals and of the clock
   integer(int32), parameter :: spare = 32, spare_at_least = 200  !! vacant slots for disks that enter: a fraction 1/spare of the
                                                                  !! disks, plus spare_at_least
 
@@ -42,7 +42,7 @@ module domains
                                             !! slot
     integer(int32) :: vacant = 0                   !! first vacant slot; 0: none
     type(event_log_t), allocatable :: log          !! log of the collisions recorded here
-    integer(int64) :: turns = 0                    !! iterations of the engine in this window
+    integer(int64) :: iterations = 0               !! iterations of the engine in this window
     logical :: done = .false.                      !! the engine has reached the end of the window
     logical :: good = .false.                      !! no own disk can have met a wrong copy
     integer(int32) :: n_news = 0
@@ -188,10 +188,10 @@ contains
 
   !> Advances the domain with its copies to the end of a window. Gives up after the given number of iterations of the engine, or
   !> after `longest_window`.
-  subroutine move_on(self, t_end, turns)
+  subroutine move_on(self, t_end, iterations)
     type(domain_t), intent(inout) :: self
     real(real64), intent(in) :: t_end              !! end of the window, since the epoch [time]
-    integer(int64), intent(in) :: turns
+    integer(int64), intent(in) :: iterations
     type(limits_t) :: limits
     type(error_t), allocatable :: error
     real(real64) :: began                          ! [s]
@@ -201,18 +201,18 @@ contains
     if (.not. self%good) return                    ! there was no slot for all copies
     began = seconds()
     limits%time = t_end
-    left = turns
+    left = iterations
     do while (left > 0)
-      limits%turns = min(left, turns_to_look)
+      limits%iterations = min(left, iterations_between_checks)
       call self%engine%advance(self%sim, limits, error, self%log)
-      left = left - (limits%turns - self%engine%turns_left)
+      left = left - (limits%iterations - self%engine%iterations_left)
       if (allocated(error)) exit
       self%done = self%engine%arrived
       if (self%done) exit
       if (stop_requested()) exit
       if (seconds() - began > longest_window) exit
     end do
-    self%turns = self%turns + turns - left
+    self%iterations = self%iterations + iterations - left
   end subroutine move_on
 
   !> Time of the next event in the domain.

@@ -226,9 +226,9 @@ contains
       self%idle = self%engine%idle
       self%arrived = self%engine%arrived
       self%last_event = self%engine%last_event
-      self%turns_left = self%engine%turns_left
+      self%iterations_left = self%engine%iterations_left
       if (sim%tally%events - events >= sim%n_disks()) &
-        call self%parts%learn(sim%tally%events - events, goal%turns - self%turns_left, sim%time() - time)
+        call self%parts%learn(sim%tally%events - events, goal%iterations - self%iterations_left, sim%time() - time)
     end subroutine advance_plainly
   end subroutine advance
 

@@ -31,7 +31,7 @@ module partition
     integer(int64) :: events = 0                   !! number of events in the domains at its beginning
     logical :: begins = .false.                    !! domains apply the corrections of the previous window first
     real(real64) :: t = 0.0_real64                 !! time up to which domains advance, since the epoch [time]
-    integer(int64) :: turns = 0                    !! largest number of iterations of an engine in this step
+    integer(int64) :: iterations = 0               !! largest number of iterations of an engine in this step
     logical :: compares = .false.                  !! domains are compared, because the window has ended
     logical :: good = .true.                       !! the window is valid
   end type plan_t
@@ -47,7 +47,7 @@ module partition
     type(domain_cuts_t) :: cuts
     type(domain_t), allocatable :: domain(:)
     real(real64) :: pace = 0.0_real64              !! event rate; 0: not known yet [1/time]
-    real(real64) :: turns_per_event = 10.0_real64  !! iterations of an engine per event
+    real(real64) :: iterations_per_event = 10.0_real64  !! iterations of an engine per event
     real(real64) :: shortening = 1.0_real64        !! factor by which windows are shortened after failures
     integer(int32) :: widening = 0                 !! widening of the halo after failures [cells]
     real(real64) :: cores = 0.0_real64             !! number of cores used recently, on average; 0: not known yet
@@ -102,14 +102,14 @@ contains
   end subroutine fill
 
   !> Updates the event rate and the iterations per event, which determine the length of windows, from a measurement.
-  pure subroutine learn(self, events, turns, time)
+  pure subroutine learn(self, events, iterations, time)
     class(partition_t), intent(inout) :: self
-    integer(int64), intent(in) :: events, turns
+    integer(int64), intent(in) :: events, iterations
     real(real64), intent(in) :: time               !! [time]
 
     if (.not. (events > 0 .and. time > 0)) return
     self%pace = events/time
-    self%turns_per_event = max(turns/real(events, real64), 1.0_real64)
+    self%iterations_per_event = max(iterations/real(events, real64), 1.0_real64)
   end subroutine learn
 
   !> The sums and counters of all collisions, including those in the domains since they were loaded.
@@ -156,7 +156,7 @@ contains
       !$omp do schedule(static, 1)
       do k = 1, self%cuts%n
         if (plan%begins) call refresh(self%domain(k))
-        call move_on(self%domain(k), plan%t, plan%turns)
+        call move_on(self%domain(k), plan%t, plan%iterations)
       end do
       !$omp end do nowait
       if (is_last_at(barrier)) then
@@ -201,7 +201,7 @@ contains
       if (plan%t_end + 0.5_real64*length > limits%time) plan%t_end = limits%time
       plan%events = sum(self%domain%sim%tally%events)
       plan%begins = .true.
-      self%domain%turns = 0
+      self%domain%iterations = 0
       call aim()
     end subroutine begin_window
 
@@ -213,7 +213,7 @@ contains
       integer(int32) :: k
 
       expected = 1.2_real64*(plan%t_end - plan%t)*self%pace + 100      ! overestimated
-      plan%turns = int(min(self%overload*self%turns_per_event*expected, 1.0e15_real64), int64)
+      plan%iterations = int(min(self%overload*self%iterations_per_event*expected, 1.0e15_real64), int64)
       sure = left()
       next = plan%t_end
       if (sure <= expected) then
@@ -234,7 +234,7 @@ contains
       ! With left() < 0 simultaneous events have exceeded the limit.
       plan%good = all(self%domain%done) .and. all(self%domain%good) .and. left() >= 0
       if (plan%good) then
-        call self%learn(sum(self%domain%sim%tally%events) - plan%events, sum(self%domain%turns), plan%t - plan%t_begin)
+        call self%learn(sum(self%domain%sim%tally%events) - plan%events, sum(self%domain%iterations), plan%t - plan%t_begin)
       else
         self%widening = min(self%widening + 2, self%halo)
       end if

@@ -7,7 +7,7 @@ module disks
   implicit none
   private
   public :: disk_t, extra_t, species_t, tag_t, whole_disk_t
-  public :: disks_before, land, longest_name, names_of, species_by_id
+  public :: disks_before, advance_disk, longest_name, names_of, species_by_id
 
   !> Position, velocity and clock of a disk change only in its own collisions, and when it passes a periodic side. Positions at
   !> other times are extrapolated.
@@ -62,7 +62,7 @@ module disks
 contains
 
   !> Advances a disk along its free flight to the time t.
-  pure subroutine land(disk, gravity, t)
+  pure subroutine advance_disk(disk, gravity, t)
     type(disk_t), intent(inout) :: disk
     real(real64), intent(in) :: gravity(2), t
     real(real64) :: s
@@ -72,7 +72,7 @@ contains
     disk%v = flight_velocity(disk%v, gravity, s)
     disk%clock = t
     disk%stamp = disk%stamp + 1
-  end subroutine land
+  end subroutine advance_disk
 
   !> Names of the species.
   pure function names_of(species) result(names)

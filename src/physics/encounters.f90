@@ -3,7 +3,7 @@
 module encounters
   use kinds, only: int32, int64, real64
   use collisions, only: pair_impulse, tangential_impulse
-  use disks, only: disk_t, land
+  use disks, only: disk_t, advance_disk
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity
   use images, only: image_t, images_t
@@ -54,9 +54,9 @@ contains
       first = merge(i, code, sim%tag(i)%id < sim%tag(code)%id)
       second = i + code - first
       if (.not. min(sim%disk(i)%clock, sim%disk(code)%clock) < t) call note_stuck(sim, i, code, t, counts, n_repeats)
-      call sim%turn(second, t)
+      call sim%rotate_to(second, t)
     end if
-    call sim%turn(first, t)
+    call sim%rotate_to(first, t)
     v = flight_velocity(sim%disk(first)%v, sim%box%gravity, t - sim%disk(first)%clock)
     w = v
     if (code > 0) w = flight_velocity(sim%disk(second)%v, sim%box%gravity, t - sim%disk(second)%clock)
@@ -95,12 +95,12 @@ contains
     sj = sim%tag(j)%species
     if (sim%law%contact_time > 0) then
       elastic = .false.
-      call sim%make_contact(i, t, elastic)
-      call sim%make_contact(j, t, elastic)
+      call sim%register_contact(i, t, elastic)
+      call sim%register_contact(j, t, elastic)
       if (elastic) restitution = 1
     end if
-    call land(sim%disk(i), sim%box%gravity, t)
-    call land(sim%disk(j), sim%box%gravity, t)
+    call advance_disk(sim%disk(i), sim%box%gravity, t)
+    call advance_disk(sim%disk(j), sim%box%gravity, t)
     dx = sim%disk(j)%x - sim%disk(i)%x
     dv = sim%disk(j)%v - sim%disk(i)%v
     if (any(sim%box%periodic)) then
@@ -140,8 +140,8 @@ contains
 
     p = sim%disk(i)
     q = sim%disk(j)
-    call land(p, sim%box%gravity, t)
-    call land(q, sim%box%gravity, t)
+    call advance_disk(p, sim%box%gravity, t)
+    call advance_disk(q, sim%box%gravity, t)
     dx = q%x - p%x
     dv = q%v - p%v
     call see_nearest(sim, t, dx, dv)
@@ -196,8 +196,8 @@ contains
       impulse = tangential_impulse(law%grip, law%inertia, reduced, slip, normal_impulse)
       p%v = p%v + (impulse/mass_i)*along
       q%v = q%v - (impulse/mass_j)*along
-      call sim%spin_up(i, -p%radius*impulse)
-      call sim%spin_up(j, -q%radius*impulse)
+      call sim%change_angular_momentum(i, -p%radius*impulse)
+      call sim%change_angular_momentum(j, -q%radius*impulse)
       if (counts) call sim%tally%sum(dissipated)%add( &
         -impulse*(slip + 0.5_real64*impulse*(1 + 1/law%inertia)/reduced))
     end associate

@@ -72,9 +72,9 @@ module simulation_state
     procedure :: position
     procedure :: velocity
     procedure :: spin
-    procedure :: spin_up
-    procedure :: turn
-    procedure :: make_contact
+    procedure :: change_angular_momentum
+    procedure :: rotate_to
+    procedure :: register_contact
     procedure :: record_velocity_change
     procedure :: inertia_of
     procedure :: kinetic_energy
@@ -253,25 +253,25 @@ contains
   end function spin
 
   !> Changes the angular momentum of disk i.
-  pure subroutine spin_up(self, i, change)
+  pure subroutine change_angular_momentum(self, i, change)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: change            !! [mass length**2/time]
 
     self%extra(i)%spin = self%extra(i)%spin + change/self%inertia_of(i)
-  end subroutine spin_up
+  end subroutine change_angular_momentum
 
-  !> Rotates disk i to its orientation at the time t. Called before `disks: land` changes its clock.
-  pure subroutine turn(self, i, t)
+  !> Rotates disk i to its orientation at the time t. Called before `disks: advance_disk` changes its clock.
+  pure subroutine rotate_to(self, i, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: t
 
     if (self%with%rotation) self%extra(i)%angle = self%extra(i)%angle + self%extra(i)%spin*(t - self%disk(i)%clock)
-  end subroutine turn
+  end subroutine rotate_to
 
   !> Registers a contact of disk i at the time t. `elastic` becomes .true. if its previous contact is not over yet (TC model).
-  pure subroutine make_contact(self, i, t, elastic)
+  pure subroutine register_contact(self, i, t, elastic)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: t
@@ -281,7 +281,7 @@ contains
       elastic = elastic .or. (self%tag(i)%collisions > 0 .and. t - last < self%law%contact_time)
       last = t
     end associate
-  end subroutine make_contact
+  end subroutine register_contact
 
   !> Registers that disk i had another velocity until the time t. The time integral of a flux is its present value times the time,
   !> minus the sum of its changes times the times at which they occurred. This is exact at every moment.

@@ -4,7 +4,7 @@ module wall_hits
   use box_geometry, only: next_obstacle, strike_velocity, surface_velocity, wall_normal
   use box_sides, only: side_time
   use collisions, only: grip_t, tangential_impulse, wall_law_t, wall_rebound
-  use disks, only: land
+  use disks, only: advance_disk
   use partners, only: axis_of, is_side, sense_of
   use side_motion, only: piston
   use random_stream, only: random_stream_t, thermal_walls
@@ -31,8 +31,8 @@ contains
     integer :: k
 
     elastic = .false.
-    if (sim%law%contact_time > 0) call sim%make_contact(i, t, elastic)
-    call land(sim%disk(i), sim%box%gravity, t)
+    if (sim%law%contact_time > 0) call sim%register_contact(i, t, elastic)
+    call advance_disk(sim%disk(i), sim%box%gravity, t)
     k = sim%box%surface_of(code)
     law = sim%box%surface(k)%law
     normal = wall_normal(sim%box, code, sim%disk(i)%x, sim%disk(i)%v)
@@ -155,7 +155,7 @@ contains
       impulse = tangential_impulse(grip, sim%law%inertia, mass, &
         dot_product(disk%v - u, along) - disk%radius*sim%spin(i), mass*abs(dot_product(disk%v - before, normal)))
       disk%v = disk%v + (impulse/mass)*along
-      call sim%spin_up(i, -disk%radius*impulse)
+      call sim%change_angular_momentum(i, -disk%radius*impulse)
     end associate
   end subroutine rub_wall
 

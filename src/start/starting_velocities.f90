@@ -92,7 +92,7 @@ contains
     !> Draws unit vectors. The partner in an opposite pair is half the list away, so that it is not a neighbour on a grid.
     subroutine draw_directions(in_pairs)
       logical, intent(in) :: in_pairs
-      real(real64), parameter :: turn = 0.5_real64*sqrt(3.0_real64)     ! sine of 120 degrees
+      real(real64), parameter :: sine_of_120 = 0.5_real64*sqrt(3.0_real64)  ! sine of 120 degrees
       integer :: n, half
 
       n = last - first + 1
@@ -107,8 +107,8 @@ contains
       end do
       if (.not. in_pairs .or. modulo(n, 2) == 0) return
       associate (e => sim%disk(last)%v)
-        sim%disk(last - 1)%v = -0.5_real64*e + turn*[-e(2), e(1)]
-        sim%disk(last - 2)%v = -0.5_real64*e - turn*[-e(2), e(1)]
+        sim%disk(last - 1)%v = -0.5_real64*e + sine_of_120*[-e(2), e(1)]
+        sim%disk(last - 2)%v = -0.5_real64*e - sine_of_120*[-e(2), e(1)]
       end associate
     end subroutine draw_directions
 
