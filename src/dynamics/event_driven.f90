@@ -8,7 +8,7 @@ module event_driven
   use box_sides, only: side_time
   use calendar, only: most_coming, stages
   use cell_grid, only: cell_grid_t
-  use encounters, only: collide, collide_pair, encounter_text, pass_side, passes
+  use encounters, only: collide, collide_pair, encounter_text, is_periodic_side, pass_side
   use epochs, only: begin_first_epoch, last_time
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t, is_full
@@ -241,7 +241,7 @@ contains
         call self%queue%schedule(sim%disk, sim%tag, i)
         return
       end if
-    else if (is_wall(code) .and. .not. passes(sim, code)) then
+    else if (is_wall(code) .and. .not. is_periodic_side(sim, code)) then
       if (self%thorough) then
         call collide(sim, i, code, t, counts, log)
       else

@@ -8,7 +8,7 @@ module time_stepped
   use kinds, only: int32, int64, most_exact, never, real64
   use box_geometry, only: strike_velocity, wall_normal
   use box_sides, only: bounds
-  use encounters, only: collide, encounter_text, pass_side, passes
+  use encounters, only: collide, encounter_text, is_periodic_side, pass_side
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t, is_full
   use evolution, only: evolution_t, limits_t
@@ -192,7 +192,7 @@ contains
           beyond = self%x(i, axis) - (high(axis) - inset)
         end if
         if (.not. beyond > 0) cycle
-        if (passes(sim, side)) then
+        if (is_periodic_side(sim, side)) then
           before = self%x(i, :)
           call pass_side(sim, i, side, sim%now)
           self%x(i, :) = sim%position(i)

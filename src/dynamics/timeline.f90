@@ -191,7 +191,7 @@ contains
 
     text = ""
     if (sim%tally%collapse < never) text = "passed an inelastic collapse, in " &
-      //counted(sim%tally%stuck, "collision")//" that took no time, the first at time "//written(sim%tally%collapse) &
+      //counted(sim%tally%simultaneous, "collision")//" that took no time, the first at time "//written(sim%tally%collapse) &
       //": rounding decides what follows; "//longer_contacts(sim)
   end function passed_collapse
 
@@ -204,7 +204,7 @@ contains
     integer(int64) :: contacts                     ! number of contacts of all disks
     real(real64) :: proposal                       ! [time]
 
-    contacts = sim%tally%events + sim%tally%collisions - 2*sim%tally%stuck
+    contacts = sim%tally%events + sim%tally%collisions - 2*sim%tally%simultaneous
     proposal = max(share*sim%time()*sim%n_disks()/max(contacts, 1_int64), blinks*sim%blink)
     if (sim%law%contact_time >= proposal) then
       text = "contact.contact_time is long already: take run.dynamics = 'steps'"

@@ -437,7 +437,7 @@ contains
       associate (tally => sim%tally)
         call record%exchange(file, tally%events)
         call record%exchange(file, tally%collisions)
-        call record%exchange(file, tally%stuck)
+        call record%exchange(file, tally%simultaneous)
         call record%exchange(file, tally%collapse)
         call exchange_sums(tally%sum)
         call record%exchange(file, tally%hits)

@@ -15,7 +15,7 @@ module encounters
   use wall_hits, only: collide_wall
   implicit none
   private
-  public :: collide, collide_pair, encounter_text, pass_side, passes
+  public :: collide, collide_pair, encounter_text, is_periodic_side, pass_side
 
   !> Limits for the detection of an inelastic collapse: the number of simultaneous collisions of a pair that any series may have,
   !> and the approach velocity below which further collisions only result from rounding errors. The latter is relative to the
@@ -47,13 +47,14 @@ contains
     first = i
     second = min(code, 0)
     if (code > 0) then
-      if (are_together(sim, i, code, t)) then
-        call keep_apart(sim, i, code)
+      if (are_in_contact(sim, i, code, t)) then
+        call remove_residual_approach(sim, i, code)
         return
       end if
       first = merge(i, code, sim%tag(i)%id < sim%tag(code)%id)
       second = i + code - first
-      if (.not. min(sim%disk(i)%clock, sim%disk(code)%clock) < t) call note_stuck(sim, i, code, t, counts, n_repeats)
+      if (.not. min(sim%disk(i)%clock, sim%disk(code)%clock) < t) &
+        call count_simultaneous_collision(sim, i, code, t, counts, n_repeats)
       call sim%rotate_to(second, t)
     end if
     call sim%rotate_to(first, t)
@@ -62,10 +63,11 @@ contains
     if (code > 0) w = flight_velocity(sim%disk(second)%v, sim%box%gravity, t - sim%disk(second)%clock)
     if (code > 0) then
       restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species)
-      if (sim%law%by_speed%speed > 0) restitution = sim%law%by_speed%restitution_at(restitution, approach(sim, i, code, t))
+      if (sim%law%by_speed%speed > 0) restitution = sim%law%by_speed%restitution_at(restitution, impact_velocity(sim, i, code, t))
       call collide_pair(sim, i, code, t, counts, restitution)
       if (n_repeats > 0) sim%tag([i, code])%met = repeated(sim%tag([code, i])%id, n_repeats)
-      if (sim%law%grip%is_rough()) call rub(sim, first, second, impulse_between(sim, first, second, v, w), counts)
+      if (sim%law%grip%is_rough()) &
+        call apply_tangential_impulse(sim, first, second, impulse_between(sim, first, second, v, w), counts)
     else
       call collide_wall(sim, i, code, t, counts)
     end if
@@ -104,7 +106,7 @@ contains
     dx = sim%disk(j)%x - sim%disk(i)%x
     dv = sim%disk(j)%v - sim%disk(i)%v
     if (any(sim%box%periodic)) then
-      if (any(abs(dx) >= 0.5_real64*sim%box%edges())) call see_nearest(sim, t, dx, dv)    ! rarely needed
+      if (any(abs(dx) >= 0.5_real64*sim%box%edges())) call use_nearest_image(sim, t, dx, dv)  ! rarely needed
     end if
     b = dx(1)*dv(1) + dx(2)*dv(2)
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
@@ -118,7 +120,7 @@ contains
     sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx  ! multiplication by a reciprocal would be rounded in the same direction each time
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     dv = sim%disk(j)%v - sim%disk(i)%v
-    if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call keep_apart(sim, i, j)    ! the pair still approaches, by rounding
+    if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call remove_residual_approach(sim, i, j)  ! the pair still approaches, by rounding
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(j)%collisions = sim%tag(j)%collisions + 1
     sim%tag(i)%met = sim%tag(j)%id
@@ -131,7 +133,7 @@ contains
   end subroutine collide_pair
 
   !> Normal impact velocity of disks i and j at the time t.
-  pure function approach(sim, i, j, t) result(g)
+  pure function impact_velocity(sim, i, j, t) result(g)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
@@ -144,15 +146,15 @@ contains
     call advance_disk(q, sim%box%gravity, t)
     dx = q%x - p%x
     dv = q%v - p%v
-    call see_nearest(sim, t, dx, dv)
+    call use_nearest_image(sim, t, dx, dv)
     g = abs(dot_product(dx, dv))/magnitude(dx)
-  end function approach
+  end function impact_velocity
 
   !> Counts a lossy collision of two disks both of which have already collided at exactly this time. This is common when more than
   !> two disks are in contact, and the series usually ends. An inelastic collapse is an infinite series: the same disks collide
   !> again and again until their approach velocity is no more than the rounding error of their velocities. Elastic disks and
   !> disks with a contact duration (TC model) cannot collapse.
-  pure subroutine note_stuck(sim, i, j, t, counts, n)
+  pure subroutine count_simultaneous_collision(sim, i, j, t, counts, n)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
@@ -168,15 +170,15 @@ contains
     n = minval(merge(repeats(met), most_repeats, met > 0)) + 1  ! if one of them has hit a wall in between, its partner's count is
                                                                 ! used
     fastest = max(magnitude(sim%disk(i)%v), magnitude(sim%disk(j)%v))
-    if (approach(sim, i, j, t) > max(rounded*(1 - restitution)*fastest, slowest)) n = min(n, most_visible)
+    if (impact_velocity(sim, i, j, t) > max(rounded*(1 - restitution)*fastest, slowest)) n = min(n, most_visible)
     n = min(n, most_repeats)
     if (.not. counts) return
-    sim%tally%stuck = sim%tally%stuck + 1
+    sim%tally%simultaneous = sim%tally%simultaneous + 1
     if (n == most_repeats) sim%tally%collapse = min(sim%tally%collapse, sim%box%epoch + t)
-  end subroutine note_stuck
+  end subroutine count_simultaneous_collision
 
   !> Applies the tangential impulse in a collision of the rough disks i and j, after the normal impulse.
-  subroutine rub(sim, i, j, normal_impulse, counts)
+  subroutine apply_tangential_impulse(sim, i, j, normal_impulse, counts)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: normal_impulse   !! [mass length/time]
@@ -186,7 +188,7 @@ contains
     associate (p => sim%disk(i), q => sim%disk(j), law => sim%law)
       along = q%x - p%x
       dv = q%v - p%v
-      call see_nearest(sim, p%clock, along, dv)
+      call use_nearest_image(sim, p%clock, along, dv)
       along = [along(2), -along(1)]/magnitude(along)             ! z x n, with n from j to i
       dv = -dv
       slip = dot_product(dv, along) - (p%radius*sim%spin(i) + q%radius*sim%spin(j))
@@ -201,8 +203,8 @@ contains
       if (counts) call sim%tally%sum(dissipated)%add( &
         -impulse*(slip + 0.5_real64*impulse*(1 + 1/law%inertia)/reduced))
     end associate
-    call keep_apart(sim, i, j)
-  end subroutine rub
+    call remove_residual_approach(sim, i, j)
+  end subroutine apply_tangential_impulse
 
   !> Change of the momentum of disk i in a collision with a surface or with disk j. If disk i is far heavier than its partner, its
   !> velocity change is dominated by rounding, and the momentum lost by the partner is used.
@@ -281,7 +283,7 @@ contains
 
     r = sim%disk(i)%x - sim%disk(j)%x
     slip = 0
-    call see_nearest(sim, sim%disk(i)%clock, r, slip)
+    call use_nearest_image(sim, sim%disk(i)%clock, r, slip)
     do a = 1, 2
       do b = 1, 2
         call sim%tally%sum(stress + 2*(a - 1) + b - 1)%add(change(a)*r(b))
@@ -290,11 +292,11 @@ contains
     if (sim%with%helfand) call sim%tally%sum(heat_virial:heat_virial + 1)%add(transferred_energy*r)
     if (.not. sim%box%is_sheared()) return
     call sim%tally%sum(work)%add(-slip(1)*change(1))
-    call keep_apart(sim, i, j)
+    call remove_residual_approach(sim, i, j)
   end subroutine add_pair_sums
 
   !> Replaces the separation and relative velocity of two disks at the time t by those to the nearest image of the second disk.
-  pure subroutine see_nearest(sim, t, dx, dv)
+  pure subroutine use_nearest_image(sim, t, dx, dv)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: t
     real(real64), intent(inout) :: dx(2)         !! [length]
@@ -307,11 +309,11 @@ contains
     image = images%image(images%nearest_image(dx, t))
     dx = dx + [image%shift(1) + image%slip*t, image%shift(2)]
     dv(1) = dv(1) + image%slip
-  end subroutine see_nearest
+  end subroutine use_nearest_image
 
   !> True if disks i and j, which touch at the time t, are still in contact after their last collision, through the same
   !> periodic image. Without forces between them, an approach is then a rounding error, from the shift of one disk by a period.
-  pure function are_together(sim, i, j, t) result(yes)
+  pure function are_in_contact(sim, i, j, t) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
@@ -328,11 +330,11 @@ contains
       yes = .not. (p%clock < q%clock .or. p%clock > q%clock) &
         .and. all(abs(images%nearest_image(then, p%clock) - images%nearest_image(dx, t)) <= 0)
     end associate
-  end function are_together
+  end function are_in_contact
 
   !> Removes the approach velocity that rounding can leave after a collision. The test uses the same expression as the prediction
   !> of contacts, so that the pair is not predicted to collide again. No event is counted, and the clocks do not change.
-  pure subroutine keep_apart(sim, i, j)
+  pure subroutine remove_residual_approach(sim, i, j)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64) :: dx(2), dv(2), slip, step, mass_i, mass_j
@@ -340,7 +342,7 @@ contains
     associate (p => sim%disk(i), q => sim%disk(j))
       dx = q%x - p%x
       dv = 0
-      call see_nearest(sim, p%clock, dx, dv)
+      call use_nearest_image(sim, p%clock, dx, dv)
       slip = dv(1)
       mass_i = sim%mass_of(i)
       mass_j = sim%mass_of(j)
@@ -355,17 +357,17 @@ contains
       p%stamp = p%stamp + 1
       q%stamp = q%stamp + 1
     end associate
-  end subroutine keep_apart
+  end subroutine remove_residual_approach
 
   !> Whether a code is that of a periodic side.
-  pure function passes(sim, code) result(yes)
+  pure function is_periodic_side(sim, code) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: code
     logical :: yes
 
     yes = .false.
     if (is_side(code)) yes = sim%box%periodic(axis_of(code))
-  end function passes
+  end function is_periodic_side
 
   !> Moves disk i by one period when it passes a periodic side at the time t. Its clock does not change.
   subroutine pass_side(sim, i, code, t)
@@ -377,7 +379,7 @@ contains
     axis = axis_of(code)
     period = sense_of(code)
     if (axis == 2 .and. sim%box%is_sheared()) then
-      call pass_seam(sim, i, period, t)
+      call pass_sheared_boundary(sim, i, period, t)
       return
     end if
     associate (d => sim%disk(i), edges => sim%box%edges())
@@ -389,7 +391,7 @@ contains
 
   !> Moves disk i across the lower or upper boundary of a sheared box (Lees-Edwards): its position is shifted by the
   !> displacement of the image, and its velocity by the velocity of the image. No force acts on the disk.
-  subroutine pass_seam(sim, i, rows, t)
+  subroutine pass_sheared_boundary(sim, i, rows, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer, intent(in) :: rows                  !! 1 across the upper boundary, -1 across the lower one
@@ -407,7 +409,7 @@ contains
       d%stamp = d%stamp + 1
       call sim%tally%sum(work)%add(0.5_real64*sim%mass_of(i)*(d%v(1) - v)*(d%v(1) + v))
     end associate
-  end subroutine pass_seam
+  end subroutine pass_sheared_boundary
 
   !> Disk i, its partner and the time, as a text for messages.
   pure function encounter_text(sim, i, code) result(text)

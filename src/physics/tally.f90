@@ -38,7 +38,7 @@ module tally
   type :: tally_t
     integer(int64) :: events = 0                   !! number of events
     integer(int64) :: collisions = 0               !! number of collisions of disks
-    integer(int64) :: stuck = 0                    !! number of simultaneous lossy ones, see `encounters: note_stuck`
+    integer(int64) :: simultaneous = 0             !! those in a series at one time, see `encounters: count_simultaneous_collision`
     real(real64) :: collapse = never               !! time of the first collapse, since the start of the run [time]
     type(exact_sum_t) :: sum(size(sums))
     integer(int64), allocatable :: hits(:)         !! (surfaces) number of collisions with each
@@ -99,7 +99,7 @@ contains
 
     self%events = self%events + other%events
     self%collisions = self%collisions + other%collisions
-    self%stuck = self%stuck + other%stuck
+    self%simultaneous = self%simultaneous + other%simultaneous
     self%collapse = min(self%collapse, other%collapse)
     call self%sum%include(other%sum)
     self%hits = self%hits + other%hits
@@ -112,7 +112,7 @@ contains
 
     self%events = 0
     self%collisions = 0
-    self%stuck = 0
+    self%simultaneous = 0
     self%collapse = never
     call self%sum%clear()
     self%hits = 0

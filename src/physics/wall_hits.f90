@@ -50,7 +50,7 @@ contains
       end if
       ! Not in time-stepped dynamics.
       if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call part(sim, i, code, normal)
-      if (law%grip%is_rough()) call rub_wall(sim, i, law%grip, normal, u, v)
+      if (law%grip%is_rough()) call apply_tangential_impulse_at_wall(sim, i, law%grip, normal, u, v)
     end if
     if (sim%box%surface(k)%motion%kind == piston) call push(sim, i, code, normal, v, u, t)
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
@@ -141,7 +141,7 @@ contains
   end subroutine part
 
   !> Applies the tangential impulse in a collision of disk i with a rough wall, after the normal impulse.
-  pure subroutine rub_wall(sim, i, grip, normal, u, before)
+  pure subroutine apply_tangential_impulse_at_wall(sim, i, grip, normal, u, before)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     type(grip_t), intent(in) :: grip
@@ -157,7 +157,7 @@ contains
       disk%v = disk%v + (impulse/mass)*along
       call sim%change_angular_momentum(i, -disk%radius*impulse)
     end associate
-  end subroutine rub_wall
+  end subroutine apply_tangential_impulse_at_wall
 
   !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk consists of the work of the
   !> moving surface and of heat from a thermal wall or, at other walls, dissipation.
