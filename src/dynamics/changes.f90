@@ -97,7 +97,7 @@ contains
     do i = 1, sim%n_disks()
       call sim%rotate_to(i, sim%now)
       call advance_disk(sim%disk(i), sim%box%gravity, sim%now)
-      sim%tag(i)%met = 0
+      sim%tag(i)%last_partner = 0
     end do
   end subroutine advance_all
 

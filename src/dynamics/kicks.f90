@@ -83,7 +83,7 @@ contains
       if (.not. is_hit) return
       call sim%rotate_to(i, sim%now)
       call advance_disk(sim%disk(i), sim%box%gravity, sim%now)
-      sim%tag(i)%met = 0
+      sim%tag(i)%last_partner = 0
       call stream%draw_normals(z)
       if (drive%kind == noise) then
         call change_velocity(sim, i, sim%disk(i)%v + sqrt(drive%strength*drive%interval)*z)

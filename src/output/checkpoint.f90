@@ -471,7 +471,7 @@ contains
         call exchange_short(tag%species)
         call exchange_short(tag%id)
         call record%exchange(file, tag%collisions)
-        call exchange_short(tag%met)
+        call exchange_short(tag%last_partner)
         if (sim%with%own_sizes) call record%exchange(file, disk%radius)      ! otherwise the radii follow from the input
       end associate
       settled = merge(1, 0, sim%settled)

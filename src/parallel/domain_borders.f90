@@ -96,7 +96,8 @@ contains
       associate (mine => self%sim%disk(s), theirs => other%sim%disk(t))
         yes = .not. (mine%clock /= theirs%clock .or. mine%x(1) /= theirs%x(1) .or. mine%x(2) /= theirs%x(2) &
           .or. mine%v(1) /= theirs%v(1) .or. mine%v(2) /= theirs%v(2)) &
-          .and. self%sim%tag(s)%collisions == other%sim%tag(t)%collisions .and. self%sim%tag(s)%met == other%sim%tag(t)%met
+          .and. self%sim%tag(s)%collisions == other%sim%tag(t)%collisions &
+          .and. self%sim%tag(s)%last_partner == other%sim%tag(t)%last_partner
       end associate
       if (.not. yes .or. .not. allocated(self%sim%extra)) return
       ! Compares all components bitwise.

@@ -7,7 +7,7 @@ module encounters
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity
   use images, only: image_t, images_t
-  use partners, only: axis_of, is_side, is_wall, met_id, most_repeats, repeated, repeats, sense_of
+  use partners, only: axis_of, is_side, is_wall, last_partner_id, most_repeats, repeated, repeats, sense_of
   use shapes, only: magnitude
   use simulation_state, only: simulation_t
   use tally, only: dissipated, heat_virial, stress, virial, work
@@ -65,7 +65,7 @@ contains
       restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species)
       if (sim%law%by_speed%speed > 0) restitution = sim%law%by_speed%restitution_at(restitution, impact_velocity(sim, i, code, t))
       call collide_pair(sim, i, code, t, counts, restitution)
-      if (n_repeats > 0) sim%tag([i, code])%met = repeated(sim%tag([code, i])%id, n_repeats)
+      if (n_repeats > 0) sim%tag([i, code])%last_partner = repeated(sim%tag([code, i])%id, n_repeats)
       if (sim%law%grip%is_rough()) &
         call apply_tangential_impulse(sim, first, second, impulse_between(sim, first, second, v, w), counts)
     else
@@ -123,8 +123,8 @@ contains
     if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call remove_residual_approach(sim, i, j)  ! the pair still approaches, by rounding
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(j)%collisions = sim%tag(j)%collisions + 1
-    sim%tag(i)%met = sim%tag(j)%id
-    sim%tag(j)%met = sim%tag(i)%id
+    sim%tag(i)%last_partner = sim%tag(j)%id
+    sim%tag(j)%last_partner = sim%tag(i)%id
     if (.not. counts) return
     sim%tally%events = sim%tally%events + 1
     sim%tally%collisions = sim%tally%collisions + 1
@@ -161,14 +161,14 @@ contains
     logical, intent(in) :: counts                !! the collision is included in the tally
     integer(int32), intent(out) :: n             !! length of the series so far, see `partners: most_repeats`
     real(real64) :: restitution, fastest
-    integer(int32) :: met(2)
+    integer(int32) :: last_partner(2)
 
     n = 0
     restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(j)%species)
     if (sim%law%contact_time > 0 .or. .not. restitution < 1) return
-    met = sim%tag([i, j])%met
-    n = minval(merge(repeats(met), most_repeats, met > 0)) + 1  ! if one of them has hit a wall in between, its partner's count is
-                                                                ! used
+    last_partner = sim%tag([i, j])%last_partner
+    ! If one of the disks has hit a wall in between, the count of the other one is used.
+    n = minval(merge(repeats(last_partner), most_repeats, last_partner > 0)) + 1
     fastest = max(magnitude(sim%disk(i)%v), magnitude(sim%disk(j)%v))
     if (impact_velocity(sim, i, j, t) > max(rounded*(1 - restitution)*fastest, slowest)) n = min(n, most_visible)
     n = min(n, most_repeats)
@@ -321,7 +321,7 @@ contains
     type(images_t) :: images
     real(real64) :: then(2), dx(2)
 
-    yes = met_id(sim%tag(i)%met) == sim%tag(j)%id .and. met_id(sim%tag(j)%met) == sim%tag(i)%id
+    yes = last_partner_id(sim%tag(i)%last_partner) == sim%tag(j)%id .and. last_partner_id(sim%tag(j)%last_partner) == sim%tag(i)%id
     if (.not. yes) return
     images = sim%images()
     associate (p => sim%disk(i), q => sim%disk(j), g => sim%box%gravity)

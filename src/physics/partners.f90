@@ -6,7 +6,7 @@ module partners
   implicit none
   private
   public :: n_sides, side_name, is_side, is_wall, axis_of, sense_of, crossing, side_crossed, looks_again, nothing
-  public :: met_id, most_repeats, repeated, repeats
+  public :: last_partner_id, most_repeats, repeated, repeats
   public :: obstacle_code, obstacle_number
 
   integer(int32), parameter :: n_sides = 4
@@ -85,31 +85,31 @@ contains
     side = code - first_crossing
   end function side_crossed
 
-  !> The value of `met` for a disk that has collided with its partner as the n-th in a series of simultaneous collisions. Such
-  !> series are rare; all other collisions store the plain id of the partner.
-  elemental function repeated(id, n) result(met)
+  !> The value of `last_partner` for a disk that has collided with its partner as the n-th in a series of simultaneous collisions.
+  !> Such series are rare; all other collisions store the plain id of the partner.
+  elemental function repeated(id, n) result(last_partner)
     integer(int32), intent(in) :: id               !! id of the partner, a disk
     integer(int32), intent(in) :: n                !! length of the series, at most `most_repeats`
-    integer(int32) :: met
+    integer(int32) :: last_partner
 
-    met = id + n*per_repeat
+    last_partner = id + n*per_repeat
   end function repeated
 
   !> The id of the last partner, if it is a disk; otherwise the code of an obstacle, or 0.
-  elemental function met_id(met) result(id)
-    integer(int32), intent(in) :: met
+  elemental function last_partner_id(last_partner) result(id)
+    integer(int32), intent(in) :: last_partner
     integer(int32) :: id
 
-    id = met
-    if (met > 0) id = modulo(met, per_repeat)
-  end function met_id
+    id = last_partner
+    if (last_partner > 0) id = modulo(last_partner, per_repeat)
+  end function last_partner_id
 
   !> Length of the series of simultaneous collisions to which the last collision belonged.
-  elemental function repeats(met) result(n)
-    integer(int32), intent(in) :: met
+  elemental function repeats(last_partner) result(n)
+    integer(int32), intent(in) :: last_partner
     integer(int32) :: n
 
-    n = max(met, 0_int32)/per_repeat
+    n = max(last_partner, 0_int32)/per_repeat
   end function repeats
 
 end module partners

@@ -38,7 +38,7 @@ module tally
   type :: tally_t
     integer(int64) :: events = 0                   !! number of events
     integer(int64) :: collisions = 0               !! number of collisions of disks
-    integer(int64) :: simultaneous = 0             !! those in a series at one time, see `encounters: count_simultaneous_collision`
+    integer(int64) :: simultaneous = 0             !! simultaneous lossy collisions, see `encounters: count_simultaneous_collision`
     real(real64) :: collapse = never               !! time of the first collapse, since the start of the run [time]
     type(exact_sum_t) :: sum(size(sums))
     integer(int64), allocatable :: hits(:)         !! (surfaces) number of collisions with each

@@ -54,7 +54,7 @@ contains
     end if
     if (sim%box%surface(k)%motion%kind == piston) call push(sim, i, code, normal, v, u, t)
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
-    sim%tag(i)%met = merge(0, code, is_side(code))
+    sim%tag(i)%last_partner = merge(0, code, is_side(code))
     if (counts) call count_hit(sim, i, k, law%temperature > 0, u, v, omega)
   end subroutine collide_wall
 
@@ -125,14 +125,14 @@ contains
     integer(int32), intent(in) :: i, code
     real(real64), intent(in) :: normal(2)        !! unit vector from the wall to the disk
     real(real64) :: speed, t
-    integer(int32) :: met
+    integer(int32) :: partner
 
     associate (disk => sim%disk(i), contact_time => sim%law%contact_time)
       speed = epsilon(speed)*disk%radius/contact_time
       do while (speed < disk%radius/contact_time)
         t = never
         if (is_side(code)) t = side_time(sim%box, disk, code)
-        if (.not. is_side(code)) call next_obstacle(sim%box, disk, code, [code], t, met)
+        if (.not. is_side(code)) call next_obstacle(sim%box, disk, code, [code], t, partner)
         if (t - disk%clock > while_parted*contact_time) exit
         disk%v = disk%v + speed*normal
         speed = 2*speed

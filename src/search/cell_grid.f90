@@ -557,7 +557,7 @@ contains
           else
             number = entry%image
             shift = self%images%shift(number)
-            call meet_image(sim%box, sim%disk(i), sim%tag(i)%met, entry%code, shift, near%time, near%partner)
+            call meet_image(sim%box, sim%disk(i), sim%tag(i)%last_partner, entry%code, shift, near%time, near%partner)
           end if
           e = entry%next
         end associate
@@ -572,7 +572,7 @@ contains
 
       number = self%reach%number_of(i)
       call next_side(sim%box, sim%disk(i), near%time, near%partner)
-      call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, [(obstacle_code(m), m=1, sim%box%n_obstacles())], &
+      call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%last_partner, [(obstacle_code(m), m=1, sim%box%n_obstacles())], &
         near%time, near%partner)
       t_margin = sim%now + time_to_circle(sim%position(i) - self%reach%big(number)%centre, sim%velocity(i), &
         sim%box%gravity, self%reach%margin, inside=.true.)

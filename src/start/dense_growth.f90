@@ -188,7 +188,7 @@ contains
       do i = 1, sim%n_disks()
         sim%disk(i)%x = sim%position(i)
         sim%disk(i)%clock = sim%now
-        sim%tag(i)%met = 0                              ! the gap to the last partner may have closed by growth
+        sim%tag(i)%last_partner = 0                     ! the gap to the last partner may have closed by growth
       end do
     end subroutine move
 
