@@ -17,7 +17,7 @@ module epochs
   integer, parameter :: significant_bits = 20  !! significant bits of the length of an epoch, few enough for exact sums of lengths
   !> Number of events without advance of time that is considered a collapse: at least this number, and this number per disk.
   integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
-  real(real64), parameter :: shortest = 2.0_real64**(-20)  !! shortest epoch in units of `blink`
+  real(real64), parameter :: shortest = 2.0_real64**(-20)  !! shortest epoch in units of `negligible_time`
   real(real64), parameter :: last_time = 0.5_real64*never
   real(real64), parameter :: crushing = 1.0e6_real64 !! factor of energy growth by which crushed disks are recognised
   real(real64), parameter :: densest = 0.9_real64  !! largest packing fraction used in the estimate
@@ -39,7 +39,7 @@ contains
       end associate
     end do
     mean = mean + sim%fastest_drive()**2
-    sim%blink = 1.0e-9_real64*minval(sim%disk%radius)/sqrt(max(fastest, tiny(fastest)))
+    sim%negligible_time = 1.0e-9_real64*minval(sim%disk%radius)/sqrt(max(fastest, tiny(fastest)))
     call begin_epoch(sim, events_per_epoch(sim)/(sqrt(max(mean, tiny(mean)))*sim%n_disks()*events_per_path()))
     sim%last_advance = sim%now
     sim%events_then = sim%tally%events
@@ -71,7 +71,7 @@ contains
     real(real64), intent(in) :: length             !! [time]
 
     sim%epoch_begin = sim%now
-    sim%epoch_end = min(sim%now + max(length, shortest*sim%blink), last_time)
+    sim%epoch_end = min(sim%now + max(length, shortest*sim%negligible_time), last_time)
     sim%epoch_events = sim%tally%events
   end subroutine begin_epoch
 
@@ -82,7 +82,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     real(real64) :: shift, length
 
-    if (sim%now - sim%last_advance >= sim%blink) then
+    if (sim%now - sim%last_advance >= sim%negligible_time) then
       sim%last_advance = sim%now
       sim%events_then = sim%tally%events
     end if
@@ -154,24 +154,24 @@ contains
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
-    yes = sim%now - sim%last_advance < sim%blink &
+    yes = sim%now - sim%last_advance < sim%negligible_time &
       .and. sim%tally%events - sim%events_then >= max(collapse_length, collapse_length_per_disk*sim%n_disks())
   end function stands_still
 
   !> Whether all disks are at rest. The bounces of a disk that falls back on a surface at rest take ever shorter times with a
-  !> finite sum. A disk is considered at rest if its remaining bounces would end within a blink and its last one was within a
-  !> blink. Without gravity it is at rest if it does not move.
+  !> finite sum. A disk is considered at rest if its remaining bounces would end within `negligible_time`, and its last one
+  !> occurred within that time. Without gravity it is at rest if it does not move.
   pure function is_at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
     real(real64) :: slow                           ! [length/time]
     integer(int32) :: i
 
-    slow = magnitude(sim%box%gravity)*sim%blink
+    slow = magnitude(sim%box%gravity)*sim%negligible_time
     yes = .true.
     do i = 1, sim%n_disks()
       yes = magnitude(sim%velocity(i)) <= slow .and. abs(sim%spin(i))*sim%disk(i)%radius <= slow
-      if (sim%box%falling()) yes = yes .and. sim%now - sim%disk(i)%clock <= sim%blink
+      if (sim%box%falling()) yes = yes .and. sim%now - sim%disk(i)%clock <= sim%negligible_time
       if (.not. yes) return
     end do
   end function is_at_rest

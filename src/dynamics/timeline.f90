@@ -137,7 +137,7 @@ contains
     logical :: from_the_start
 
     text = "time no longer advances: "//encounter_text(sim, i, code)
-    from_the_start = .not. sim%time() > sim%blink
+    from_the_start = .not. sim%time() > sim%negligible_time
     if (slides(sim, i, code) .and. (from_the_start .or. .not. may_lose(sim, i, code))) then
       text = text//"; the disk slides along a concave obstacle, in an unbounded number of collisions: start it with a gap to " &
         //"the obstacle, "//steps
@@ -200,12 +200,12 @@ contains
   pure function longer_contacts(sim) result(text)
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text
-    real(real64), parameter :: share = 0.01_real64, blinks = 1.0e5_real64
+    real(real64), parameter :: share = 0.01_real64, negligible_times = 1.0e5_real64
     integer(int64) :: contacts                     ! number of contacts of all disks
     real(real64) :: proposal                       ! [time]
 
     contacts = sim%tally%events + sim%tally%collisions - 2*sim%tally%simultaneous
-    proposal = max(share*sim%time()*sim%n_disks()/max(contacts, 1_int64), blinks*sim%blink)
+    proposal = max(share*sim%time()*sim%n_disks()/max(contacts, 1_int64), negligible_times*sim%negligible_time)
     if (sim%law%contact_time >= proposal) then
       text = "contact.contact_time is long already: take run.dynamics = 'steps'"
       return

@@ -2,7 +2,7 @@
 module input_settings
   use kinds, only: int64, never, real64
   use box_geometry, only: box_t
-  use collisions, only: grip_t, restitution_laws, series_terms, wall_law_t, wall_rules
+  use collisions, only: tangential_law_t, restitution_laws, series_terms, wall_law_t, wall_rules
   use disks, only: names_of
   use drive, only: drive_kinds
   use input_groups, only: group_t, range_of
@@ -106,8 +106,8 @@ contains
         call check_least(group, "restitution", law%by_speed, problems)
         call check_least(group, "wall_restitution", law%by_speed, problems)
         call check_least(group, "pair_restitution", law%by_speed, problems)
-        call take_grip(group, "", grip_t(), law%grip, problems)
-        call take_grip(group, "wall_", law%grip, wall_law%grip, problems)
+        call take_grip(group, "", tangential_law_t(), law%tangential, problems)
+        call take_grip(group, "wall_", law%tangential, wall_law%tangential, problems)
         law%inertia = group%real_of("inertia", 0.5_real64)
         law%contact_time = group%real_of("contact_time", 0.0_real64)
         call group%put_reals("wall_restitution", [wall_law%restitution])

@@ -2,7 +2,7 @@
 module input_surfaces
   use box_geometry, only: box_t
   use circles, only: new_circle
-  use collisions, only: grip_t, normal_rule, speed_law_t, wall_law_t, wall_rules
+  use collisions, only: tangential_law_t, normal_rule, speed_law_t, wall_law_t, wall_rules
   use errors, only: error_t, exit_files
   use input_problems, only: problem_list_t
   use input_species, only: check_name
@@ -152,7 +152,7 @@ contains
     real(real64) :: width                                 ! of the box [length]
 
     box%surface%law = otherwise
-    if (otherwise%rule /= normal_rule) box%surface%law%grip = grip_t()
+    if (otherwise%rule /= normal_rule) box%surface%law%tangential = tangential_law_t()
     line_of = 0
     do k = 1, size(sides)
       side = place_of(trim(sides(k)%instance), side_name)
@@ -200,11 +200,11 @@ contains
       call check_least(group, "restitution", law%by_speed, problems)
       law%restitution = group%real_of("restitution", otherwise%restitution)
       call group%put_reals("restitution", [law%restitution])
-      if (law%rule == normal_rule) call take_grip(group, "", otherwise%grip, law%grip, problems)
-      if (law%grip%is_rough()) call group%put_reals("tangential_restitution", [law%grip%restitution])
-      if (law%grip%is_rough() .and. law%grip%friction < huge(law%grip%friction)) &
-        call group%put_reals("friction", [law%grip%friction])
-      if (abs(law%speed) > 0 .and. .not. law%grip%is_rough()) call group%complain("surface_velocity", &
+      if (law%rule == normal_rule) call take_grip(group, "", otherwise%tangential, law%tangential, problems)
+      if (law%tangential%is_rough()) call group%put_reals("tangential_restitution", [law%tangential%restitution])
+      if (law%tangential%is_rough() .and. law%tangential%friction < huge(law%tangential%friction)) &
+        call group%put_reals("friction", [law%tangential%friction])
+      if (abs(law%speed) > 0 .and. .not. law%tangential%is_rough()) call group%complain("surface_velocity", &
         "has no effect on disks without temperature or tangential_restitution of the same wall", problems)
     end subroutine take_law
 
@@ -270,8 +270,8 @@ contains
   subroutine take_grip(group, prefix, otherwise, grip, problems)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: prefix
-    type(grip_t), intent(in) :: otherwise
-    type(grip_t), intent(out) :: grip
+    type(tangential_law_t), intent(in) :: otherwise
+    type(tangential_law_t), intent(out) :: grip
     type(problem_list_t), intent(inout) :: problems
 
     grip%restitution = group%real_of(prefix//"tangential_restitution", otherwise%restitution)

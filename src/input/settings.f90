@@ -126,7 +126,7 @@ contains
 
     associate (with => self%with, species => self%species)
       with%own_sizes = any(species%mass_in_file .or. species%radius_in_file .or. species%polydispersity > 0)
-      with%rotation = self%law%grip%is_rough() .or. self%box%has_rough_walls() .or. any(abs(species%angular_velocity) > 0 &
+      with%rotation = self%law%tangential%is_rough() .or. self%box%has_rough_walls() .or. any(abs(species%angular_velocity) > 0 &
         .or. species%rotational_temperature >= 0 .or. species%spin_in_file)
       with%orientation = with%rotation .or. self%drive%kind == active .or. any(species%angle_in_file)
       with%helfand = self%output%helfand

@@ -404,7 +404,7 @@ contains
     call record%exchange(file, sim%epoch_begin)
     call record%exchange(file, sim%epoch_end)
     call record%exchange(file, sim%epoch_events)
-    call record%exchange(file, sim%blink)
+    call record%exchange(file, sim%negligible_time)
     call record%exchange(file, sim%last_advance)
     call record%exchange(file, sim%events_then)
     call record%exchange(file, sim%start_energy)

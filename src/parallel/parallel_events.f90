@@ -148,7 +148,7 @@ contains
       end if
       ! The serial engine finds the exact event at which a count reaches its limit or a collapse occurs.
       too_far = good
-      if (good) too_far = limits%outgrown(self%parts%tally_now(sim)) .or. t - sim%last_advance < sim%blink
+      if (good) too_far = limits%outgrown(self%parts%tally_now(sim)) .or. t - sim%last_advance < sim%negligible_time
       if (good .and. .not. too_far) then
         call self%parts%write_back_all(sim, t)
         self%arrived = t >= limits%time

@@ -218,7 +218,7 @@ contains
     logical :: yes
     integer :: k
 
-    yes = any([(self%is_wall(k), k=1, size(self%surface))] .and. self%surface%law%grip%is_rough())
+    yes = any([(self%is_wall(k), k=1, size(self%surface))] .and. self%surface%law%tangential%is_rough())
   end function has_rough_walls
 
   !> Highest temperature of a thermal wall.

@@ -3,8 +3,8 @@ module collisions
   use kinds, only: real64
   implicit none
   private
-  public :: contact_law_t, grip_t, normal_rule, pair_impulse, restitution_laws, series_terms, speed_law_t, tangential_impulse
-  public :: wall_law_t, wall_rebound, wall_rules
+  public :: contact_law_t, normal_rule, pair_impulse, restitution_laws, series_terms, speed_law_t
+  public :: tangential_impulse, tangential_law_t, wall_law_t, wall_rebound, wall_rules
 
   !> Names of the wall rules in the input. A rule is represented by its position in this list.
   character(len=*), parameter :: wall_rules = "velocity normal"
@@ -28,19 +28,19 @@ module collisions
 
   !> Tangential interaction of two rough surfaces (Walton 1993; Luding, Huthmann, McNamara and Zippelius,
   !> Phys. Rev. E 57, 3416 (1998)).
-  type :: grip_t
+  type :: tangential_law_t
     real(real64) :: restitution = -1.0_real64        !! tangential restitution, from -1 (smooth) to 1
     real(real64) :: friction = huge(1.0_real64)      !! Coulomb friction coefficient; huge: no limit
   contains
     procedure :: is_rough
-  end type grip_t
+  end type tangential_law_t
 
   !> The contact law of a wall.
   type :: wall_law_t
     real(real64) :: restitution = 1.0_real64
     integer :: rule = 1                              !! position in `wall_rules`
     type(speed_law_t) :: by_speed = speed_law_t()
-    type(grip_t) :: grip = grip_t()
+    type(tangential_law_t) :: tangential = tangential_law_t()
     real(real64) :: temperature = 0.0_real64         !! kT of a thermal wall; 0: not thermal [energy]
     real(real64) :: speed = 0.0_real64               !! tangential velocity of the surface [length/time]
   end type wall_law_t
@@ -52,7 +52,7 @@ module collisions
     !> Contact duration t_c of the TC model (Luding and McNamara, Granular Matter 1, 113 (1998)): a collision is elastic if one
     !> of the partners had its previous collision less than this time ago. [time]
     real(real64) :: contact_time = 0.0_real64
-    type(grip_t) :: grip = grip_t()                  !! tangential interaction of two disks
+    type(tangential_law_t) :: tangential = tangential_law_t()  !! tangential interaction of two disks
     real(real64) :: inertia = 0.5_real64             !! moment of inertia over mass times radius squared
   contains
     procedure :: loses_energy
@@ -65,7 +65,7 @@ contains
     class(contact_law_t), intent(in) :: self
     logical :: yes
 
-    yes = any(self%restitution < 1) .or. self%grip%is_rough()
+    yes = any(self%restitution < 1) .or. self%tangential%is_rough()
   end function loses_energy
 
   !> Coefficient of restitution at an impact velocity.
@@ -104,7 +104,7 @@ contains
 
   !> Whether the surfaces are rough, so that tangential impulses occur.
   elemental function is_rough(self) result(yes)
-    class(grip_t), intent(in) :: self
+    class(tangential_law_t), intent(in) :: self
     logical :: yes
 
     yes = self%restitution > -1
@@ -113,7 +113,7 @@ contains
   !> Tangential impulse on a body whose surface slips at a contact. It changes the slip velocity to -beta times its value, unless
   !> Coulomb's law limits the force.
   pure function tangential_impulse(law, inertia, mass, slip, normal_impulse) result(impulse)
-    type(grip_t), intent(in) :: law
+    type(tangential_law_t), intent(in) :: law
     real(real64), intent(in) :: inertia              !! moment of inertia over mass times radius squared, equal for both bodies
     real(real64), intent(in) :: mass                 !! reduced mass [mass]
     real(real64), intent(in) :: slip                 !! tangential velocity of the surface at the contact [length/time]

@@ -66,7 +66,7 @@ contains
       if (sim%law%by_speed%speed > 0) restitution = sim%law%by_speed%restitution_at(restitution, impact_velocity(sim, i, code, t))
       call collide_pair(sim, i, code, t, counts, restitution)
       if (n_repeats > 0) sim%tag([i, code])%last_partner = repeated(sim%tag([code, i])%id, n_repeats)
-      if (sim%law%grip%is_rough()) &
+      if (sim%law%tangential%is_rough()) &
         call apply_tangential_impulse(sim, first, second, impulse_between(sim, first, second, v, w), counts)
     else
       call collide_wall(sim, i, code, t, counts)
@@ -195,7 +195,7 @@ contains
       mass_i = sim%mass_of(i)
       mass_j = sim%mass_of(j)
       reduced = mass_i*mass_j/(mass_i + mass_j)
-      impulse = tangential_impulse(law%grip, law%inertia, reduced, slip, normal_impulse)
+      impulse = tangential_impulse(law%tangential, law%inertia, reduced, slip, normal_impulse)
       p%v = p%v + (impulse/mass_i)*along
       q%v = q%v - (impulse/mass_j)*along
       call sim%change_angular_momentum(i, -p%radius*impulse)

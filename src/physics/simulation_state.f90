@@ -47,7 +47,7 @@ module simulation_state
     real(real64) :: epoch_end = 0.0_real64        !! end of the epoch, since the epoch; 0: not known yet [time]
     integer(int64) :: epoch_events = 0            !! number of events at the beginning of the epoch
     ! For the detection of a collapse, an infinite series of events during which time does not advance:
-    real(real64) :: blink = 0.0_real64            !! time in which no disk moves noticeably; 0: not known yet [time]
+    real(real64) :: negligible_time = 0.0_real64  !! time in which no disk moves noticeably; 0: not known yet [time]
     real(real64) :: last_advance = 0.0_real64     !! time of the last advance by more than that, since the epoch [time]
     integer(int64) :: events_then = 0             !! number of events at that time
     integer(int64) :: kicks = 0                   !! number of kicks since the start of the run

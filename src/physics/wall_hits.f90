@@ -3,7 +3,7 @@ module wall_hits
   use kinds, only: int32, never, real64
   use box_geometry, only: next_obstacle, strike_velocity, surface_velocity, wall_normal
   use box_sides, only: side_time
-  use collisions, only: grip_t, tangential_impulse, wall_law_t, wall_rebound
+  use collisions, only: tangential_law_t, tangential_impulse, wall_law_t, wall_rebound
   use disks, only: advance_disk
   use partners, only: axis_of, is_side, sense_of
   use side_motion, only: piston
@@ -50,7 +50,7 @@ contains
       end if
       ! Not in time-stepped dynamics.
       if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call part(sim, i, code, normal)
-      if (law%grip%is_rough()) call apply_tangential_impulse_at_wall(sim, i, law%grip, normal, u, v)
+      if (law%tangential%is_rough()) call apply_tangential_impulse_at_wall(sim, i, law%tangential, normal, u, v)
     end if
     if (sim%box%surface(k)%motion%kind == piston) call push(sim, i, code, normal, v, u, t)
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
@@ -141,10 +141,10 @@ contains
   end subroutine part
 
   !> Applies the tangential impulse in a collision of disk i with a rough wall, after the normal impulse.
-  pure subroutine apply_tangential_impulse_at_wall(sim, i, grip, normal, u, before)
+  pure subroutine apply_tangential_impulse_at_wall(sim, i, law, normal, u, before)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    type(grip_t), intent(in) :: grip
+    type(tangential_law_t), intent(in) :: law
     real(real64), intent(in) :: normal(2)        !! unit vector from the wall to the disk
     real(real64), intent(in) :: u(2)             !! velocity of the surface [length/time]
     real(real64), intent(in) :: before(2)        !! velocity of the disk before the collision [length/time]
@@ -152,7 +152,7 @@ contains
 
     along = [-normal(2), normal(1)]
     associate (disk => sim%disk(i), mass => sim%mass_of(i))
-      impulse = tangential_impulse(grip, sim%law%inertia, mass, &
+      impulse = tangential_impulse(law, sim%law%inertia, mass, &
         dot_product(disk%v - u, along) - disk%radius*sim%spin(i), mass*abs(dot_product(disk%v - before, normal)))
       disk%v = disk%v + (impulse/mass)*along
       call sim%change_angular_momentum(i, -disk%radius*impulse)
