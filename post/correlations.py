@@ -233,7 +233,7 @@ AXES = {
     "msd": {"ylabel": "square displacement / $\\sigma^2$", "xscale": "log", "yscale": "log"},
     "D": {"ylabel": "$D(t)\\,/\\,D_E$", "xscale": "log"},
     "F_s": {"ylabel": "$F_s(k,t)$", "xscale": "log"},
-    "alpha2": {"ylabel": "$\\alpha_2$ of ways (0: normal)", "xscale": "log"},
+    "alpha2": {"ylabel": "$\\alpha_2$ of displacements (0: Gaussian)", "xscale": "log"},
     "a2": {"xlabel": "collisions per disk", "ylabel": "$a_2$ of velocities (0: Maxwell)"},
     "g": {"xlabel": "$r\\,/\\,\\sigma$", "ylabel": "pair correlation $g(r)$"},
     "S": {"xlabel": "$k\\,\\sigma$", "ylabel": "structure factor $S(k)$"},

@@ -31,7 +31,7 @@ input() {
 
 # state NAME SPECIES...: mixes the disks of these species and writes $work/NAME.nml, which goes on
 # from there. Mixing takes 20 collisions per disk, from random places or, beyond what random
-# insertion reaches, from a lattice. A lattice of 1e5 disks or more has not molten by then.
+# insertion reaches, from a lattice. A lattice of 1e5 disks or more has not melted by then.
 state() {
   local name=$1 placement=random
   shift

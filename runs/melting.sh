@@ -2,7 +2,7 @@
 # Melting: pressure against packing fraction, and pictures of the order of the bonds.
 #
 # A crystal takes very long to melt between 0.70 and 0.72, and a liquid to freeze. Therefore 64^2 disks
-# start from a crystal that has half molten at 0.66, once a little less and once a little more, so
+# start from a crystal that has half melted at 0.66, once a little less and once a little more, so
 # that a memory of the start shows in their scatter. 128^2 disks start as four copies of these, with
 # other velocities. Some minutes; P* is then right to 0.1 near melting, and warnings say where the two
 # starts still differ. With FULL=1 long runs, and 256^2 disks: some eight hours of processor time.

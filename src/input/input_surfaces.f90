@@ -263,7 +263,7 @@ contains
     type(problem_list_t), intent(inout) :: problems
 
     if (group%given(name) .and. any(group%reals_of(name) < by_speed%least())) call group%complain(name, "must be at least " &
-      //written(by_speed%least())//" with contact.restitution_law = 'viscoelastic': there its series ends to fall", problems)
+      //written(by_speed%least())//" with contact.restitution_law = 'viscoelastic': there its series has its minimum", problems)
   end subroutine check_least
 
   !> How rough disks or walls are, by variables whose names have a prefix in &contact.

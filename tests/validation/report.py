@@ -58,8 +58,9 @@ NOTES = """
 - **P15-09**: the theory of sheared grains is linear in the stress. For ξ = .95 it has .2276, .2142,
   .9518, found are .2275(6), .2168(6), .9494(6); for ξ = .8 .475, .379, .826, found .490(1),
   .386(1), .818(1).
-- **P15-13**: the threshold of Maxwell's demon, .73 here, is that of many dilute grains. The 120 of
-  the case turn even near .65; five times as many of a fifth of the diameter still part there.
+- **P15-13**: the threshold of Maxwell's demon, .73 here, holds for many dilute grains. The 120
+  disks of the case become evenly distributed near .65; 600 disks of a fifth of the diameter are
+  still separated there.
 - **P8-03** is no case: up to packing .70 the program agrees with Li et al. (2022) within .03
   to .2 %, its errors.
 """
