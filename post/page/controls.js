@@ -32,7 +32,6 @@ function prepareFilm() {
   $('sofar').hidden = film.speeds.rest;
   if (!film.speeds.rest) $('bars').textContent = 'Bars: share of the disks per unit of speed.'
     + (film.settles ? ' Curves: Maxwell’s law at the mean kinetic energy of the species.' : '');
-  $('between').textContent = film.note ? `Frames only: ${film.note}.` : '';
   $('event').hidden = !source.hasEvents();
 }
 
@@ -61,6 +60,9 @@ function layout() {
   tell();  // the stage gets the room that plots and words leave
   $('pressures').hidden = false;  // to be measured
   layOutStage();
+  drawLegend();  // words that depend on how large disks are on the screen
+  tellLimits();
+  layOutStage();
   for (const canvas of ['histogram', 'energy', 'pressure'].map($)) {
     const { clientWidth, clientHeight } = canvas;  // asked for once, for it takes long
     Object.assign(canvas, { width: Math.round(clientWidth * page.dots), height: Math.round(clientHeight * page.dots) });
@@ -75,7 +77,6 @@ function press(pairs) {
 }
 
 function refresh() {
-  drawLegend();
   press({
     sofar: state.sofar, total: state.total, arrows: state.arrows, follow: camera.follow >= 0,
   });

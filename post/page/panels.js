@@ -45,21 +45,34 @@ function chip(kind, text) {
   return element;
 }
 
-const PATTERN_WORDS = ['', ', with a hole', ', with a ring', ', with hole and ring'];
+const PATTERN_WORDS = ['', ', striped', ', striped upright', ', chequered'];
+
+// The pattern of a species, if the whole box shows it.
+function patternOf(s) {
+  const radius = Math.max(leastRadius(), page.unit * film.radii[sizeOf[speciesOf.indexOf(s)]]);
+  return isStriped(s, radius) ? PATTERN_WORDS[s % PATTERN_WORDS.length] : '';
+}
 
 function drawLegend() {
   const scale = film.scales[state.colour], legend = $('legend');
   legend.replaceChildren();
-  if (!scale) legend.replaceChildren(...kinds.map((kind, s) => chip(kind, `${kind.name}, ${kind.sizes}${PATTERN_WORDS[s % PATTERN_WORDS.length]}`)));
+  if (!scale) legend.replaceChildren(...kinds.map((kind, s) => chip(kind, `${kind.name}, ${kind.sizes}${patternOf(s)}`)));
   else {
     const stops = Array.from({ length: 17 }, (_, k) => css(scaleColour(255 * k / 16)));
     const middle = state.colour === 'collisions' ? Math.expm1(Math.log1p(scale[1]) / 2) : scale[1] / 2;
     legend.innerHTML = `<div id="scale"><i></i>
-      <span><b>0</b><b>${short(+middle.toPrecision(2))}</b><b>≥ ${short(+scale[1].toPrecision(2))}</b></span></div><p>${scale[0]}</p>`;
+      <span><b>0</b><b>${short(+middle.toPrecision(2))}</b><b>≥ ${short(+scale[1].toPrecision(2))}</b></span></div>`;
     legend.querySelector('i').style.background = `linear-gradient(to right, ${stops})`;  // the page's policy refuses it in the text
   }
-  const surfaces = film.sides.map((law, k) => describeLaw(film.surfaces[k], law)).filter(Boolean);
-  if (surfaces.length) legend.append(Object.assign(document.createElement('p'), { textContent: surfaces.join('; ') }));
+  const notes = [scale?.[0], ...film.sides.map((law, k) => describeLaw(film.surfaces[k], law))].filter(Boolean);
+  if (notes.length) legend.append(Object.assign(document.createElement('p'), { textContent: notes.join('; ') }));
+}
+
+// What the picture cannot show, below the controls.
+function tellLimits() {
+  const tiny = angles && film.radii.every(radius => Math.max(leastRadius(), radius * page.unit) < LEAST_TO_TURN * page.dots);
+  $('between').textContent = [film.note && `Frames only: ${film.note}.`, enlarged() && 'Small disks are drawn larger than they are.',
+    tiny && 'Zoom in to see how disks turn.'].filter(Boolean).join(' ');
 }
 
 // ---------- small plots ----------

@@ -83,9 +83,13 @@ function roomOfStage() {
   return { width, height: Math.max(full ? 100 : isPart ? 200 : 300, height - $('controls').offsetHeight - between - 16) };
 }
 
+// Small disks far apart would be lost: they are drawn larger than they are, and the legend says so.
+const leastRadius = () => clamp(0.06 * Math.sqrt(film.edges[0] * film.edges[1] / disks) * page.unit, 1.1, 3 * page.dots);
+const enlarged = () => film.radii.some(radius => radius * page.unit < leastRadius());
+
 function drawStage() {
   aim();
-  radii = film.radii.map(radius => Math.max(1.1, radius * view.unit));
+  radii = film.radii.map(radius => Math.max(leastRadius(), radius * view.unit));
   const seen = [view.unit, view.x, view.y, ...sidesAt(moment.shown), slides() && moment.shown].join();
   if (groundShown !== seen) drawGround();
   groundShown = seen;
@@ -173,13 +177,15 @@ function inBox(brush, action) {
 
 // ---------- disks ----------
 
-// Pixel by pixel into an array: far faster than thousands of arcs. Species have patterns where there is room: plain, a hole,
-// a ring, both; the paper shows up to the first, and from the second to the third share of the square of the radius.
-const SMALLEST_PATTERN = 2.5, PATTERNS = [[0, 0, 0], [0.18, 0, 0], [0, 0.25, 0.6], [0.1, 0.35, 0.65]];
+// Pixel by pixel into an array: far faster than thousands of arcs. Species are plain, or striped where there is room for it:
+// across (1), upright (2), both (3). Between the stripes the paper shows.
+const SMALLEST_PATTERN = 3.5, PATTERNS = [0, 1, 2, 3];
+const isStriped = (kind, radius) => PATTERNS[kind % PATTERNS.length] > 0 && radius >= SMALLEST_PATTERN * page.dots;
+const bare = share => share - Math.floor(share) > 0.66;  // of the period of the stripes
 
 function drawDisks() {
   const code = codesNow(state.colour), [width, height] = film.edges, wraps = film.periodic.some(Boolean);
-  const patterns = kinds.map((_, s) => radii.map(radius => PATTERNS[radius < SMALLEST_PATTERN * page.dots ? 0 : s % PATTERNS.length]));
+  const patterns = kinds.map((_, s) => radii.map(radius => isStriped(s, radius) ? PATTERNS[s % PATTERNS.length] : 0));
   const [left, top, right, bottom] = seenBox(), clip = [Math.ceil(left), Math.ceil(top), Math.floor(right) - 1, Math.floor(bottom) - 1];
   pixels.fill(0);
   for (let i = 0; i < disks; i++) {
@@ -193,15 +199,16 @@ function drawDisks() {
   disksBrush.putImageData(picture, 0, 0);
 }
 
-function drawDisk(x, y, radius, colour, [hole, from, to], [left, top, right, bottom]) {
-  const cx = x - 0.5, cy = y - 0.5, reach = radius + 0.5, whole = radius * radius, inner = (radius - 0.5) ** 2;
+function drawDisk(x, y, radius, colour, stripes, [left, top, right, bottom]) {
+  const cx = x - 0.5, cy = y - 0.5, reach = radius + 0.5, inner = (radius - 0.5) ** 2;
+  const often = 1 / Math.max(3.5 * page.dots, 0.55 * radius);  // stripes per pixel; a stripe runs through the centre
   const low = Math.max(top, Math.ceil(cy - reach)), high = Math.min(bottom, Math.floor(cy + reach));
   for (let j = low; j <= high; j++) {
-    const dd = (j - cy) * (j - cy), half = Math.sqrt(Math.max(0, reach * reach - dd)), end = Math.min(right, Math.floor(cx + half));
+    const between = stripes & 1 && bare((j - cy) * often + 0.33), dd = (j - cy) * (j - cy), half = Math.sqrt(Math.max(0, reach * reach - dd)), end = Math.min(right, Math.floor(cx + half));
     for (let i = Math.max(left, Math.ceil(cx - half)), at = j * page.width + i; i <= end; i++, at++) {
-      const square = (i - cx) * (i - cx) + dd, share = square / whole;
+      const square = (i - cx) * (i - cx) + dd;
       if (square > inner) pixels[at] = painted(pixels[at], colour, 255 * (reach - Math.sqrt(square)) | 0);
-      else pixels[at] = share < hole || (share > from && share < to) ? paper : colour;
+      else pixels[at] = between || (stripes & 2 && bare((i - cx) * often + 0.33)) ? paper : colour;
     }
   }
 }
@@ -232,14 +239,15 @@ function drawMarks() {
   });
 }
 
-// A radius of each disk that is large enough for one shows how it turns.
+// A radius of each disk that is large enough for one shows its orientation.
+const LEAST_TO_TURN = 2;
 function drawRadii() {
   marks.strokeStyle = ink.stage;
   marks.lineWidth = 1.2 * page.dots;
   marks.beginPath();
   for (let i = 0; i < disks; i++) {
     const length = radii[sizeOf[i]], reach = length / view.unit, angle = angles[i];
-    if (length < 3 * page.dots) continue;
+    if (length < LEAST_TO_TURN * page.dots) continue;
     copies([X[i] - reach, X[i] + reach], [Y[i] - reach, Y[i] + reach], (dx, dy) => {
       const x = across(X[i] + dx), y = up(Y[i] + dy);
       marks.moveTo(x, y);

@@ -584,3 +584,33 @@ def test_box_and_controls_are_seen_without_scrolling(browser, playing, tmp_path,
     if size == "wide":
         assert boxes["energy"]["right"] > 1860 and boxes["energy"]["bottom"] < 1080
     assert browser.complaints() == []
+
+
+# --- disks that can be seen ---
+
+
+def test_species_are_striped_and_never_look_like_a_hole(playing, tmp_path):
+    """The centre of each disk has its colour, the legend names a pattern only where it is seen."""
+    x = np.array([[[0.2, 0.5], [0.5, 0.5], [0.8, 0.5]]] * 2)
+    kinds = {"species": [1, 2, 3], "names": ("a", "b", "c"), "radius": [0.1, 0.1, 0.004]}
+    browser = playing(still_run(tmp_path / "a.h5", x, **kinds))
+    words = browser.run("return kinds.map((_, s) => patternOf(s))")
+    assert words == ["", ", striped", ""]
+    for disk, striped in ((0, False), (1, True)):
+        centre, column = browser.run(
+            """const at = dy => pixels[Math.round(up(Y[arguments[0]] + dy)) * page.width
+                + Math.round(across(X[arguments[0]]))];
+            const heights = Array.from({ length: 91 }, (_, k) => (k - 45) / 500);
+            const own = palette[arguments[0]], between = heights.filter(dy => at(dy) === paper);
+            return [at(0) === own, between.length]""",
+            disk,
+        )
+        assert centre and (column > 5) == striped
+
+
+def test_small_disks_far_apart_are_drawn_large_enough_and_the_page_says_so(playing, tmp_path):
+    x = np.broadcast_to(np.array([[0.2, 0.2], [0.8, 0.8]]), (2, 2, 2))
+    for radius, words in ((1e-4, True), (0.05, False)):
+        browser = playing(still_run(tmp_path / f"{words}.h5", x, radius=radius))
+        least, said = browser.run("return [radii[0] / page.dots, $('between').textContent]")
+        assert least >= 3 and ("drawn larger" in said) == words
