@@ -19,6 +19,8 @@ from ricochet.figures.drawing import (
     disk_collection,
     draw_box,
     label_of,
+    limits_of,
+    note_on_size,
     plt,
     radius_marks,
     scale_top,
@@ -67,7 +69,7 @@ def animate(
     figure, axes = plt.subplots(figsize=(max(width, 3.6), height + 0.6), dpi=100)
     style = {}
     if colour != "species":
-        limits = (-180, 180) if colour == "psi6" else (0, scale_top(run, frames, colour))
+        limits = limits_of(colour, scale_top(run, frames, colour))
         style = {"cmap": colour_map(colour), "clim": limits}
 
     def show(frame: int) -> EllipseCollection:
@@ -78,14 +80,16 @@ def animate(
         else:
             style["array"] = values_of(run, frame, colour)
         radius_marks(axes, run, frame)
-        axes.set_title(f"{caption([run])},  t = {run.time[frame]:.4g}")
+        axes.set_title(f"{caption([run])},  t = {run.time[frame]:.4g}{note_on_size(axes, run)}")
         return disk_collection(axes, run, run.position[frame], **style)
 
     disks = show(frames[0])
     if colour == "species":
         species_legend(figure, run)
     else:
-        figure.colorbar(disks, label=label_of(run, colour), shrink=0.8, extend="max")
+        beyond = {"psi6": "neither", "spin": "both"}.get(colour, "max")
+        figure.colorbar(disks, label=label_of(run, colour), shrink=0.8, extend=beyond)
+        species_legend(figure, run, by_outline=True)
     warn(figure, [run.termination_note] if run.termination_note else [])
     figure.canvas.draw()
     figure.set_layout_engine("none")  # the layout stays; solving it for each frame is slow

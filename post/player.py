@@ -398,8 +398,8 @@ def main() -> None:
     parser.add_argument("--open", action="store_true", help="open the film in the browser")
     args = parser.parse_args()
     (run,) = args.runs
-    if args.colour == "psi6":
-        raise RunError("--colour psi6 is for snapshot.py and animate.py")
+    if args.colour in ("psi6", "spin"):
+        raise RunError(f"--colour {args.colour} is for snapshot.py and animate.py")
     if args.live:
         if args.output:
             raise RunError("--live writes no file: leave out -o")

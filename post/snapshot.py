@@ -4,10 +4,12 @@
     python post/snapshot.py runs/gas.h5 --frames 0,10,-1 -o gas.png    chosen frames side by side
     python post/snapshot.py runs/gravity.h5 --count 12 --quiver        twelve frames, evenly spread
 
-Colour: species, speed, displacement from the first frame, collisions so far, or psi6, the direction
-of the order of the bonds against that of the mean over all disks.  One scale holds for all frames,
-from 0, unless --per-frame; with --log it is logarithmic.  A disk that reaches across a periodic
-side is drawn on both.
+Colour: species, speed, displacement from the first frame, collisions so far, spin (the angular
+velocity of disks that can rotate), or psi6, the direction of the order of the bonds against that of
+the mean over all disks.  One scale holds for all frames, from 0, unless --per-frame; with --log it
+is logarithmic.  Where colours mean a quantity, all species but the first are outlined.  A disk that
+reaches across a periodic side is drawn on both.  Disks that can rotate have a radius at their
+orientation.  Small disks far apart are drawn larger than they are, and the title says so.
 """
 
 import argparse
@@ -15,21 +17,34 @@ import argparse
 from ricochet import Run, drawing
 from ricochet.analysis.thermodynamics import packing
 from ricochet.figures.drawing import plt
+from ricochet.reading.units import UNNAMED
 from ricochet.script import chosen_frames, command_line, frame_list, launch, report
 
 import numpy as np
+from matplotlib.quiver import Quiver
 from matplotlib.colors import LogNorm, Normalize, to_rgba_array
 
 
 def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
     """Return a colour scale without the few largest values; a logarithmic one starts above 0."""
-    if colour == "psi6":
-        return Normalize(-180, 180)
+    if colour in ("psi6", "spin"):
+        top = np.quantile(np.abs(values), 0.995) or 1.0
+        return Normalize(*drawing.limits_of(colour, top))
     moved = values[values > 0]
     if not len(moved):
         return Normalize(0, 1)
     low, top = np.quantile(moved, (0.005, 0.995))
     return LogNorm(min(low, top / 1.01), top) if log else Normalize(0, top)
+
+
+def draw_key(axes: plt.Axes, run: Run, arrows: Quiver, longest: float) -> None:
+    """Draw an arrow of a round speed above a panel, as the scale of all arrows."""
+    power = 10.0 ** np.floor(np.log10(longest))
+    speed = max(step * power for step in (1, 2, 5) if step * power <= longest)
+    unit = run.units.name("speed")
+    words = f"speed {speed:g}" + f" {unit}" * (unit != UNNAMED.name("speed"))
+    place = {"coordinates": "axes", "labelpos": "W", "color": "black"}
+    axes.quiverkey(arrows, 0.9, 1.04, speed, words, **place)
 
 
 def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> plt.Figure:
@@ -43,7 +58,7 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
     if colour != "species":
         values = np.array([drawing.values_of(run, frame, colour) for frame in frames])
         whole = scale(values, args.log, colour)
-        beyond = "neither" if colour == "psi6" else "both" if args.log else "max"
+        beyond = {"psi6": "neither", "spin": "both"}.get(colour, "both" if args.log else "max")
         bar = {"label": drawing.label_of(run, colour), "extend": beyond}
     longest = max(float(np.max(run.speed(frame))) for frame in frames) or 1.0
     # The longest arrow is a tenth of the box.
@@ -61,21 +76,27 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
             style = {"facecolors": drawing.species_colours(run)}
         else:
             norm = scale(values[k], args.log, colour) if args.per_frame else whole
-            seen = np.maximum(values[k], norm.vmin)  # 0 has no place on a logarithmic scale
+            # A logarithmic scale has no 0.
+            seen = np.maximum(values[k], norm.vmin) if args.log else values[k]
             style = {"array": seen, "norm": norm, "cmap": drawing.colour_map(colour)}
         disks = drawing.disk_collection(axes, run, run.position[frames[k]], **style)
         drawing.radius_marks(axes, run, frames[k])
         if colour != "species" and args.per_frame:
             figure.colorbar(disks, ax=axes, shrink=0.7, **bar)
         if args.quiver:
-            axes.quiver(*run.position[frames[k]].T, *run.velocity[frames[k]].T, **arrows)
+            drawn = axes.quiver(*run.position[frames[k]].T, *run.velocity[frames[k]].T, **arrows)
+            if k == 0:
+                draw_key(axes, run, drawn, longest)
         axes.set_title(f"t = {run.time[frames[k]]:.4g}")
     if colour == "species":
         drawing.species_legend(figure, run)
-    elif not args.per_frame:
+    else:
+        drawing.species_legend(figure, run, by_outline=True)
+    if colour != "species" and not args.per_frame:
         figure.colorbar(disks, ax=panels, shrink=0.8, aspect=30, **bar)
     dense = f",  η = {packing(run):.4g}" if colour == "psi6" else ""
-    figure.suptitle(drawing.caption([run]) + dense)
+    larger = drawing.note_on_size(panels.flat[0], run)
+    figure.suptitle(drawing.caption([run]) + dense + larger)
     return figure
 
 

@@ -8,7 +8,15 @@ are the exact path of flight without gravity.  Several runs are drawn side by si
 """
 
 from ricochet import Run
-from ricochet.figures.drawing import COLOURS, caption, disk_collection, draw_box, plt
+from ricochet.figures.drawing import (
+    COLOURS,
+    caption,
+    disk_collection,
+    draw_box,
+    drawn_diameters,
+    note_on_size,
+    plt,
+)
 from ricochet.script import chosen_disks, chosen_frames, command_line, launch, report
 
 import numpy as np
@@ -46,16 +54,18 @@ def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) ->
     draw_box(axes, run, run.time[frames[-1]])
     others = np.full(run.n_disks, "0.85")
     others[disks] = "none"
+    sizes = drawn_diameters(axes, run)
     disk_collection(axes, run, run.position[frames[-1]], facecolors=others, zorder=0.8)
     for order, (disk, path) in enumerate(zip(disks, paths_of(run, disks, frames), strict=True)):
         colour = COLOURS[order % len(COLOURS)]
         alpha = float(np.clip(60 / len(path), 0.25, 1)) ** 0.5
         axes.plot(*path.T, color=colour, lw=0.8, alpha=alpha, zorder=1)
         axes.plot(*path[0], marker="x", color=colour, zorder=4)
-        axes.add_patch(Circle(path[-1], run.radius[disk], color=colour, lw=0, zorder=0.9))
+        axes.add_patch(Circle(path[-1], sizes[disk] / 2, color=colour, lw=0, zorder=0.9))
     axes.set_title(
         f"{run.parameter('run', 'title') or run.path.stem}\n{caption([run])}\n"
-        f"t = {run.time[frames[0]]:.4g} (crosses) to {run.time[frames[-1]]:.4g} (disks)",
+        f"t = {run.time[frames[0]]:.4g} (crosses) to {run.time[frames[-1]]:.4g} (disks)"
+        f"{note_on_size(axes, run)}",
         parse_math=False,
         pad=18,  # above what is said of a wall
     )

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 from matplotlib import colors
+from matplotlib.collections import EllipseCollection
+from matplotlib.quiver import QuiverKey
 
 import cooling as cooling_figure
-from ricochet import crater, read_run, script, thermodynamics
+from ricochet import crater, drawing, read_run, script, thermodynamics
+from ricochet.figures.drawing import plt
 from synthetic_run import ROOT, run_script, write_run
 
 
@@ -199,3 +202,55 @@ def test_the_coefficient_of_speeds_is_explained_beside_its_band(tmp_path, rng, f
     shown = dict(zip(*way.get_legend_handles_labels()[::-1], strict=True))
     band = shown["95 % in equilibrium"].get_facecolor()
     assert band[:3] == colors.to_rgb(shown["N = 400"][0].get_color())
+
+
+# --- pictures of disks ---
+
+
+def test_disks_have_their_true_size_unless_they_would_be_lost(tmp_path, rng):
+    """They are never drawn smaller, and enlarged to at most 0.12 of their mean distance."""
+    for _ in range(20):
+        count, radius = int(rng.integers(1, 400)), 10 ** rng.uniform(-5, -1)
+        x = rng.uniform(0, 1, (1, count, 2))
+        run = read_run(write_run(tmp_path / "a.h5", x, 0 * x, radius=radius))
+        figure, axes = plt.subplots(figsize=rng.uniform(1, 12, 2))
+        drawing.draw_box(axes, run)
+        drawn = drawing.drawn_diameters(axes, run)
+        larger = drawn[0] > 2 * radius
+        most = max(2 * radius, 0.12 / count**0.5) * (1 + 1e-9)
+        assert np.all(drawn >= 2 * radius) and np.all(drawn <= most)
+        points = drawn[0] * drawing.points_per_length(axes)
+        assert points <= drawing.LEAST_POINTS * (1 + 1e-9) or not larger
+        assert bool(drawing.note_on_size(axes, run)) == larger
+        disks = drawing.disk_collection(axes, run, run.position[0])
+        np.testing.assert_allclose(2 * disks._widths, drawn)
+        plt.close(figure)
+
+
+def test_arrows_have_a_scale_and_a_second_species_an_outline(tmp_path, rng, figures):
+    v = rng.normal(size=(2, 6, 2))
+    kinds = {"species": [1, 1, 1, 2, 2, 2], "names": ("a", "b"), "radius": 0.05}
+    path = write_run(tmp_path / "a.h5", rng.uniform(0.2, 0.8, v.shape), v, **kinds)
+    words = ("--quiver", "--colour", "speed", "--units", "length=m,time=s")
+    assert run_script("snapshot", path, "-o", tmp_path / "a.png", *words) == 0
+    (figure,) = figures
+    axes, run = figure.axes[0], read_run(path)
+    (key,) = [one for one in axes.artists if isinstance(one, QuiverKey)]
+    speed = float(key.label.split()[1])
+    assert key.label.endswith(" m/s") and speed <= run.speed(-1).max() < 2.5 * speed
+    (disks,) = [one for one in axes.collections if isinstance(one, EllipseCollection)]
+    widths = disks.get_linewidths()
+    assert np.all(np.array(widths) == np.array([0, 0, 0, 1, 1, 1]) * widths[-1]) and widths[-1] > 0
+
+
+def test_spins_have_a_colour(tmp_path, rng, figures, capsys, simulated):
+    """On a scale with 0 in the middle; of disks that cannot rotate there is none."""
+    rough = "&contact tangential_restitution = 0 /"
+    run = simulated(f"&species count = 9 radius = 0.05 temperature = 1 /{rough}&stop time = 1 /")
+    assert run_script("snapshot", run.path, "--colour", "spin", "-o", tmp_path / "a.png") == 0
+    (disks,) = [c for c in figures[0].axes[0].collections if isinstance(c, EllipseCollection)]
+    np.testing.assert_allclose(disks.get_array(), run.angular_velocity[-1])
+    assert disks.norm.vmin == -disks.norm.vmax and np.ptp(run.angular_velocity[-1]) > 0
+    smooth = simulated("&species count = 9 radius = 0.05 speed = 1 /&stop time = 1 /")
+    assert run_script("snapshot", smooth.path, "--colour", "spin", "-o", tmp_path / "a.png") == 2
+    assert "its disks cannot rotate" in capsys.readouterr().err

@@ -17,6 +17,7 @@ def test_units_are_made_of_length_time_and_mass():
         "length": "m",
         "time": "s",
         "mass": "kg",
+        "rate": "1/s",
         "speed": "m/s",
         "squared speed": "m²/s²",
         "energy": "kg m²/s²",

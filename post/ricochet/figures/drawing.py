@@ -28,6 +28,9 @@ from ..reading.reader import SIDES, Run, groups_of_rows
 
 STYLE = Path(__file__).with_name("style.mplstyle")
 COLOURS = matplotlib.rc_params_from_file(STYLE)["axes.prop_cycle"].by_key()["color"]
+LEAST_SHARE = 0.12  # least drawn diameter over the mean distance of disks
+OUTLINE = 0.12  # width of an outline over the diameter
+LEAST_POINTS = 4.0  # drawn diameter up to which small disks are enlarged
 WALL: dict[str, Any] = {"color": "0.25", "linewidth": 1.2}
 
 #: What disks can be coloured by, apart from their species: label of the scale, and its quantity.
@@ -35,6 +38,7 @@ COLOURINGS = {
     "speed": ("speed", "speed"),
     "displacement": ("displacement", "length"),
     "collisions": ("collisions so far", "number"),
+    "spin": ("angular velocity", "rate"),
     "psi6": ("direction of $\\psi_6$ against the mean one (degrees)", "number"),
 }
 
@@ -114,6 +118,8 @@ def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
     if colour == "psi6":
         psi = bond_order(run, frame)
         return np.degrees(np.angle(psi * psi.mean().conj()))
+    if colour == "spin":
+        return run.angular_velocity[as_index(frame)]
     return run.displacement(frame) if colour == "displacement" else run.speed(frame)
 
 
@@ -124,13 +130,18 @@ def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
     """
     some = [] if colour == "displacement" else frames[:: max(1, len(frames) // 40)]
     values = values_of(run, sorted({*some, frames[-1]}), colour)
-    moved = values[values > 0]
+    moved = np.abs(values[values != 0])
     return float(np.quantile(moved, 0.995)) if len(moved) else 1.0
 
 
+def limits_of(colour: str, top: float) -> tuple[float, float]:
+    """Return the ends of a linear colour scale whose largest value is `top`."""
+    return {"psi6": (-180.0, 180.0), "spin": (-top, top)}.get(colour, (0.0, top))
+
+
 def colour_map(colour: str) -> str:
-    """Return the name of the colour map; it is cyclic for directions."""
-    return "hsv" if colour == "psi6" else "viridis"
+    """Return the name of the colour map; directions have a cyclic one, spins one with a middle."""
+    return {"psi6": "hsv", "spin": "coolwarm"}.get(colour, "viridis")
 
 
 def chosen_colour(run: Run, wish: str | None) -> str:
@@ -141,6 +152,8 @@ def chosen_colour(run: Run, wish: str | None) -> str:
         raise RunError(f"'{wish}' is not one of {', '.join(known)}{hint}")
     if wish == "collisions" and run.event_count is None:
         raise RunError(f"{run.path}: has no collisions per disk")
+    if wish == "spin" and "angular_velocity" not in run.disk_data:
+        raise RunError(f"{run.path}: its disks cannot rotate, or the frames leave their spins out")
     return wish or ("species" if len(run.names) > 1 else "speed")
 
 
@@ -249,13 +262,41 @@ def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return np.concatenate(which), np.concatenate(places)
 
 
-def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) -> EllipseCollection:
-    """Draw disks of true size at `position` (N, 2), and their periodic images.
+def points_per_length(axes: Axes) -> float:
+    """Return how many points on paper a length of 1 takes, in axes of equal scales."""
+    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+    pixels = min(axes.bbox.width / (x1 - x0), axes.bbox.height / (y1 - y0))
+    return float(72 * pixels / axes.get_figure(root=True).dpi)
 
-    `array` (N,) in `style` colours them by value, `facecolors` directly.
+
+def drawn_diameters(axes: Axes, run: Run) -> np.ndarray:
+    """Return the diameters (N,) that disks are drawn with.
+
+    They are the true ones, unless disks of a few points are so far apart that they would be lost.
+    """
+    apart = np.sqrt(np.prod(run.edges) / run.n_disks)
+    least = min(LEAST_SHARE * apart, LEAST_POINTS / points_per_length(axes))
+    return np.maximum(2 * run.radius, least)
+
+
+def note_on_size(axes: Axes, run: Run) -> str:
+    """Return the words for a title where disks are drawn larger than they are, else ''."""
+    larger = drawn_diameters(axes, run) > 2 * run.radius
+    return ",  small disks drawn larger" if larger.any() else ""
+
+
+def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) -> EllipseCollection:
+    """Draw disks of their `drawn_diameters` at `position` (N, 2), and their periodic images.
+
+    `array` (N,) in `style` colours them by value, `facecolors` directly.  Where they are coloured
+    by value, the disks of all species but the first have a black outline.
     """
     which, places = with_images(run, position)
-    size, flat = 2 * run.radius[which], np.zeros(len(which))
+    diameters = drawn_diameters(axes, run)
+    size, flat = diameters[which], np.zeros(len(which))
+    if "array" in style and len(run.names) > 1:
+        widths = np.clip(OUTLINE * diameters * points_per_length(axes), 0, 1.5)
+        style = {"edgecolors": "black", "linewidths": (widths * (run.species > 1))[which], **style}
     for name in style.keys() & {"array", "facecolors"}:
         style[name] = np.asarray(style[name])[which]
     style = {"linewidths": 0, "units": "xy", "offset_transform": axes.transData, **style}
@@ -270,7 +311,8 @@ def radius_marks(axes: Axes, run: Run, frame: int) -> LineCollection | None:
         return None
     which, places = with_images(run, run.position[frame])
     angle = run.orientation[frame][which]
-    rim = run.radius[which] * np.array([np.cos(angle), np.sin(angle)])
+    length = drawn_diameters(axes, run)[which] / 2
+    rim = length * np.array([np.cos(angle), np.sin(angle)])
     lines = np.stack([places, places + rim.T], axis=1)
     marks = LineCollection([*lines], colors="black", linewidths=0.6, zorder=1.5)
     axes.add_collection(marks)
@@ -307,12 +349,15 @@ def species_colours(run: Run) -> list[str]:
     return [COLOURS[(s - 1) % len(COLOURS)] for s in run.species]
 
 
-def species_legend(figure: Figure, run: Run) -> None:
-    """Add a legend of the species below all panels, if there are several."""
-    handles = [
-        Line2D([], [], ls="", marker="o", color=COLOURS[k % len(COLOURS)])
-        for k in range(len(run.names))
-    ]
+def species_legend(figure: Figure, run: Run, by_outline: bool = False) -> None:
+    """Add a legend of the species below all panels, if there are several.
+
+    They differ by their colours, or `by_outline` as in `disk_collection`.
+    """
+    styles = [{"color": COLOURS[k % len(COLOURS)]} for k in range(len(run.names))]
+    if by_outline:
+        styles = [{"mfc": "0.8", "mec": "black", "mew": 1.5 * (k > 0)} for k in range(len(styles))]
+    handles = [Line2D([], [], ls="", marker="o", **style) for style in styles]
     if len(run.names) > 1:
         figure.legend(handles, run.names, loc="outside lower center", ncols=len(run.names))
 

@@ -14,6 +14,7 @@ POWERS = {
     "length": (1, 0, 0),
     "time": (0, 1, 0),
     "mass": (0, 0, 1),
+    "rate": (0, -1, 0),
     "speed": (1, -1, 0),
     "squared speed": (2, -2, 0),
     "energy": (2, -2, 1),
