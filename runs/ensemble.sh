@@ -34,14 +34,14 @@ running:
   --share K/M            of M parts of the list the K-th (what the engines start elsewhere)
   -h, --help
 
-Member NAME writes FOLDER/NAME.h5 and FOLDER/NAME.log.  The same command again goes on: a member
+Member NAME writes FOLDER/NAME.h5 and FOLDER/NAME.log.  The same command again continues: a member
 with NAME.h5 is finished and left out, one with NAME.h5.part resumes, one that broke off or failed
 is tried again (by Slurm only with --retry).  TERM or Ctrl-C stops all members after a checkpoint.  Copies of the command on one folder
 share the work.  The program is what RICOCHET names, or ricochet beside this command (in a clone
 build/ricochet).  All machines need the same folders.
 
 exit:   0 all finished; 1 some failed; 2 wrong usage; 3 the folder cannot be used; 75 stopped, the
-        same command goes on
+        same command continues
 TEXT
 }
 
@@ -143,8 +143,8 @@ check_names() {
       die "'$name' cannot name a member: up to 200 characters, not empty, no slash," \
         "no dash or dot in front, no blanks around"
     [[ $name != parallel && $name != slurm ]] ||
-      die "'$name' cannot name a member: $name.log is something else"
-    [[ -z ${seen[x$name]:-} ]] || die "two members are called '$name'"
+      die "'$name' cannot name a member: $name.log is a file of the engine"
+    [[ -z ${seen[x$name]:-} ]] || die "two members have the name '$name': give --scan values that differ, and separate vectors by semicolons"
     seen[x$name]=1
   done
 }
@@ -172,7 +172,7 @@ put() {
 # What member NAME has said last.
 last_words() { ! may_be_ours "$folder/$1.log" || tail -n 1 -- "$folder/$1.log" 2>/dev/null || true; }
 
-goes_on='^(stopped .*|killed by signal .*|.*--resume goes on.*|)$' # what one that has not failed says last
+goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line of a member that has not failed
 
 # Does member NAME have data, finished or to go on from? One that broke off has said why.
 has_data() { [[ -e $folder/$1.h5 || -e $folder/$1.h5.part && $(last_words "$1") =~ $goes_on ]]; }
@@ -193,7 +193,7 @@ remember() {
   local -A before=() linked=()
   if { exec {door}<"$folder"; } 2>/dev/null; then # one command at a time, where folders have locks
     flock -w 60 -E 75 "$door" 2>/dev/null || (($? != 75)) ||
-      fail 3 "another command keeps $folder to itself: try again"
+      fail 3 "$folder is locked by another command: try again later"
   fi
   for name in input.nml manifest.txt; do check_ordinary "$folder/$name"; done
   while IFS= read -r -d '' name; do
@@ -204,7 +204,7 @@ remember() {
   fi
   if [[ -e $folder/input.nml ]] && ! cmp -s -- "$input" "$folder/input.nml"; then
     [[ -e $folder/manifest.txt ]] ||
-      fail 3 "$folder/input.nml is not of an ensemble: choose another folder"
+      fail 3 "$folder/input.nml is not the input of an ensemble: choose another folder"
     mended=1
     for name in "${!before[@]}"; do
       ! has_data "${name#x}" ||
@@ -216,7 +216,7 @@ remember() {
     name=${names[k]}
     check_ordinary "$folder/$name.log"
     [[ ! -e $folder/$name.log || -n ${before[x$name]+known} && -z ${linked[x$name.log]:-} ]] ||
-      fail 3 "$folder/$name.log is not of this ensemble: remove it, or choose another folder"
+      fail 3 "$folder/$name.log is not a log of this ensemble: remove it, or choose another folder"
     if [[ ${before[x$name]-${overrides[k]}} != "${overrides[k]}" ]] && has_data "$name"; then
       die "$folder holds a member '$name' with other settings (${before[x$name]}):" \
         "choose another folder or name"
@@ -307,7 +307,7 @@ work() {
     elif [[ -n $share ]] && has_failed "${names[k]}"; then
       printf '%s failed before\n' "$k" >&"$events" # as this task was requeued
     else
-      tell "${names[k]}" "$([[ -e $base.h5.part ]] && echo 'goes on' || echo begins)"
+      tell "${names[k]}" "$([[ -e $base.h5.part ]] && echo continues || echo begins)"
       run_member "$k"
     fi
     exec {lock}>&-
@@ -415,7 +415,7 @@ summarise() {
   ((failed == 0)) || exit 1
   ((finished < total)) || return 0
   [[ -n $share ]] || ((busy == 0)) || printf '  %d are run by another copy\n' "$busy" >&2
-  [[ -n $share ]] || printf '  %sthe same command goes on with the rest\n' "${stopped:+stopped: }" >&2
+  [[ -n $share ]] || printf '  %sthe same command continues with the rest\n' "${stopped:+stopped: }" >&2
   exit 75
 }
 
@@ -496,7 +496,7 @@ submit_to_slurm() {
   [[ ! -s $folder/slurm.job ]] || id=$(<"$folder/slurm.job")
   if [[ -n $id && -n $(squeue --noheader --array --jobs "$id" 2>/dev/null || true) ]]; then
     judge_by_files
-    announce "Slurm job $id goes on: "
+    announce "Slurm job $id is not finished: "
     exit 75
   fi
   [[ -z $retry ]] || for name in "${names[@]}"; do forget_failure "$name"; done
@@ -506,7 +506,7 @@ submit_to_slurm() {
   [[ $site =~ ^[1-9][0-9]*$ ]] || site=1000
   : "${tasks:=$((10*jobs))}"
   prepare_shares "$((tasks < site ? tasks : site))"
-  ((shares > 0)) || summarise 'only --retry goes on: '
+  ((shares > 0)) || summarise 'only --retry runs these again: '
   check_ordinary "$folder/slurm.log"
   text="#!/usr/bin/env bash
 trap 'stopped=1; [[ -z \$child ]] || kill -TERM \$child' TERM
@@ -520,10 +520,10 @@ if [[ \$status == 75 || -n \$stopped && \$status != 0 ]] && [[ \$(squeue --nohea
 fi
 exit \$status"
   id=$(sbatch --parsable --array="1-$shares%$jobs" --requeue --signal=B:TERM@60 --open-mode=append \
-    --job-name="${here##*/}" --output="$here/slurm.log" <<<"$text") || die "sbatch refused the job"
+    --job-name="${here##*/}" --output="$here/slurm.log" <<<"$text") || die "Slurm: sbatch refused the job, for the reason above"
   put "$folder/slurm.job" <<<"${id%%;*}"
   announce "Slurm job ${id%%;*} submitted, "
-  printf '  the same command says how far it is\n' >&2
+  printf '  the same command reports its progress\n' >&2
   exit 75
 }
 
@@ -534,7 +534,7 @@ unset CDPATH
 script=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)/${BASH_SOURCE[0]##*/}
 input='' folder='' seeds='' manifest='' engine=pool hosts='' share='' dry='' tasks='' retry='' task='' jobs=$(nproc 2>/dev/null || echo 1)
 common='' scans=() host=$(uname -n)
-for word; do [[ $word != *[[:cntrl:]]* ]] || die "'$word' holds control characters"; done
+for word; do [[ $word != *[[:cntrl:]]* ]] || die "'$word' contains control characters"; done
 while (($#)); do
   case $1 in
   -h | --help) usage && exit 0 ;;
@@ -546,7 +546,7 @@ while (($#)); do
     die "unknown option $1${near:-, see --help}"
     ;;
   *)
-    [[ -z $input ]] || die "one input file, not '$input' and '$1'"
+    [[ -z $input ]] || die "only one input file is allowed, not '$input' and '$1'"
     input=$1 && shift && continue
     ;;
   esac
@@ -565,27 +565,27 @@ while (($#)); do
   shift 2
 done
 
-[[ -n $input ]] || die "no input file, see --help"
+[[ -n $input ]] || die "no input file is given, see --help"
 [[ -r $input && -f $input ]] || die "cannot read $input$(nearest "$input" "${input%"${input##*/}"}"*.nml)"
-[[ -n $folder ]] || die "no folder for the members: -d FOLDER"
+[[ -n $folder ]] || die "no folder for the members is given: -d FOLDER"
 [[ $folder != -* ]] || folder=./$folder
 [[ $jobs =~ ^[1-9][0-9]{0,5}$ ]] || die "-j $jobs: not a number of members"
-[[ $engine =~ ^(pool|slurm|parallel)$ ]] || die "--engine $engine: pool, slurm or parallel"
+[[ $engine =~ ^(pool|slurm|parallel)$ ]] || die "--engine $engine: unknown engine; allowed: pool, slurm or parallel"
 [[ $tasks =~ ^(|[1-9][0-9]{0,5})$ ]] || die "--tasks $tasks: not a number of tasks"
-[[ -z $tasks$retry || $engine == slurm ]] || die "--tasks and --retry go with --engine slurm"
-[[ -z $hosts || $engine == parallel ]] || die "--sshloginfile goes with --engine parallel"
+[[ -z $tasks$retry || $engine == slurm ]] || die "--tasks and --retry need --engine slurm"
+[[ -z $hosts || $engine == parallel ]] || die "--sshloginfile needs --engine parallel"
 [[ -z $hosts || -f $hosts && -r $hosts ]] || die "cannot read $hosts, or it is not an ordinary file"
 [[ $share =~ ^(|[1-9][0-9]{0,8}/[1-9][0-9]{0,8})$ ]] || die "--share $share: write K/M, such as 2/10"
 if [[ -n $manifest ]]; then
-  [[ -z $seeds && ${#scans[@]} == 0 ]] || die "either --manifest or --seeds and --scan"
+  [[ -z $seeds && ${#scans[@]} == 0 ]] || die "--manifest cannot be combined with --seeds or --scan"
   [[ -f $manifest && -r $manifest ]] || die "cannot read $manifest, or it is not an ordinary file"
   read_manifest "$manifest"
 else
-  [[ -n $seeds || ${#scans[@]} -gt 0 ]] || die "no members: give --seeds, --scan or --manifest"
+  [[ -n $seeds || ${#scans[@]} -gt 0 ]] || die "no members are given: use --seeds, --scan or --manifest"
   [[ -z $seeds ]] || scan_seeds "$seeds"
   generate_members
 fi
-((${#names[@]} > 0)) || die "no members"
+((${#names[@]} > 0)) || die "${manifest:-the list of members}: contains no members"
 check_names
 for k in "${!overrides[@]}"; do
   overrides[k]=${common:+$common${overrides[k]:+ }}${overrides[k]}
@@ -606,7 +606,7 @@ here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 program=${here%/*}/build/ricochet
 [[ ! -x $here/ricochet ]] || program=$here/ricochet # both are installed
 program=${RICOCHET:-$program}
-[[ -f $program && -x $program ]] || die "no program $program: run make, or set RICOCHET"
+[[ -f $program && -x $program ]] || die "there is no program $program: run make, or set RICOCHET"
 if [[ -n $dry ]]; then
   for k in "${!names[@]}"; do printf '%s\t%s\n' "${names[k]}" "${overrides[k]}"; done
   arguments=("$input" --check --quiet) status=0
@@ -616,7 +616,7 @@ if [[ -n $dry ]]; then
   ((status == 0)) || printf '%s: note: member %s cannot run yet: %s\n' "$me" "${names[0]}" "${reason##*$'\n'}" >&2
   exit 0 # a starting file may be a result that another ensemble will have
 fi
-command -v flock >/dev/null || die "needs flock (package util-linux)"
+command -v flock >/dev/null || die "the program flock is missing (package util-linux)"
 reason=$(mkdir -p -- "$folder" 2>&1) || fail 3 "cannot make $folder: ${reason##*: }"
 [[ -n $share ]] || remember
 

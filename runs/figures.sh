@@ -17,7 +17,7 @@ done
 failed=()
 for system; do
   [[ " ${known[*]} " == *" $system "* ]] || {
-    printf 'figures.sh: no system %s; there are: %s\n' "$system" "${known[*]}" >&2
+    printf 'figures.sh: unknown system %s; known: %s\n' "$system" "${known[*]}" >&2
     exit 2
   }
   printf '== %s\n' "$system" >&2

@@ -117,7 +117,7 @@ contains
     session => session_of(handle)
     rule = session%rule
     if (ieee_is_nan(time)) then
-      call fail(error, exit_usage, "time: nan is not a time")
+      call fail(error, exit_usage, "time: NaN is not a time")
       code = answer(error, message, room)
       return
     end if
@@ -282,7 +282,7 @@ contains
     session => session_of(handle)
     changed = session%sim
     if (.not. all(ieee_is_finite(values(:2*changed%n_disks())))) then
-      call fail(error, exit_usage, "velocity: has values that are no numbers")
+      call fail(error, exit_usage, "velocity: some values are NaN or infinite")
       code = answer(error, message, room)
       return
     end if

@@ -79,7 +79,7 @@ contains
     if (.not. allocated(error)) call run%output%finish(run%sim, cost_of(run), note(run), error)
     if (allocated(error)) then
       if (error%code == exit_broken) call run%output%break_off(run%sim, cost_of(run), error%message)
-      if (error%code == exit_files) error%message = error%message//"; --resume goes on from the last checkpoint"
+      if (error%code == exit_files) error%message = error%message//"; --resume continues from the last checkpoint"
     else
       call end_at_signals("stopped; the run is finished, only its summary is missing", exit_finished)
       if (run%sim%tally%collapse < never .and. .not. command%quiet) write (error_unit, "(a)") "note: "//note(run)
@@ -138,7 +138,7 @@ contains
       else if (finished .and. rule%too_cold(sim)) then
         call fail(error, exit_files, command%output//": is a finished run that has "//coldness//": it cannot be continued")
       else if (command%check) then
-        call print_text(legible(command%input)//": valid; the run goes on from time "//written(sim%time()), error)
+        call print_text(legible(command%input)//": valid; the run continues from time "//written(sim%time()), error)
       else
         call run%output%resume(run%input, sim, progress, finished, error)
       end if
@@ -153,7 +153,7 @@ contains
     text = run%evolution%warning(run%sim)
     if (text /= "") write (error_unit, "(a)") "warning: "//text
     if (run%input%settings%stop%energy_fraction > 0 .and. .not. run%sim%start_energy > 0) write (error_unit, "(a)") &
-      "warning: nothing moves at the start: stop.energy_fraction is met at once"
+      "warning: stop.energy_fraction: no disk moves at the start, so that the rule is met at once"
   end subroutine warn
 
   !> Advances the simulation to its end and measures the speed.
@@ -223,7 +223,7 @@ contains
         call run%output%save(run%sim, error)
         if (stop_requested()) stopping = .true.            ! requested during the write
         if (stopping .and. .not. allocated(error)) call fail(error, exit_stopped, "stopped at time "// &
-          written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to go on")
+          written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to continue")
         if (allocated(error)) exit
         next_checkpoint = seconds() + run%input%settings%output%checkpoint_every     ! counted from the end of the write
       end if

@@ -138,12 +138,12 @@ contains
     cores = cores_of_process()
     associate (threads => settings%run%threads)
       if (threads > cores) warning = name//": "//written(threads)//" threads are more than the " &
-        //counted(int(cores, int64), "core")//" that the run may use, and slower"
+        //counted(int(cores, int64), "core")//" that the run may use; fewer threads would be faster"
       threads = min(threads, usual%most_domains(int(settings%n_disks()), settings%box%periodic))
       if (.not. settings%wants_domains()) threads = 1
       if (threads > 1) then
         if (.not. room_for_domains(settings)) then
-          warning = name//": there is not enough memory for "//written(threads)//" threads; the run goes on with one"
+          warning = name//": there is not enough memory for "//written(threads)//" threads; the run uses one"
           threads = 1
         end if
       end if

@@ -16,7 +16,7 @@ module stop_rules
   public :: coldness, stop_rule_t, stop_settings_t, whole_collisions
 
   real(real64), parameter :: coldest = 1.0e-25_real64        !! smallest temperature relative to the first one
-  character(len=*), parameter :: coldness = "cooled to 1e-25 of the first temperature"
+  character(len=*), parameter :: coldness = "cooled to 1e-25 of the initial temperature"
 
   !> Stop rules. The default values are never reached.
   type :: stop_settings_t

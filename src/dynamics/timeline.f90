@@ -92,8 +92,8 @@ contains
     !> Begins the next epoch, or reports that the disks are crushed or that time stands still.
     subroutine end_epoch()
       if (are_crushed(sim)) then
-        call fail(error, exit_broken, "a side crushes the disks, whose energy has grown a million times: let it end " &
-          //"before the time "//about(sim%time())//" (side.end_time)")
+        call fail(error, exit_broken, "side.end_time: the side crushes the disks, whose energy has grown a million times; " &
+          //"choose a time before "//about(sim%time()))
       else if (stands_still(sim)) then
         if (limits%at_rest .and. is_at_rest(sim)) return
         associate (i => evolution%last_event(1), code => evolution%last_event(2))
@@ -133,7 +133,7 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code            !! as in `partners`
     character(len=:), allocatable :: text
-    character(len=*), parameter :: steps = "or take run.dynamics = 'steps'"
+    character(len=*), parameter :: steps = "or use run.dynamics = 'steps'"
     logical :: from_the_start
 
     text = "time no longer advances: "//encounter_text(sim, i, code)
@@ -190,9 +190,9 @@ contains
     character(len=:), allocatable :: text
 
     text = ""
-    if (sim%tally%collapse < never) text = "passed an inelastic collapse, in " &
-      //counted(sim%tally%simultaneous, "collision")//" that took no time, the first at time "//written(sim%tally%collapse) &
-      //": rounding decides what follows; "//longer_contacts(sim)
+    if (sim%tally%collapse < never) text = "an inelastic collapse occurred: " &
+      //counted(sim%tally%simultaneous, "collision")//" took no time, the first at time "//written(sim%tally%collapse) &
+      //"; the motion after it depends on rounding errors; "//longer_contacts(sim)
   end function passed_collapse
 
   !> The advice to set a contact duration: much longer than a collapse, and much shorter than the mean time between collisions, as
@@ -207,10 +207,10 @@ contains
     contacts = sim%tally%events + sim%tally%collisions - 2*sim%tally%simultaneous
     proposal = max(share*sim%time()*sim%n_disks()/max(contacts, 1_int64), negligible_times*sim%negligible_time)
     if (sim%law%contact_time >= proposal) then
-      text = "contact.contact_time is long already: take run.dynamics = 'steps'"
+      text = "contact.contact_time is already long: use run.dynamics = 'steps'"
       return
     end if
-    text = trim(merge("raise", "set  ", sim%law%contact_time > 0))//" contact.contact_time (TC model), say to " &
+    text = trim(merge("raise", "set  ", sim%law%contact_time > 0))//" contact.contact_time (TC model), for example to " &
       //about(proposal)//", well below the mean time between collisions"
   end function longer_contacts
 

@@ -110,7 +110,7 @@ contains
     if (status >= 0) call h5pget_layout_f(creation, layout, status)
     if (status >= 0) call h5pget_external_count_f(creation, n_files, status)
     if (status >= 0 .and. (layout == h5d_virtual_f .or. n_files > 0)) status = -1
-    call self%check(status, "be used: "//name//" keeps its values in another file")
+    call self%check(status, "be used: "//name//" stores its values in another file")
     call h5pclose_f(creation, closed)
     if (status >= 0) call h5dget_space_f(dataset, space, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)

@@ -8,6 +8,7 @@ module hdf5_series
     h5t_std_i32le, h5t_std_i64le
   use hdf5_objects, only: hdf5_file_t
   use kinds, only: int32, int64, real64
+  use texts, only: written
   implicit none
   private
   public :: series_t, double_precision, single_precision, short_integer, long_integer
@@ -156,7 +157,8 @@ contains
     integer(int64), intent(in) :: number          !! number of the sample, counted from 1
     real(real64), intent(inout), target :: values(*)
 
-    if (number < 1 .or. number > self%capacity) call file%check(-1, "be read: "//trim(self%name))
+    if (number < 1 .or. number > self%capacity) call file%check(-1, "be read: "//trim(self%name)//" has no sample " &
+      //written(number))
     call file%transfer(trim(self%name), number, self%extents(1_int64), h5kind_to_type(real64, h5_real_kind), c_loc(values), &
       writing=.false.)
   end subroutine load

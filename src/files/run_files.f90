@@ -54,7 +54,7 @@ contains
     character(len=*), intent(in) :: output        !! path of the output
     type(error_t), allocatable, intent(out) :: error
 
-    if (output_of(output) /= "") call fail(error, exit_usage, "the output "//shown(output)//" would have a name that is kept " &
+    if (output_of(output) /= "") call fail(error, exit_usage, "the name of the output "//shown(output)//" is reserved " &
       //"for files of the run with the output "//shown(output_of(output))//"; choose another name")
   end subroutine check_name
 

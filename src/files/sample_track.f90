@@ -152,11 +152,11 @@ contains
 
     committed = 0
     call file%fetch(self%counter, 1, committed)
-    if (committed(1) < count) call file%check(-1, "go on: "//self%counter//" is " &
+    if (committed(1) < count) call file%check(-1, "be continued: "//self%counter//" is " &
       //written(committed(1))//", the checkpoint says "//written(count))
     do k = 1, size(self%series)
       call self%series(k)%find(file)
-      if (self%series(k)%capacity < committed(1)) call file%check(-1, "go on: "//self%counter//" is " &
+      if (self%series(k)%capacity < committed(1)) call file%check(-1, "be continued: "//self%counter//" is " &
         //written(committed(1))//", but "//trim(self%series(k)%name)//" has only "//written(self%series(k)%capacity))
     end do
     self%capacity = minval(self%series%capacity)

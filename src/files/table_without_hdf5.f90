@@ -15,7 +15,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     allocate (table(sum(widths), 0))
-    call fail(error, exit_usage, path//": HDF5 files cannot be read here, without HDF5")
+    call fail(error, exit_usage, path//": cannot be read: this library was built without HDF5")
   end subroutine read_table
 
 end submodule table_without_hdf5

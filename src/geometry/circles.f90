@@ -118,7 +118,7 @@ contains
         "radius: the obstacle is wider than the box along the periodic axis "//merge("x", "y", axis == 1)
       if (problem /= "" .or. .not. (self%encloses .and. periodic(axis))) cycle
       if (min(self%middle(axis) - lower(axis), upper(axis) - self%middle(axis)) < self%radius) problem = &
-        "centre: what keeps disks inside must not reach over a periodic side, along "//merge("x", "y", axis == 1)
+        "centre: a container (side = 'inside') must not extend beyond a periodic boundary, along "//merge("x", "y", axis == 1)
     end do
   end function misfit
 

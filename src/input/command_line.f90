@@ -80,7 +80,7 @@ contains
     end do
     if (command%question /= "") return
     if (command%input == "") call refuse("no input file is given; usage: ricochet INPUT.nml, see --help")
-    if (command%resume .and. command%force) call refuse("--resume goes on with a run, --force starts it over; give one of them")
+    if (command%resume .and. command%force) call refuse("--resume continues a run, --force starts it again; give only one of them")
     if (command%output == "") command%output = default_output(command%input)
     if (.not. allocated(error)) call check_name(command%output, error)
 
@@ -209,7 +209,7 @@ contains
 
     text = "ricochet "//program_version//eol//"commit:   "//git_commit//eol// &
       "compiler: "//compiler_version()//eol//"flags:    "//build_flags//eol//"HDF5:     "//hdf5_version()//eol// &
-      "threads:  "//trim(merge("as run.threads says", "one, no OpenMP     ", index(build_flags, "-fopenmp") > 0))
+      "threads:  "//trim(merge("set by run.threads", "one, no OpenMP    ", index(build_flags, "-fopenmp") > 0))
   end function version_text
 
   !> One screen.
@@ -226,7 +226,7 @@ contains
       "                      restores the default"//eol// &
       "  --resume            continue a stopped run, or a finished one to a later end"//eol// &
       "  --check             read and check everything, run nothing"//eol// &
-      "  --force             start over: replace FILE.part; at the end, a finished FILE"//eol// &
+      "  --force             start again: replace FILE.part and, at the end, FILE"//eol// &
       "  --quiet             no progress, notes or warnings on stderr"//eol// &
       "  --print-defaults    an input file with every variable and its default"//eol// &
       "  --print-variables   all about every variable, as JSON for other programs"//eol// &

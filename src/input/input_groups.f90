@@ -270,7 +270,7 @@ contains
           if (.not. any(words(2:) == word)) then
             call slot%clear()
             if (slot%given .and. word /= "" .and. .not. self%faulty(words(1))) call self%complain(trim(slot%name), &
-              "has no effect with "//trim(words(1))//" = '"//trim(word)//"'; it goes with "//either(words(2:)), problems)
+              "has no effect with "//trim(words(1))//" = '"//trim(word)//"'; it applies with "//either(words(2:)), problems)
           else if (row%status == "required" .and. .not. slot%given) then
             call self%complain(trim(words(1)), "'"//trim(word)//"' needs "//trim(self%name)//"."//slot%name, problems)
           end if
@@ -278,7 +278,7 @@ contains
         if (.not. slot%given) cycle
         do j = 1, size(self%values)
           if (self%values(j)%given .and. excludes(slot%row, self%values(j)%row)) call self%complain(trim(slot%name), &
-            "is given with "//trim(self%values(j)%name)//"; give one of them", problems)
+            "cannot be given together with "//trim(self%values(j)%name)//"; give only one of them", problems)
         end do
       end associate
     end do

@@ -80,7 +80,7 @@ contains
         text = text//new_line("a")//legible(place//": "//problem%text)
       end associate
     end do
-    if (self%cut_short) text = text//new_line("a")//legible(path)//": more problems than these "//written(most_problems)
+    if (self%cut_short) text = text//new_line("a")//legible(path)//": there are more problems than these "//written(most_problems)
     allocate (error)                            ! not by `fail`: there are several lines
     error%message = text(2:)
     error%code = merge(exit_files, exit_usage, self%unreadable == self%count)

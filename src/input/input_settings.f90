@@ -196,7 +196,7 @@ contains
       sampling%per_decade = int(group%integer_of(what//"_per_decade", 0_int64))
       sampling%from = group%real_of("decades_from", never)
       if (sampling%per_decade > 0 .and. .not. group%given("decades_from")) call group%complain(what//"_per_decade", &
-        "needs decades_from, the time of the first", problems)
+        "needs decades_from, the time of the first of them", problems)
       if (.not. group%given(what//"_at")) return
       sampling%at = group%reals_of(what//"_at")
       if (any(sampling%at(2:) <= sampling%at(:size(sampling%at) - 1))) call group%complain(what//"_at", &
@@ -231,8 +231,10 @@ contains
       call refuse(shear .and. settings%run%dynamics == "steps", "box.shear_rate", "run.dynamics = 'steps'")
       call refuse(settings%run%dynamics == "steps" .and. any(box%surface%motion%kind == piston), "run.dynamics", &
         "side.motion = 'piston'")
-      call refuse(settings%output%helfand .and. box%falling(), "output.helfand", "box.gravity: velocities change all the time")
-      call refuse(settings%output%helfand .and. shear, "output.helfand", "box.shear_rate: velocities change through its images")
+      call refuse(settings%output%helfand .and. box%falling(), "output.helfand", &
+        "box.gravity: velocities change between collisions")
+      call refuse(settings%output%helfand .and. shear, "output.helfand", &
+        "box.shear_rate: velocities change at its periodic boundary")
       call refuse(by_energy .and. shear, energy, "box.shear_rate: the shear does work"//other_rule)
       call refuse(by_energy .and. kicks, energy, "drive.kind: kicks change the energy"//other_rule)
       call refuse(by_energy .and. box%gives_energy() .and. .not. shear, energy, "walls that give energy, by temperature, " &
@@ -240,18 +242,18 @@ contains
       call refuse(by_energy .and. .not. (timed .or. counted .or. rule%events < unlimited .or. law%loses_energy() .or. kicks &
         .or. box%has_lossy_walls() .or. box%gives_energy()), energy, "elastic collisions"//other_rule//", or a restitution below 1")
       call refuse(rule%at_rest .and. settings%run%dynamics == "steps", rest, &
-        "run.dynamics = 'steps': bounces end at no moment"//other_rule)
-      call refuse(rule%at_rest .and. law%contact_time > 0, rest, "contact.contact_time: it keeps the bounces going"//other_rule)
-      call refuse(rule%at_rest .and. shear, rest, "box.shear_rate: disks are driven for ever"//other_rule)
-      call refuse(rule%at_rest .and. kicks, rest, "drive.kind: disks are driven for ever"//other_rule)
+        "run.dynamics = 'steps': the end of bounces has no defined time"//other_rule)
+      call refuse(rule%at_rest .and. law%contact_time > 0, rest, "contact.contact_time: bounces then never end"//other_rule)
+      call refuse(rule%at_rest .and. shear, rest, "box.shear_rate: driven disks never come to rest"//other_rule)
+      call refuse(rule%at_rest .and. kicks, rest, "drive.kind: driven disks never come to rest"//other_rule)
       call refuse(rule%at_rest .and. box%gives_energy() .and. .not. shear, rest, "walls that give energy, by temperature, " &
         //"surface_velocity or motion of &side, &obstacle or &wall"//other_rule)
       call refuse(rule%at_rest .and. .not. (law%loses_energy() .or. box%has_lossy_walls()), rest, &
         "elastic collisions"//other_rule//", or a restitution below 1")
       call refuse(single .and. counted .and. .not. (timed .or. by_energy .or. rule%events < unlimited), "stop.collisions", &
-        "a single disk (species.count), which meets no other; give time or events")
+        "a single disk (species.count), which has no collision partner; give time or events")
       call refuse(alone .and. (shear .or. kicks) .and. .not. timed, "stop", &
-        "a single disk in a periodic box that is sheared (box.shear_rate) or with kicks (drive.kind): nothing happens; give time")
+        "a single disk in a periodic box that is sheared (box.shear_rate) or driven (drive.kind): no event ever occurs; give time")
     end associate
     if (settings%run%dynamics == "steps") call limit("run", "dt", "steps", 1.0e18_real64)
     call limit("drive", "interval", "kicks", 1.0e15_real64)
@@ -268,7 +270,7 @@ contains
 
       if (.not. together) return
       dot = index(variable//".", ".")
-      associate (group => groups(place_of(variable(:dot - 1), groups%name)), what => "does not go with "//other)
+      associate (group => groups(place_of(variable(:dot - 1), groups%name)), what => "cannot be combined with "//other)
         if (dot < len(variable)) call group%complain(variable(dot + 1:), what, problems)
         if (dot > len(variable)) call problems%add(group%line, variable, what)
       end associate

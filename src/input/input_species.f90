@@ -28,7 +28,7 @@ contains
     integer :: k
 
     allocate (species(size(groups)))
-    if (size(groups) == 0) call problems%add(0, "species", "there is none; give at least one")
+    if (size(groups) == 0) call problems%add(0, "species", "the input has no &species; give at least one")
     do k = 1, size(groups)
       call check_name(groups, k, problems)
       if (groups(k)%given("file") .and. .not. groups(k)%given("velocities")) call groups(k)%put_text("velocities", "file")
@@ -126,7 +126,7 @@ contains
         if (s%file /= "" .and. .not. group%given("packing_fraction")) return
         if (.not. (group%faulty("position") .or. group%faulty("grid"))) call group%demand("count", problems)
       else if (group%given("count")) then
-        if (n /= s%count) call group%complain(source, "holds "//counted(n, "disk")//", but species.count is "// &
+        if (n /= s%count) call group%complain(source, "describes "//counted(n, "disk")//", but species.count is "// &
           written(s%count), problems)
       else if (n > most_disks) then
         call group%complain(source, counted(n, "disk")//"; allowed: up to "//written(most_disks), problems)
@@ -150,8 +150,8 @@ contains
         .or. group%given("rotational_temperature"))
       call take_pairs(group, "velocity", s%velocity)
       associate (n => size(s%velocity, 2))
-        if (n > 1 .and. n /= s%count .and. s%count > 0) call group%complain("velocity", written(n)//" pairs for "// &
-          counted(int(s%count, int64), "disk"), problems)
+        if (n > 1 .and. n /= s%count .and. s%count > 0) call group%complain("velocity", "has "//written(n)//" pairs for "// &
+          counted(int(s%count, int64), "disk")//"; allowed: one pair, or one for each disk", problems)
       end associate
     end subroutine take_velocities
 
@@ -176,8 +176,8 @@ contains
           cycle
         end if
         species(base(k))%is_base = .true.
-        if (species(base(k))%radius_in_file) call groups(k)%complain("relative_to", "the radii of """//species(base(k))%name &
-          //""" are those of its file; give mass and radius instead", problems)
+        if (species(base(k))%radius_in_file) call groups(k)%complain("relative_to", "the species """//species(base(k))%name &
+          //""" has its radii from a file; give mass and radius instead", problems)
       end do
       do k = 1, size(species)
         species(k)%mass = 1
@@ -241,7 +241,7 @@ contains
     do j = 1, k - 1                                       ! without a copy of all names for each of them
       if (groups(j)%instance == name) exit
     end do
-    if (j < k) call groups(k)%complain("name", shown(name)//" is already the name of the one in line "// &
+    if (j < k) call groups(k)%complain("name", shown(name)//" is already the name of the group in line "// &
       written(groups(j)%line), problems)
   end subroutine check_name
 

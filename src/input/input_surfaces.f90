@@ -8,7 +8,7 @@ module input_surfaces
   use input_species, only: check_name
   use kinds, only: int64, real64
   use input_groups, only: group_t
-  use variables, only: largest, table, words_of
+  use variables, only: either, largest, table, words_of
   use obstacle_file, only: read_obstacles
   use partners, only: n_sides, side_name
   use segments, only: new_segment
@@ -157,9 +157,9 @@ contains
     do k = 1, size(sides)
       side = place_of(trim(sides(k)%instance), side_name)
       if (side == 0) then
-        if (.not. sides(k)%faulty("name")) call sides(k)%complain("name", "is missing; say which side it is", problems)
+        if (.not. sides(k)%faulty("name")) call sides(k)%complain("name", "is missing; give "//either(side_name), problems)
       else if (line_of(side) > 0) then
-        call sides(k)%complain("name", "the side """//trim(side_name(side))//""" is already that of line "// &
+        call sides(k)%complain("name", "the side """//trim(side_name(side))//""" is already described in line "// &
           written(line_of(side)), problems)
       else if (.not. box%is_wall(side)) then
         call sides(k)%complain("name", "the side """//trim(side_name(side))//""" is periodic (box.boundary), not a wall", &
@@ -173,7 +173,7 @@ contains
         if (.not. box%surface(side)%motion%travels()) cycle
         ! Sides must not meet, whenever each is how far inwards.
         if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%inmost()) >= width) call sides(k)%complain( &
-          culprit(box%surface(side)%motion), "leaves no room between the sides, which are "// &
+          culprit(box%surface(side)%motion), "lets the sides meet, which are "// &
           written(width)//" apart (box.upper)", problems)
       end if
     end do
@@ -234,7 +234,7 @@ contains
         modulo(side, 2) == 1)
       if (motion%kind == still .and. abs(motion%offset) > 0) motion%kind = constant_velocity    ! which is 0
       if (motion%kind == sawtooth .and. group%given("velocity") .and. .not. motion%strike > 0) call group%complain( &
-        "velocity", "must be > 0 with motion = 'sawtooth': it strikes inwards", problems)
+        "velocity", "must be > 0 with motion = 'sawtooth': the side strikes inwards", problems)
       if (motion%kind == constant_velocity) then
         motion%start_time = group%real_of("start_time", 0.0_real64)
         motion%end_time = group%real_of("end_time", 0.0_real64)
@@ -263,7 +263,8 @@ contains
     type(problem_list_t), intent(inout) :: problems
 
     if (group%given(name) .and. any(group%reals_of(name) < by_speed%least())) call group%complain(name, "must be at least " &
-      //written(by_speed%least())//" with contact.restitution_law = 'viscoelastic': there its series has its minimum", problems)
+      //written(by_speed%least())//" with contact.restitution_law = 'viscoelastic': below that value its series has no solution", &
+      problems)
   end subroutine check_least
 
   !> How rough disks or walls are, by variables whose names have a prefix in &contact.
@@ -277,7 +278,7 @@ contains
     grip%restitution = group%real_of(prefix//"tangential_restitution", otherwise%restitution)
     grip%friction = group%real_of(prefix//"friction", otherwise%friction)
     if (group%given(prefix//"friction") .and. .not. grip%is_rough()) call group%complain(prefix//"friction", &
-      "has no effect without "//prefix//"tangential_restitution, which is -1 (smooth); give it, too", problems)
+      "has no effect without "//prefix//"tangential_restitution, which is -1 (smooth); give that, too", problems)
   end subroutine take_grip
 
 end module input_surfaces

@@ -236,7 +236,7 @@ contains
       if (assignment%element > 0) then
         at = at + 3
       else
-        call complain(assignment, "brackets hold the number of one value, as in name(2) = value")
+        call complain(assignment, "brackets must contain the number of one value, as in name(2) = value")
       end if
     end subroutine read_element
 
@@ -477,7 +477,8 @@ contains
         if (size(names) == 0) then
           call problems%add(line, group, "the input has no &"//group)
         else if (instance == "") then
-          call problems%add(line, group, "which one? write "//group//"."//trim(names(1))//".VARIABLE; known: "//joined(names, ", "))
+          call problems%add(line, group, "several groups have this name; write "//group//"."//trim(names(1)) &
+            //".VARIABLE; known: "//joined(names, ", "))
         else
           call problems%add(line, group//"."//instance, "unknown or not unique; "//suggestion(instance, names))
         end if

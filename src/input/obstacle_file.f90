@@ -41,7 +41,7 @@ contains
     else
       call read_text(path, walls, rows, error)
     end if
-    if (size(rows, 2) == 0 .and. .not. allocated(error)) call fail(error, exit_usage, path//": holds no obstacles")
+    if (size(rows, 2) == 0 .and. .not. allocated(error)) call fail(error, exit_usage, path//": contains no obstacles")
   end subroutine read_obstacles
 
   !> Reads them from an HDF5 file, whose numbers nobody has checked.

@@ -298,13 +298,13 @@ contains
     source = source_of(output)
     finished = source == output
     if (.not. is_file(source)) then
-      call fail(error, exit_files, source//": there is no run to go on from")
+      call fail(error, exit_files, source//": there is no run to continue")
       return
     end if
     progress = progress_t(input%settings)
     call file%open(source, writable=.false.)
     if (checkpoint_number(file) == none) then
-      call fail(error, exit_files, source//": its run broke off and cannot go on; without --resume it starts over")
+      call fail(error, exit_files, source//": its run broke off and cannot be continued; without --resume it starts again")
     else
       call check_origin(file, input%groups, error)
     end if
@@ -339,14 +339,14 @@ contains
       call exchange_all(file, record, sim, progress)
       words = file%length(record%name)
       if (words > 0 .and. words /= record%words) then
-        call fail(error, exit_files, file%path//": has other disks than the input describes now: a starting file " &
-          //"(species.file) is not what it was; --resume needs it as it was, --force instead starts over")
+        call fail(error, exit_files, file%path//": has other disks than the input now describes: a starting file " &
+          //"(species.file) has changed; --resume needs it unchanged, --force starts the run again")
         return
       end if
       call record%begin(reading)
       call exchange_all(file, record, sim, progress)
       if (any(sim%tag%species < 1 .or. sim%tag%species > size(sim%species) .or. sim%tag%id < 1 .or. sim%tag%id > size(sim%tag))) &
-        call file%check(-1, "be read: "//record%name//" has disks that are none")
+        call file%check(-1, "be read: "//record%name//" has invalid species or numbers of disks")
       if (.not. allocated(file%failure)) return
       if (trial == 1) call move_alloc(file%failure, failure)
     end do
@@ -362,7 +362,8 @@ contains
 
     call file%fetch_text(checkpoint_group//"program", there)
     if (there /= program() .and. .not. allocated(file%failure)) &
-      call fail(error, exit_usage, file%path//": was written by "//legible(there)//", this is "//program())
+      call fail(error, exit_usage, file%path//": was written by "//legible(there)//", but this is "//program() &
+      //"; continue the run with the program that started it")
     if (.not. allocated(error)) call file%report(error)
   end subroutine check_program
 
@@ -384,7 +385,7 @@ contains
       if (there(k:k) /= here(k:k)) exit
     end do
     call fail(error, exit_usage, file%path//": belongs to another input: there "//legible(line_at(there, k)) &
-      //", here "//legible(line_at(here, k))//"; --resume needs the input as it was there, --force instead starts over")
+      //", here "//legible(line_at(here, k))//"; --resume needs the unchanged input, --force starts the run again")
   end subroutine check_origin
 
   !> Counts, writes or reads a checkpoint. For reading, the box and the species of the simulation must already be set.

@@ -86,7 +86,7 @@ contains
     if (.not. allocated(error)) call remove_file(path//unfinished_new)      ! left incomplete by a run that was killed
     self%replaced = identity_of(path)
     if (is_file(path) .and. all(self%replaced == 0) .and. .not. allocated(error)) &
-      call fail(error, exit_files, path//": cannot be looked at: "//last_problem())
+      call fail(error, exit_files, path//": cannot be examined: "//last_problem())
   end subroutine claim
 
   !> Opens the output of a new run after `claim`, and writes the first samples.
@@ -138,7 +138,7 @@ contains
     else if (is_file(self%path//unfinished)) then
       if (has_broken_off(self%path)) return
       call fail(error, exit_files, self%path//unfinished//": exists already, from a run that did not finish; --resume " &
-        //"goes on, --force starts over")
+        //"continues it, --force starts it again")
     end if
   end subroutine check_start
 

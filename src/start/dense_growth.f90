@@ -95,8 +95,8 @@ contains
       wanted = pi*sum(full**2)/product(sim%box%edges())
       advice = "use fewer or smaller disks"
       if (maxval(full) <= minval(full)) advice = "placement = 'lattice' may pack equal disks more densely; or "//advice
-      call fail(error, exit_usage, "dense placement reached "//written(reached)//" of the wanted packing "//written(wanted) &
-        //"; "//advice)
+      call fail(error, exit_usage, "species.placement: dense placement reached "//written(reached)//" of the wanted packing " &
+        //written(wanted)//"; "//advice)
     end subroutine fail_to_grow
 
     !> Starts at given positions with random velocities. All disks have the largest common relative size that fits.

@@ -66,10 +66,10 @@ contains
     if (.not. speed > 0) return
     if (longest*speed > most .or. shortest*speed < 1/most .or. longest/speed > most .or. shortest/speed < 1/most) then
       call problems%add(0, "species.radius", "lengths from "//written(shortest)//" to "//written(longest)//" with speeds up to " &
-        //written(speed)//": their products are out of range; take other units of length and time")
+        //written(speed)//": their products are out of range; choose other units of length and time")
     else if (mass(2)*speed > most/speed/sim%n_disks() .or. mass(1)*speed < 1/most/speed) then
       call problems%add(0, "species.mass", "masses from "//written(mass(1))//" to "//written(mass(2))//" with speeds up to " &
-        //written(speed)//": their energies are out of range; take other units of mass and time")
+        //written(speed)//": their energies are out of range; choose other units of mass and time")
     end if
   end subroutine check_speeds
 

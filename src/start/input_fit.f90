@@ -127,7 +127,7 @@ contains
         end if
         last = motion%end_time - (disks/(high(3 - axis) - low(3 - axis)) - (high(axis) - low(axis)))/motion%strike
         call groups(k)%complain("end_time", "the side would crush the disks, which need at least their own area, "// &
-          written(disks)//"; possible: before "//written(last), problems)
+          written(disks)//"; allowed: a time before "//written(last), problems)
       end associate
     end do
   end subroutine check_strokes
@@ -153,7 +153,7 @@ contains
         if (decides) call complain_of_file(s, group, problems)
         return
       end if
-      if (size(s%in_file%rows) == 0) call group%complain("file", s%file//" holds no disks of species """//s%name//'"', problems)
+      if (size(s%in_file%rows) == 0) call group%complain("file", s%file//" contains no disks of species """//s%name//'"', problems)
       if (size(s%in_file%rows) == 0) return
       s%spin_in_file = s%spin_in_file .and. s%in_file%there(spin_row)
       s%angle_in_file = s%in_file%there(angle_row)

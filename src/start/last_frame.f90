@@ -26,7 +26,7 @@ contains
 
     call file%open(path, .false.)
     if (max(file%length(disk_species), file%length(species_names)) > most_disks) &
-      call file%check(-1, "be read: its size is not that of a run's")
+      call file%check(-1, "be read: its number of disks is not valid")
     n = int(max(0_int64, file%length(disk_species)))
     allocate (species(n))
     call file%fetch(disk_species, n, species)
@@ -51,7 +51,7 @@ contains
         call file%fetch(box_group//"/lower", 2, lower)
         call file%fetch(box_group//"/edges", 2, edges)
         if (.not. all(abs(lower) <= largest .and. edges >= smallest .and. edges <= largest)) &
-          call file%check(-1, "be read: "//box_group)
+          call file%check(-1, "be read: "//box_group//" has values out of range")
         do k = 1, size(disks%rows)
           disks%table(1:2, k) = box%lower + (disks%table(1:2, k) - lower)*(box%edges()/edges)
         end do

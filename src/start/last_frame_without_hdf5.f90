@@ -11,7 +11,7 @@ contains
     type(disks_in_file_t), intent(inout) :: disks
     type(box_t), intent(in), optional :: box
 
-    call fail(disks%error, exit_usage, path//": files of runs cannot be read here, without HDF5")
+    call fail(disks%error, exit_usage, path//": cannot be read: this library was built without HDF5")
   end subroutine read_last_frame
 
 end submodule last_frame_without_hdf5

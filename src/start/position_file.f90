@@ -75,7 +75,7 @@ contains
 
       if (len_trim(line) == longest_line) problem = "the line is too long"
       if (number == 1 .and. (index(line, numpy_mark) == 1 .or. index(line, zip_mark) == 1)) &
-        problem = "arrays of NumPy; write_start of the Python package makes a starting file of them"
+        problem = "the file contains arrays of NumPy; write_start of the Python package makes a starting file of them"
       call find_words(line, first, last, n_words)
       if (n_words == 0 .or. problem /= "") return
       if (size(column) == 0) then
@@ -86,7 +86,8 @@ contains
         if (n_words == 2 .or. n_words == 4) column = [(k, k=1, n_words)]
       end if
       if (size(column) == 0) then
-        problem = counted(int(n_words, int64), "number")//"; allowed: x y, or x y vx vy, or what a first line names: " &
+        problem = counted(int(n_words, int64), "number")//"; allowed: x y, or x y vx vy, " &
+          //"or the columns that the first line names: " &
           //joined(known_names, " ")
       else if (n_words /= size(column)) then
         problem = counted(int(n_words, int64), "value")//"; expected: "//joined(known_names(column), " ")

@@ -54,7 +54,8 @@ contains
       if (is_run(me%file)) then
         call read_last_frame(me%file, me%name, me%in_file, new_box)
       else if (me%scale_positions) then
-        call refuse(me, me%file//": is not the file of a run (.h5), which scale_positions needs: it says how large the box was")
+        call refuse(me, me%file//": is not the output of a run (.h5); scale_positions needs one, " &
+          //"because it contains the size of its box")
       else
         call read_positions(me%file, names_of(species), s, me%in_file)
       end if

@@ -165,10 +165,10 @@ contains
         end do
         if (first == last) then
           call groups(s)%complain("exact_temperature", "one disk does not move relative to the mean of its species; leave it " &
-            //"out, or take more disks", problems)
+            //"out, or use more disks", problems)
         else if (.not. temperature > 0) then
           call groups(s)%complain("exact_temperature", "the disks do not move relative to each other, which no factor changes; " &
-            //"let them start with velocities = 'maxwell'", problems)
+            //"use velocities = 'maxwell'", problems)
         else
           do i = 1, size(disk)
             disk(i)%v = mean + sqrt(wanted/temperature)*(disk(i)%v - mean)

@@ -250,7 +250,7 @@ def test_slurm_is_not_given_the_same_work_twice_and_keeps_the_limit(ensemble, cl
     folder = tmp_path / "members"
     wait_for(lambda: list(folder.glob("*.part")))
     again = ensemble(*arguments)
-    assert again.returncode == 75 and "goes on: 0 of 2 members finished" in again.stderr
+    assert again.returncode == 75 and "is not finished: 0 of 2 members finished" in again.stderr
     assert len(list(folder.glob("*.part"))) == 1  # %1, though there are two processors
     assert len(cluster("squeue", "--noheader", "--array").splitlines()) == 2
 

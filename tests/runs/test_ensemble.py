@@ -39,7 +39,7 @@ out=${out:-$1.check}
 trap 'echo TERM >>"$out.signals"; touch "$out.h5.part"; exit 75' TERM INT
 echo "${resumed:-anew} $sets" >>"$out.starts"
 [[ -z ${resumed:-} || ! -e $out.broken ]] ||
-  { echo "$out.h5.part: its run broke off and cannot go on" >&2; exit 3; }
+  { echo "$out.h5.part: its run broke off and cannot be continued" >&2; exit 3; }
 [[ ${outcome:-} != 4 ]] || touch "$out.h5.part" "$out.broken"
 [[ ${outcome:-} != 9 ]] || { touch "$out.h5.part"; kill -9 $$; }
 [[ -z ${outcome:-} ]] || { echo "reason of the failure" >&2; exit "$outcome"; }
@@ -75,7 +75,7 @@ def ensemble(lab, *options, seconds=None, **more):
 @pytest.mark.parametrize(
     ("tool", "engine", "said"),
     [
-        ("flock", "pool", "ensemble.sh: needs flock (package util-linux)\n"),
+        ("flock", "pool", "ensemble.sh: the program flock is missing (package util-linux)\n"),
         ("sbatch", "slurm", "--engine slurm needs"),
         ("parallel", "parallel", "--engine parallel needs"),
     ],
@@ -201,7 +201,7 @@ def test_a_signal_reaches_each_member_once_and_the_command_goes_on(lab, how):
         os.killpg(process.pid, how)  # as a terminal does
         said = process.communicate(timeout=PATIENCE)[1]
     assert process.returncode == 75 and not processes_of(lab)
-    assert "0 of 6 members finished" in said and "stopped: the same command goes on" in said
+    assert "0 of 6 members finished" in said and "stopped: the same command continues" in said
     assert len(list((lab / "out").glob("*.h5.part"))) == 2
     assert [p.read_text() for p in (lab / "out").glob("*.signals")] == ["TERM\n"] * 2
     (lab / "hold").unlink()
@@ -381,25 +381,25 @@ def test_settings_of_a_failed_member_may_be_mended(lab):
         (["--seeds", "1", "-j", "0"], "-j 0"),
         (["--sedes", "1"], "unknown option --sedes; did you mean --seeds?"),
         (["--seeds"], "needs a value"),
-        (["--seeds", "1", "--manifest", "x"], "either"),
+        (["--seeds", "1", "--manifest", "x"], "--manifest cannot be combined"),
         (["--manifest", "/nowhere"], "cannot read"),
-        (["--seeds", "1,1"], "two members are called"),
+        (["--seeds", "1,1"], "two members have the name"),
         (["--seeds", "1-1000000000"], "more than 100000 members"),
         (["--seeds", "1-99999999999999999999"], "neither a number nor a range"),
         (["--seeds", "1-1000", "--scan", "a.b=" + "1," * 200], "more than 100000 members"),
         (["--seeds", "[0-9]*"], "'[0-9]*' is neither a number nor a range"),
         (["--seeds", "08-10"], "'08-10' is neither a number nor a range"),
         (["--seeds", "1,"], "'' is neither a number nor a range"),
-        (["--seeds", "1\n2"], "'1?2' holds control characters"),
+        (["--seeds", "1\n2"], "'1?2' contains control characters"),
         (["--set", "run.title=a\tb", "--seeds", "1"], "control characters"),
         (["--manifest", "."], "cannot read"),
         (["--manifest", "/dev/zero"], "cannot read"),
         (["--manifest", "fifo"], "cannot read"),
         (["--seeds", "1", "--engine", "parallel", "--sshloginfile", "fifo"], "cannot read"),
-        (["--seeds", "1", "--engine", "cloud"], "--engine cloud: pool, slurm or parallel"),
-        (["--seeds", "1", "--sshloginfile", "hosts"], "goes with --engine parallel"),
+        (["--seeds", "1", "--engine", "cloud"], "--engine cloud: unknown engine"),
+        (["--seeds", "1", "--sshloginfile", "hosts"], "needs --engine parallel"),
         (["--seeds", "1", "--share", "0/3"], "--share 0/3: write K/M"),
-        (["--seeds", "1", "--retry"], "go with --engine slurm"),
+        (["--seeds", "1", "--retry"], "need --engine slurm"),
     ],
 )
 def test_wrong_usage_is_one_line_and_exit_2(lab, options, message):

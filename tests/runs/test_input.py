@@ -248,7 +248,7 @@ def test_all_problems_come_at_once_and_the_last_line_says_so_too(checked):
     ("content", "said"),
     [
         (b"", "gas.nml: is empty, or a pipe or a device instead of a file"),
-        (b"\n", "gas.nml: species: there is none"),
+        (b"\n", "gas.nml: species: the input has no &species"),
         (bytes(range(256)), "is not a text file: byte 1"),
         (GOOD.encode("utf-16"), "is not a text file"),
         (b"\xff\xfe" + GOOD.encode(), "text outside a group"),

@@ -41,7 +41,7 @@ LOGGED = """&box boundary = 'periodic', 'wall' /
 NO_ROOM = r"^disk/gas\.h5(\.part)?: .*(\d+ bytes needed, \d+ bytes free|.* are free)"
 #: ... and what to do, at the start and later.
 MAKE_ROOM = NO_ROOM + "(; choose fewer frames or make room)?$"
-GO_ON = NO_ROOM + "; --resume goes on from the last checkpoint$"
+GO_ON = NO_ROOM + "; --resume continues from the last checkpoint$"
 
 
 @pytest.mark.parametrize("text", [BUSY, PLANNED], ids=["growing", "planned"])

@@ -108,7 +108,7 @@ def test_a_file_that_declares_absurdly_many_disks_is_refused_at_once(ricochet, t
     small = {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_AS, (2**28, 2**28))}
     run = ricochet("gas.nml", "--check", seconds=2, **small)
     assert run.returncode == FILES and len(run.stderr.splitlines()) == 1
-    reason = "or a smaller starting file" if count == 10**8 else "its size is not that"
+    reason = "or a smaller starting file" if count == 10**8 else "its number of disks is not valid"
     assert reason in run.stderr
 
 

@@ -129,7 +129,7 @@ def test_a_file_of_hdf5_has_the_same_obstacles(program, folder):
         ("x y radius\n\n1 1 0.2\n1 2\n", "circles.txt:4: 2 values; expected: x y radius"),
         ("x y radius\n1 1 O.2\n", 'circles.txt:2: "O.2" is not a number'),
         ("1 1 0.2\n", "circles.txt:1: the first line must name the columns, x y radius"),
-        ("x y radius\n# none\n", "circles.txt: holds no obstacles"),
+        ("x y radius\n# none\n", "circles.txt: contains no obstacles"),
         (
             "radius y x\n0.1 2 3\n\n0.1 2 30 # far\n",
             "circles.txt:4: centre: the obstacle is outside",

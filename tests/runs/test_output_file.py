@@ -235,7 +235,7 @@ def test_a_run_that_is_over_before_it_begins_says_why(ricochet, tmp_path):
     input_file = write_input(tmp_path)
     run = ricochet(input_file, "-o", "gas.h5", *rest, "--set", "stop.energy_fraction=0.1")
     assert run.returncode == FINISHED and "\ntime = 0\n" in run.stdout
-    assert "nothing moves at the start" in one_line(run)
+    assert "no disk moves at the start" in one_line(run)
 
 
 def test_impossible_places_are_refused_in_one_line(ricochet, tmp_path):

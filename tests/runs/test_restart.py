@@ -133,7 +133,7 @@ def test_a_file_that_is_damaged_is_refused_in_one_line(ricochet, before, trials)
     assert run.returncode == FILES and one_line(run).startswith(f"{before.name}: cannot be read: ")
     before.unlink()
     run = ricochet(*COMMAND, "--resume")
-    assert run.returncode == FILES and "no run to go on from" in one_line(run)
+    assert run.returncode == FILES and "there is no run to continue" in one_line(run)
 
 
 def test_a_run_that_breaks_off_leaves_its_last_state_and_makes_way(ricochet, tmp_path):
@@ -172,7 +172,7 @@ def test_a_run_that_passed_a_collapse_says_so(ricochet, tmp_path):
         if pair[1] > 0 and all(last.get(disk) == time for disk in pair):
             stuck.append(time)
         last |= dict.fromkeys(pair, time)
-    said = re.search(r"in (\d+) collisions .* at time ([\d.]+): .* say to ([^,]+),", note)
+    said = re.search(r": (\d+) collisions .* at time ([\d.]+); .* example to ([^,]+),", note)
     assert (int(said[1]), float(said[2])) == (len(stuck), pytest.approx(stuck[0], rel=1e-5))
     run = ricochet(*crater, f"--set=contact.contact_time={said[3]}")
     assert run.returncode == FINISHED and "collapse" not in run.stderr + run.stdout
@@ -304,7 +304,7 @@ def test_a_finished_run_asks_for_a_later_stop_rule(ricochet, tmp_path, end):
 def test_a_check_of_a_run_that_goes_on_changes_nothing(ricochet, before):
     content, there = before.read_bytes(), set(before.parent.iterdir())
     run = ricochet(*COMMAND, "--resume", "--check")
-    assert run.returncode == FINISHED and "goes on from time " in run.stdout
+    assert run.returncode == FINISHED and "continues from time " in run.stdout
     assert set(before.parent.iterdir()) == there and before.read_bytes() == content
 
 

@@ -57,7 +57,8 @@ def test_more_threads_than_cores_are_warned_of(ricochet, gas, options, environme
 
     more = {"env": os.environ | environment, "preexec_fn": prepare}
     done = ricochet("gas.nml", "-o", "many.h5", *options, **more)
-    text = "warning: {}: 4 threads are more than the 1 core that the run may use, and slower\n"
+    text = "warning: {}: 4 threads are more than the 1 core that the run may use; "
+    text += "fewer threads would be faster\n"
     assert done.returncode == FINISHED and done.stderr == (text.format(said) if said else "")
     assert threads_of(gas / "many.h5") == threads
     assert differences(gas / "one.h5", gas / "many.h5") == []
@@ -109,6 +110,6 @@ def test_too_little_memory_for_domains_is_said(program, gas):
     done = ran(*command, cwd=gas)
     if "unshare" in done.stderr or "mount" in done.stderr:
         pytest.skip("cannot pretend to have less memory here: needs root")
-    said = "there is not enough memory for 2 threads; the run goes on with one"
+    said = "there is not enough memory for 2 threads; the run uses one"
     assert done.stderr == f"warning: run.threads: {said}\n" and threads_of(gas / "many.h5") == 1
     assert differences(gas / "one.h5", gas / "many.h5") == []

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 BROKE_OFF = ": its run broke off "
 LOOK = 0.2  # interval of checks whether members are still wanted [s]
-GOES_ON = re.compile(r"(stopped.*|killed by signal.*|.*--resume goes on.*|)")
+GOES_ON = re.compile(r"(stopped.*|killed by signal.*|.*--resume continues.*|)")
 
 
 def sweep(
