@@ -12,6 +12,11 @@ top of both.  u changes within a cell as it does from cell to cell.  Frames coun
 input (docs/theory.md); cells in which fewer than two of them saw a disk have a density alone, and
 three disks must be left without any block for kT, stress and heat.
 
+--grid also draws the stream function psi of the flux j = n u, j_x = d psi / dy and j_y = -d psi /
+dx: its lines are the paths of the mean flow.  The longest arrow is the largest significant flow;
+arrows are pale where the flow is within its error (chi^2 of both components below 5.99, which noise
+exceeds in 5 % of the cells).
+
 Across equal disks between two walls, dashed: what the fluxes of momentum and energy at the walls
 say by Enskog's viscosity and conductivity (Gass 1971) and the equation of state, from temperature
 and flow in the middle on; nothing is fitted.  The band is the error by fluxes and middle.  At a
@@ -20,10 +25,12 @@ are the walls; how far the gas there is from them, by the law, is in the table.
 """
 
 import argparse
+from typing import NamedTuple
 
 from ricochet import Run
 from ricochet.analysis.fields import ACROSS, fields, has_theory, places, prediction
 from ricochet.analysis.statistics import Estimate
+from ricochet.analysis.streams import stream_function
 from ricochet.figures.drawing import band, draw_box, plt, titled
 from ricochet.reading.reader import SIDES
 from ricochet.reading.units import Units
@@ -33,7 +40,8 @@ import numpy as np
 from matplotlib.patches import Circle
 
 MOST_CELLS = 100_000
-LEAST_FLOW = 0.2  # smallest scale of arrows, in thermal speeds: noise is not enlarged
+LEAST_FLOW = 0.2  # smallest range of the axis of a flow, in thermal speeds
+SIGNIFICANT = 5.99  # chi^2 of two components that noise exceeds in 5 % of the cells
 #: Words and dimension of the label of each field.
 LABELS = {
     "density": ("number density n", "number density"),
@@ -122,25 +130,65 @@ def at_walls(run: Run, axis: int, law: dict) -> list[dict]:
     return rows
 
 
-def draw_grid(runs: list[Run], cells: tuple[int, int], found: dict) -> plt.Figure:
-    """Draw maps of density and temperature, with the flow as arrows."""
+class Flow(NamedTuple):
+    """The mean flow on a grid of cells."""
+
+    u: np.ndarray  # (2, C) along x and y [speed]
+    significant: np.ndarray  # (C,) whether it differs from 0 by more than its error explains
+    stream: np.ndarray  # (NY + 1, NX + 1) stream function at the corners [1/time]
+
+
+def flow_of(run: Run, cells: tuple[int, int], found: dict[str, Estimate]) -> Flow:
+    """Return the flow of measured fields, and the stream function of its flux."""
+    parts = [found[name] for name in ("flow_x", "flow_y")]
+    u, error = (np.array([part[k] for part in parts]) for k in (0, 1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        chi2 = np.sum(np.square(u / error), axis=0)
+    flux = (u * found["density"].mean).reshape(2, *cells[::-1])
+    return Flow(u, np.nan_to_num(chi2, posinf=0.0) > SIGNIFICANT, stream_function(run, flux))
+
+
+def draw_arrows(axes: plt.Axes, run: Run, cells: tuple[int, int], flow: Flow, colour: str) -> None:
+    """Draw the flow as arrows: the largest significant one is as long as a cell, others are pale.
+
+    Where no flow is significant, the largest of all sets the scale.
+    """
+    size = np.hypot(*flow.u)
+    shown = size[flow.significant] if flow.significant.any() else size
+    top = float(np.nanmax(shown, initial=0.0)) or 1.0
+    scale = {"units": "xy", "scale_units": "xy", "angles": "xy", "color": colour, "zorder": 2}
+    scale |= {"scale": top / float(np.min(run.edges / cells))}
+    scale |= {"width": 0.05 * float(np.min(run.edges / cells))}
+    for some, alpha in ((~flow.significant, 0.25), (flow.significant, 1.0)):
+        place, u = places(run, cells)[some], flow.u[:, some]
+        arrows = axes.quiver(*place.T, *u, alpha=alpha, **scale)
+    words = f"flow {top:.2g}" + " (not significant)" * (not flow.significant.any())
+    key = {"labelpos": "W", "color": "black", "coordinates": "axes", "alpha": 1.0}
+    axes.quiverkey(arrows, 0.45, 1.05, top, words, **key)
+
+
+def draw_grid(
+    runs: list[Run], cells: tuple[int, int], found: dict[str, Estimate], flow: Flow
+) -> plt.Figure:
+    """Draw maps of density and temperature, and the stream function with the flow as arrows."""
     run = runs[0]
-    figure, panels = plt.subplots(1, 2, figsize=(12, 1 + 5 * run.edges[1] / run.edges[0]))
+    figure, panels = plt.subplots(1, 3, figsize=(16, 1 + 4.5 * run.edges[1] / run.edges[0]))
     sides = [np.linspace(run.lower[k], run.upper[k], cells[k] + 1) for k in (0, 1)]
-    flow = [found[name].mean.reshape(cells[::-1]) for name in ("flow_x", "flow_y")]
-    thermal = np.sqrt(np.nanmedian(found["temperature"].mean) / run.mass.mean())
-    top = float(max(np.nanmax(np.hypot(*flow)), LEAST_FLOW * thermal))
-    scale = {"units": "xy", "scale_units": "xy", "angles": "xy"}
-    scale |= {"scale": top / float(np.min(run.edges / cells)), "color": "white"}
-    for axes, name in zip(panels, ("density", "temperature"), strict=True):
+    for axes, name in zip(panels, ("density", "temperature"), strict=False):
         draw_box(axes, run)
         image = axes.pcolormesh(*sides, found[name].mean.reshape(cells[::-1]), zorder=0.2)
         for one in (obstacle for obstacle in run.obstacles if obstacle.inside):
             image.set_clip_path(Circle(one.centre, one.radius, transform=axes.transData))
         figure.colorbar(image, ax=axes, label=run.units.label(*LABELS[name]), shrink=0.8)
-        arrows = axes.quiver(*places(run, cells).T, *(part.ravel() for part in flow), **scale)
-        key = {"labelpos": "W", "color": "black", "coordinates": "axes"}
-        axes.quiverkey(arrows, 0.3, 1.04, top, f"flow {top:.2g}", **key)
+    draw_box(panels[2], run)
+    top = float(np.abs(flow.stream).max()) or 1.0
+    levels = np.linspace(-top, top, 16)  # an even number: no line at 0, where all is noise
+    style = {"cmap": "RdBu_r", "zorder": 0.2}
+    filled = panels[2].contourf(*sides, flow.stream, levels, **style)
+    panels[2].contour(*sides, flow.stream, levels, colors="0.5", linewidths=0.5, zorder=0.3)
+    label = run.units.label("stream function ψ of the flux n u", "rate")
+    figure.colorbar(filled, ax=panels[2], label=label, shrink=0.8, format="%.2g", ticks=levels[::3])
+    draw_arrows(panels[2], run, cells, flow, "black")
     figure.suptitle(titled(runs))
     return figure
 
@@ -172,7 +220,13 @@ def main() -> None:
     middles = places(runs[0], cells)
     data = {"x": middles[:, 0], "y": middles[:, 1]} | spread({"": found})
     if args.grid:
-        figure = draw_grid(runs, cells, found)
+        flow = flow_of(runs[0], cells, found)
+        middle = sum(
+            flow.stream[i : -1 + i or None, j : -1 + j or None] for i in (0, 1) for j in (0, 1)
+        )
+        data |= {"stream_function": middle.ravel() / 4}
+        data |= {"flow_significant": flow.significant.astype(int)}
+        figure = draw_grid(runs, cells, found, flow)
     else:
         x, law = data["xy"[axis]], None
         if has_theory(runs, axis):

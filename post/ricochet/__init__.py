@@ -49,6 +49,7 @@ if TYPE_CHECKING:  # the modules that `__getattr__` loads, for type checkers
     from .analysis import paths as paths
     from .analysis import speeds as speeds
     from .analysis import statistics as statistics
+    from .analysis import streams as streams
     from .analysis import structure as structure
     from .analysis import thermodynamics as thermodynamics
     from .analysis import transport as transport

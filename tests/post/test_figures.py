@@ -1,13 +1,16 @@
 """What figures show beside the measured curves: bands of single runs, panels, explanations."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from matplotlib import colors
 from matplotlib.collections import EllipseCollection
-from matplotlib.quiver import QuiverKey
+from matplotlib.quiver import Quiver, QuiverKey
 
 import cooling as cooling_figure
-from ricochet import crater, drawing, read_run, script, thermodynamics
+import fields as fields_figure
+from ricochet import crater, drawing, read_run, script, statistics, streams, thermodynamics
 from ricochet.figures.drawing import plt
 from synthetic_run import ROOT, run_script, write_run
 
@@ -238,7 +241,7 @@ def test_arrows_have_a_scale_and_a_second_species_an_outline(tmp_path, rng, figu
     (key,) = [one for one in axes.artists if isinstance(one, QuiverKey)]
     speed = float(key.label.split()[1])
     assert key.label.endswith(" m/s") and speed <= run.speed(-1).max() < 2.5 * speed
-    (disks,) = [one for one in axes.collections if isinstance(one, EllipseCollection)]
+    *_, disks = [one for one in axes.collections if isinstance(one, EllipseCollection)]
     widths = disks.get_linewidths()
     assert np.all(np.array(widths) == np.array([0, 0, 0, 1, 1, 1]) * widths[-1]) and widths[-1] > 0
 
@@ -248,9 +251,56 @@ def test_spins_have_a_colour(tmp_path, rng, figures, capsys, simulated):
     rough = "&contact tangential_restitution = 0 /"
     run = simulated(f"&species count = 9 radius = 0.05 temperature = 1 /{rough}&stop time = 1 /")
     assert run_script("snapshot", run.path, "--colour", "spin", "-o", tmp_path / "a.png") == 0
-    (disks,) = [c for c in figures[0].axes[0].collections if isinstance(c, EllipseCollection)]
+    *_, disks = (c for c in figures[0].axes[0].collections if isinstance(c, EllipseCollection))
     np.testing.assert_allclose(disks.get_array(), run.angular_velocity[-1])
     assert disks.norm.vmin == -disks.norm.vmax and np.ptp(run.angular_velocity[-1]) > 0
     smooth = simulated("&species count = 9 radius = 0.05 speed = 1 /&stop time = 1 /")
     assert run_script("snapshot", smooth.path, "--colour", "spin", "-o", tmp_path / "a.png") == 2
     assert "its disks cannot rotate" in capsys.readouterr().err
+
+
+# --- flows ---
+
+
+@pytest.mark.parametrize("periodic", [(False, False), (True, False), (False, True), (True, True)])
+def test_a_stream_function_is_found_from_its_flux(rng, periodic):
+    """Of random modes that suit the sides, with a flux through the box along periodic axes."""
+    edges = rng.uniform(0.5, 3, 2)
+    ends = [np.linspace(0, edge, int(rng.integers(30, 45)) + 1) for edge in edges]
+    through = rng.normal(size=2) * periodic
+    waves = np.where(periodic, 2, 1) * np.pi * rng.integers(1, 3, (3, 2)) / edges
+    phases, sizes = np.where(periodic, rng.uniform(0, 6, (3, 2)), 0), rng.normal(size=3)
+
+    def psi(x, y):
+        parts = zip(sizes, waves, phases, strict=True)
+        total = sum(a * np.sin(k[0] * x + p[0]) * np.sin(k[1] * y + p[1]) for a, k, p in parts)
+        return total + through[0] * y - through[1] * x
+
+    x, y = np.meshgrid(*((end[1:] + end[:-1]) / 2 for end in ends))
+    step = 1e-5
+    flux = np.stack([psi(x, y + step) - psi(x, y - step), psi(x - step, y) - psi(x + step, y)])
+    run = SimpleNamespace(edges=edges, periodic=np.array(periodic))
+    found = streams.stream_function(run, flux / (2 * step))
+    exact = psi(*np.meshgrid(*ends))
+    exact = exact - exact[0, 0]
+    assert np.abs(found - exact).max() < 0.03 * np.ptp(exact)
+
+
+def test_arrows_are_as_long_as_the_largest_flow_beyond_its_error(tmp_path, rng):
+    """A roll of 5 % of the thermal speed, with noise: the roll is dark, and sets the scale."""
+    x = rng.uniform(0, 1, (1, 4, 2))
+    run, cells = read_run(write_run(tmp_path / "a.h5", x, 0 * x)), (10, 8)
+    u = 0.01 * rng.normal(size=(2, 80))
+    u[:, 5], error = (0.2, 0.0), np.full((2, 80), 0.01)
+    u[:, 7], error[:, 7] = (0.5, 0.5), 1.0
+    names = zip(("flow_x", "flow_y"), u, error, strict=True)
+    found = {name: statistics.Estimate(*own) for name, *own in names}
+    found["density"] = statistics.Estimate(np.ones(80), np.zeros(80))
+    flow = fields_figure.flow_of(run, cells, found)
+    assert flow.significant[5] and not flow.significant[7] and flow.significant.sum() < 14
+    figure, axes = plt.subplots()
+    fields_figure.draw_arrows(axes, run, cells, flow, "black")
+    pale, dark = (c for c in axes.collections if isinstance(c, Quiver))
+    assert pale.get_alpha() < dark.get_alpha() == 1 and flow.significant.sum() == dark.N
+    assert 0.2 / dark.scale == pytest.approx(0.1), "the length of a cell"
+    plt.close(figure)

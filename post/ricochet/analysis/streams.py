@@ -1,0 +1,98 @@
+"""The stream function of a measured flow on a grid of cells.
+
+In a steady state the flux of disks j = n u has no divergence, so that j_x = d psi / dy and j_y = -d
+psi / dx.  Its lines of equal value are the paths of the mean flow, and the difference between two
+of them is the number of disks that pass between them per time.
+"""
+
+import numpy as np
+import scipy
+
+from ..reading.reader import Run
+
+__all__ = ["stream_function"]
+
+
+def stream_function(run: Run, flux: np.ndarray) -> np.ndarray:
+    """Fit a stream function to the flux of disks in cells.
+
+    The flux of its derivatives has the smallest sum of squared deviations from the measured one.
+    The noise of the measured flux that has a divergence is lost in this way.
+
+    Parameters
+    ----------
+    run : Run
+        a run, for the box; no flux passes its walls
+    flux : numpy.ndarray
+        (2, NY, NX) density times flow along x and y [1/(length time)]; NaN where nothing was
+        measured, as inside obstacles, counts as 0
+
+    Returns
+    -------
+    numpy.ndarray
+        (NY + 1, NX + 1) values at the corners of the cells [1/time], 0 at the lower left one
+
+    Examples
+    --------
+    >>> still = np.zeros((2, 4, 5))
+    >>> streams.stream_function(run, still).shape
+    (5, 6)
+    """
+    _, rows, columns = flux.shape
+    edges = run.edges / (columns, rows)
+    unknowns, corners = corner_unknowns(rows, columns, run.periodic)
+    # Each corner is a sum of unknowns: a row of `corners`.  Differences of corners make the flux.
+    number = np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, columns + 1)
+    lower, upper, left, right = number[:-1], number[1:], number[:, :-1], number[:, 1:]
+    ends = slice(None, -1), slice(1, None)
+    along_y = [(one[:, end], sign / 2) for one, sign in ((upper, 1), (lower, -1)) for end in ends]
+    along_x = [(one[end], sign / 2) for one, sign in ((left, 1), (right, -1)) for end in ends]
+    matrix = scipy.sparse.vstack(
+        [
+            differences(along_y, number.size) @ corners / edges[1],
+            differences(along_x, number.size) @ corners / edges[0],
+        ]
+    )
+    wanted = np.nan_to_num(flux).reshape(-1)
+    if not unknowns or not wanted.any():
+        return np.zeros(number.shape)
+    fitted = scipy.sparse.linalg.lsqr(matrix, wanted, atol=1e-10, btol=1e-10, iter_lim=20000)[0]
+    psi = (corners @ fitted).reshape(number.shape)
+    return psi - psi[0, 0]
+
+
+def differences(terms: list[tuple[np.ndarray, float]], count: int) -> scipy.sparse.csr_array:
+    """Return the sparse matrix whose row for each cell adds corners with these factors."""
+    cells = terms[0][0].size
+    rows = np.tile(np.arange(cells), len(terms))
+    columns = np.concatenate([corner.ravel() for corner, _ in terms])
+    values = np.repeat([factor for _, factor in terms], cells)
+    return scipy.sparse.csr_array((values, (rows, columns)), shape=(cells, count))
+
+
+def corner_unknowns(
+    rows: int, columns: int, periodic: np.ndarray
+) -> tuple[int, scipy.sparse.csr_array]:
+    """Return the number of unknowns, and how the values at the corners are made of them.
+
+    The first unknowns are values at corners that no wall fixes, those on two sides of a period
+    being one.  Walls have one value each, 0 at the lower or left one.  Along a periodic axis a
+    last unknown is the flux through the whole box, which makes psi grow across it.
+    """
+    y, x = np.meshgrid(np.arange(rows + 1), np.arange(columns + 1), indexing="ij")
+    fixed = np.zeros(x.shape, dtype=bool)
+    if not periodic[0]:
+        fixed |= (x == 0) | (x == columns)
+    if not periodic[1]:
+        fixed |= (y == 0) | (y == rows)
+    home = (y % rows if periodic[1] else y) * (columns + 1) + (x % columns if periodic[0] else x)
+    free, which = np.unique(home[~fixed], return_inverse=True)
+    entries = [(np.flatnonzero(~fixed.ravel()), which, np.ones(len(which)))]
+    unknowns = len(free)
+    for axis, place, count in ((0, y, rows), (1, x, columns)):
+        if periodic[axis]:  # the flux along this axis
+            every = np.arange(x.size)
+            entries.append((every, np.full(x.size, unknowns), place.ravel() / count))
+            unknowns += 1
+    row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
+    return unknowns, scipy.sparse.csr_array((value, (row, column)), shape=(x.size, unknowns))
