@@ -3,6 +3,7 @@
 module packing
   use images, only: images_t
   use kinds, only: int32, real64
+  use memory_hints, only: prefetch
   use obstacle_cells, only: obstacle_cells_t
   use partners, only: obstacle_code, obstacle_number
   use box_geometry, only: box_t
@@ -17,6 +18,8 @@ module packing
     real(real64) :: lower(2) = 0.0_real64           !! corners of a rectangle that contains all centres [length]
     real(real64) :: upper(2) = 0.0_real64
     real(real64) :: density(2) = 0.0_real64         !! cells per length [1/length]
+    integer :: n(2) = 0                             !! columns, rows
+    real(real64) :: width = 0.0_real64              !! of a cell, the smaller side [length]
     integer(int32), allocatable :: head(:, :)       !! first disk in each cell; 0: none
   end type layer_t
 
@@ -30,6 +33,7 @@ module packing
 
   type :: packing_t
     type(box_t) :: box
+    type(images_t), private :: images               !! of the box
     type(placed_t), allocatable :: disk(:)          !! (n)
     type(layer_t), allocatable :: layer(:)          !! (number of species)
     type(obstacle_cells_t) :: near                  !! obstacles, for the largest radius of an opened species
@@ -40,6 +44,8 @@ module packing
     procedure :: list_neighbours
     procedure :: covers
     procedure :: separation
+    procedure :: load_cells
+    procedure :: load_disks
   end type packing_t
 
   interface packing_t
@@ -55,6 +61,7 @@ contains
     type(packing_t) :: packing
 
     packing%box = box
+    packing%images = box%images()
     allocate (packing%disk(n_disks), packing%layer(n_species))
   end function empty_packing
 
@@ -80,6 +87,8 @@ contains
       layer%upper = upper
       layer%density = 0
       where (extent > 0) layer%density = n/extent
+      layer%n = n
+      layer%width = minval(extent/n)
       if (allocated(layer%head)) deallocate (layer%head)
       allocate (layer%head(n(1), n(2)), source=0_int32)
     end associate
@@ -133,6 +142,38 @@ contains
     end do
   end subroutine find_blocker
 
+  !> Loads the cells of a species around a point into the cache.
+  subroutine load_cells(self, s, p)
+    class(packing_t), intent(in) :: self
+    integer(int32), intent(in) :: s
+    real(real64), intent(in) :: p(2)                !! [length]
+    integer :: c(2)
+
+    associate (layer => self%layer(s))
+      c = cell(layer, p)
+      call prefetch(layer%head(c(1), max(c(2) - 1, 1)))
+      call prefetch(layer%head(c(1), c(2)))
+      call prefetch(layer%head(c(1), min(c(2) + 1, layer%n(2))))
+    end associate
+  end subroutine load_cells
+
+  !> Loads the last disk of each of these cells.
+  subroutine load_disks(self, s, p)
+    class(packing_t), intent(in) :: self
+    integer(int32), intent(in) :: s
+    real(real64), intent(in) :: p(2)                !! [length]
+    integer :: c(2), i, j
+
+    associate (layer => self%layer(s))
+      c = cell(layer, p)
+      do j = max(c(2) - 1, 1), min(c(2) + 1, layer%n(2))
+        do i = max(c(1) - 1, 1), min(c(1) + 1, layer%n(1))
+          call prefetch(self%disk(max(layer%head(i, j), 1_int32))%x(1))
+        end do
+      end do
+    end associate
+  end subroutine load_disks
+
   !> Finds a disk of species s that excludes disks of this radius from every point of the rectangle p +- half; 0: none. The
   !> cell in the middle is searched first, because it contains the blocker most often.
   pure subroutine search_layer(packing, s, p, half, radius, blocker)
@@ -150,8 +191,13 @@ contains
       middle = cell(layer, p)
       blocker = blocker_in(packing, layer%head(middle(1), middle(2)), p, half, radius)
       if (blocker > 0) return
-      low = cell(layer, p - rho)
-      high = cell(layer, p + rho)
+      if (rho <= layer%width) then                  ! often; beyond the neighbours of the cell there is none then
+        low = max(middle - 1, 1)
+        high = min(middle + 1, layer%n)
+      else
+        low = cell(layer, p - rho)
+        high = cell(layer, p + rho)
+      end if
       do j = low(2), high(2)
         do i = low(1), high(1)
           blocker = blocker_in(packing, layer%head(i, j), p, half, radius)
@@ -247,11 +293,9 @@ contains
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: a(2), b(2)          !! [length]
     real(real64) :: d(2)
-    type(images_t) :: images
 
-    images = self%box%images()
     d = b - a
-    d = d + images%shift(images%nearest_image(d))
+    d = d + self%images%shift(self%images%nearest_image(d))
   end function separation
 
   !> The cell that contains a point, or the nearest cell if the point is outside the grid.
@@ -262,7 +306,7 @@ contains
     real(real64) :: column_row(2)
 
     column_row = max((p - layer%lower)*layer%density, 0.0_real64)
-    c = 1 + int(min(column_row, shape(layer%head) - 1.0_real64))
+    c = 1 + int(min(column_row, layer%n - 1.0_real64))
   end function cell
 
   !> Range of periodic images of a point, in periods, that have disks of the box within the distance rho.

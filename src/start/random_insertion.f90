@@ -6,6 +6,7 @@
 !> ends when a disk does not fit in many attempts.
 module random_insertion
   use kinds, only: int32, real64
+  use memory_hints, only: prefetch
   use packing, only: packing_t
   use random_stream, only: random_stream_t
   use sorting, only: sort_by_count
@@ -15,6 +16,7 @@ module random_insertion
   public :: insert_at_random, largest_first
 
   integer(int32), parameter :: disks_per_look = 1024    !! number of disks between two updates of the progress line
+  integer(int32), parameter :: drawn_ahead = 8          !! attempts whose numbers are known before they are made
   integer(int32), parameter :: most_attempts = 300000   !! largest number of attempts for one disk, if radii differ
 
   !> The voxels in which a centre may still be possible.
@@ -24,6 +26,13 @@ module random_insertion
     integer(int32) :: n = 0                         !! number of voxels left
     integer(int32), allocatable :: column_row(:, :) !! (2,n) column and row of each voxel, counted from 0
   end type voxels_t
+
+  !> The random numbers of an attempt, and the stream after them.
+  type :: attempt_t
+    real(real64) :: voxel = 0.0_real64              !! which, as a share of them all
+    real(real64) :: place(2) = 0.0_real64           !! where in the voxel
+    type(random_stream_t) :: after
+  end type attempt_t
 
 contains
 
@@ -38,6 +47,9 @@ contains
     integer(int32), intent(out) :: placed           !! number of disks inserted
     type(voxels_t) :: voxels
     integer(int32) :: i, j, k, n(2), blocker, failures, count, order(size(size_of))
+    integer(int32) :: attempts                      ! those that have been made, modulo `drawn_ahead`
+    type(attempt_t) :: coming(0:drawn_ahead - 1)    ! drawn early, so that what they will read can be loaded in time
+    type(random_stream_t) :: last                   ! after the last attempt that was made
     real(real64) :: p(2), radius, lower(2), upper(2)
     logical :: equal
 
@@ -58,12 +70,21 @@ contains
     end do
     placed = 0
     failures = 0
+    last = stream
+    attempts = 0
+    do k = 0, drawn_ahead - 1
+      call draw_attempt(stream, coming(k))
+    end do
     do while (placed < count .and. voxels%n > 0)
       radius = size_of(order(placed + 1))
-      call stream%draw_index(voxels%n, k)
-      call stream%draw_uniform(p(1))
-      call stream%draw_uniform(p(2))
-      p = min(max(voxels%origin + (voxels%column_row(:, k) + p)*voxels%side, lower), upper)
+      associate (attempt => coming(attempts))
+        k = chosen(voxels, attempt)
+        p = place(attempt)
+        last = attempt%after
+        call draw_attempt(stream, attempt)
+      end associate
+      attempts = modulo(attempts + 1, drawn_ahead)
+      call load_ahead()
       call packing%find_blocker(p, [0.0_real64, 0.0_real64], radius, blocker)
       if (blocker == 0) then
         blocker = first - 1 + order(placed + 1)
@@ -87,7 +108,49 @@ contains
         failures = 0
       end if
     end do
+    stream = last
+
+  contains
+
+    !> Where an attempt puts the centre.
+    pure function place(attempt) result(p)
+      type(attempt_t), intent(in) :: attempt
+      real(real64) :: p(2)
+
+      p = min(max(voxels%origin + (voxels%column_row(:, chosen(voxels, attempt)) + attempt%place)*voxels%side, lower), upper)
+    end function place
+
+    !> Loads what the next attempts will read: the voxel of the last one, and the cells and disks around those before. Many
+    !> disks do not fit into the cache, and everything about an attempt is in another place than for the one before.
+    subroutine load_ahead()
+      associate (far => coming(modulo(attempts - 1, drawn_ahead)), near => coming(modulo(attempts + 3, drawn_ahead)), &
+          next => coming(modulo(attempts + 1, drawn_ahead)))
+        call prefetch(voxels%column_row(1, max(chosen(voxels, far), 1)))
+        call packing%load_cells(s, place(near))
+        call packing%load_disks(s, place(next))
+      end associate
+    end subroutine load_ahead
   end subroutine insert_at_random
+
+  !> Draws the random numbers of an attempt.
+  pure subroutine draw_attempt(stream, attempt)
+    type(random_stream_t), intent(inout) :: stream
+    type(attempt_t), intent(out) :: attempt
+
+    call stream%draw_uniform(attempt%voxel)
+    call stream%draw_uniform(attempt%place(1))
+    call stream%draw_uniform(attempt%place(2))
+    attempt%after = stream
+  end subroutine draw_attempt
+
+  !> The number of the voxel that an attempt chooses, as `draw_index` does.
+  pure function chosen(voxels, attempt) result(k)
+    type(voxels_t), intent(in) :: voxels
+    type(attempt_t), intent(in) :: attempt
+    integer(int32) :: k
+
+    k = 1 + int(voxels%n*attempt%voxel, int32)
+  end function chosen
 
   !> Order of disks by decreasing radius, with a resolution of a thousandth of the range of radii. Equal disks keep their order.
   pure function largest_first(radius) result(order)
