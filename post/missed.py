@@ -5,6 +5,8 @@
 Needs event-driven runs, and runs by time steps with the same seeds.  For each step dt: the share of
 pair collisions that is missing against the event-driven run of the same seed, after the first
 --equilibration collisions per disk, averaged over the seeds; and the share expected from the rule.
+With a single pair of runs the error is from the fluctuations of both collision rates in time, which
+are larger than the share that small steps miss: take several seeds.
 
 Two disks with the relative speed g and the impact parameter b overlap on a chord of length 2 l,
 l = sqrt(s^2 - b^2), s their diameter.  They approach on its first half only, for the time l / g:
@@ -24,7 +26,7 @@ from itertools import combinations_with_replacement
 from math import comb
 
 from ricochet import Run, RunError
-from ricochet.analysis.statistics import Estimate, estimate
+from ricochet.analysis.statistics import Estimate, SeriesMean, correlated_mean, estimate
 from ricochet.analysis.thermodynamics import kinds_of_disks, start_of_equilibrium, temperature
 from ricochet.figures.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, grouped, launch, measured, report
@@ -59,14 +61,28 @@ def expected_share(run: Run, step: float, temperature: float) -> float:
     return float(np.average(shares, weights=rates))
 
 
-def rate_and_temperature(run: Run, skip: float | None) -> tuple[float, float]:
+def rate_and_temperature(run: Run, skip: float | None) -> tuple[SeriesMean, float]:
     """Return pair collisions per disk and time, and kT, in equilibrium."""
     time, tau = run.collisions_per_disk
     first = int(np.searchsorted(time, start_of_equilibrium(run, skip)))
     if first >= len(time) - 1:
         raise RunError(f"{run.path}: needs two samples of the observables in equilibrium")
-    rate = (tau[-1] - tau[first]) / (time[-1] - time[first])
-    return float(rate), temperature(run, skip).mean
+    rate = correlated_mean(np.diff(tau[first:]), np.diff(time[first:]))
+    return rate, temperature(run, skip).mean
+
+
+def missed_of_pairs(rates: list[SeriesMean], exact: list[SeriesMean]) -> Estimate:
+    """Return the share of collisions that time steps miss, over pairs of runs of one seed.
+
+    Its error is over the pairs; of a single pair it is from the fluctuations of both rates.
+    """
+    shares = [1 - one.mean / other.mean for one, other in zip(rates, exact, strict=True)]
+    if rates == exact:
+        return Estimate(0.0, 0.0)
+    if len(shares) > 1:
+        return estimate(shares)
+    relative = [one.error / one.mean for one in (rates[0], exact[0])]
+    return Estimate(shares[0], float((1 - shares[0]) * np.hypot(*relative)))
 
 
 def compare(runs: list[Run], skip: float | None) -> list[dict]:
@@ -80,11 +96,12 @@ def compare(runs: list[Run], skip: float | None) -> list[dict]:
         pairs = [run for run in members if run.seed in exact]
         if not pairs:
             raise RunError(f"no seed of dt = {step:g} has an event-driven run")
-        rates, temperatures = np.array([rate_and_temperature(run, skip) for run in pairs]).T
-        share = estimate(1 - rates / [exact[run.seed] for run in pairs])
+        rates, temperatures = zip(*(rate_and_temperature(run, skip) for run in pairs), strict=True)
+        rate = rates[0] if len(rates) == 1 else estimate([one.mean for one in rates])
+        share = missed_of_pairs(list(rates), [exact[run.seed] for run in pairs])
         kt = float(np.mean(temperatures))
         row = {"dt": step, "runs": len(pairs), **measured("kT", estimate(temperatures))}
-        row |= measured("rate", estimate(rates))
+        row |= measured("rate", rate)
         row |= measured("missed_percent", Estimate(*(100 * part for part in share)))
         rows.append(row | {"expected_percent": 100 * expected_share(pairs[0], step, kt)})
     return rows

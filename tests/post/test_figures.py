@@ -10,6 +10,7 @@ from matplotlib.quiver import Quiver, QuiverKey
 
 import cooling as cooling_figure
 import fields as fields_figure
+import missed as missed_figure
 from ricochet import crater, drawing, read_run, script, statistics, streams, thermodynamics
 from ricochet.figures.drawing import plt
 from synthetic_run import ROOT, run_script, write_run
@@ -304,3 +305,23 @@ def test_arrows_are_as_long_as_the_largest_flow_beyond_its_error(tmp_path, rng):
     assert pale.get_alpha() < dark.get_alpha() == 1 and flow.significant.sum() == dark.N
     assert 0.2 / dark.scale == pytest.approx(0.1), "the length of a cell"
     plt.close(figure)
+
+
+# --- one run ---
+
+
+def test_the_collisions_that_one_pair_of_runs_misses_have_an_error(rng):
+    """It contains the truth in two of three pairs of runs with correlated rates."""
+    inside, true = 0, 0.1
+    for _ in range(300):
+        noise = rng.normal(size=(2, 420))
+        for k in range(1, 420):  # correlated over some five samples
+            noise[:, k] = 0.8 * noise[:, k - 1] + 0.6 * noise[:, k]
+        rates = [
+            statistics.correlated_mean(mean * (5 + one[20:]))
+            for mean, one in zip((1 - true, 1.0), noise, strict=True)
+        ]
+        share = missed_figure.missed_of_pairs(rates[:1], rates[1:])
+        inside += abs(share.mean - true) < share.error
+    assert 0.58 < inside / 300 < 0.78
+    assert missed_figure.missed_of_pairs(rates[1:], rates[1:]) == (0.0, 0.0)
