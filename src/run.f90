@@ -58,7 +58,8 @@ contains
     call watch_signals()
     call run%line%open(command%quiet)
     call end_at_signals("stopped before the run began; nothing is lost: repeat the command", exit_stopped)
-    if (command%resume) call recall_overrides(command%output, run%command%overrides)
+    if (command%resume) call recall_overrides(command%output, run%command%overrides, error)
+    if (allocated(error)) return
     call read_input(command%input, run%command%overrides, run%input, error)
     if (allocated(error)) return
     call start_threads(run%input%settings, warning)

@@ -81,10 +81,11 @@ contains
   end function fixed_input
 
   !> Adds the overrides of the original command line that may not change on `--resume`, so that they need not be repeated.
-  subroutine recall_overrides(output, overrides)
+  subroutine recall_overrides(output, overrides, error)
     character(len=*), intent(in) :: output                       !! path of the output
     type(text_t), allocatable, intent(inout) :: overrides(:)  !! in: GROUP.VARIABLE=VALUE of the present command line; out: with
                                                               !! those recalled
+    type(error_t), allocatable, intent(out) :: error          !! the output is of another version, or its input is damaged
     type(hdf5_file_t) :: file
     type(text_t) :: override
     type(text_t), allocatable :: given(:)
@@ -94,7 +95,12 @@ contains
     if (.not. is_file(source_of(output))) return
     call file%open(source_of(output), writable=.false.)
     call file%fetch_text(parameters_group//"overrides", text)
+    if (checkpoint_number(file) /= none) then
+      call check_program(file, error)                         ! the names of variables may have changed since another version
+      if (.not. allocated(error)) call check_description(file, error)
+    end if
     call file%close()
+    if (allocated(error)) return
     call move_alloc(overrides, given)
     allocate (overrides(0))
     do while (text /= "")
@@ -114,7 +120,6 @@ contains
     character(len=:), allocatable, intent(out) :: text, overrides
     character(len=:), allocatable, intent(out) :: changes         !! changes made during the run; not allocated if there are none
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: there
 
     text = ""
     overrides = ""
@@ -123,10 +128,19 @@ contains
     call file%fetch_text(parameters_group//"input", text)
     call file%fetch_text(parameters_group//"overrides", overrides)
     if (file%length(changes_at_work) >= 0) call file%fetch_text(changes_at_work, changes)
+    call check_description(file, error)
+  end subroutine recall_input
+
+  !> Refuses a file in which the texts of the input have changed since they were written.
+  subroutine check_description(file, error)
+    type(hdf5_file_t), intent(inout) :: file
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: there
+
     call file%fetch_text(described, there)
     if (there /= description_checksum(file)) call file%check(-1, "be read", "its input is damaged")
     call file%report(error)
-  end subroutine recall_input
+  end subroutine check_description
 
   !> Checksum of the texts of the input in a file.
   function description_checksum(file) result(text)

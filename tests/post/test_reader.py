@@ -285,7 +285,7 @@ def test_every_script_draws_a_running_simulation():
     [
         ("a.h5", "", ""),
         ("a.h5", "cooled to nothing", "a.h5 ended early: cooled to nothing"),
-        ("a.h5", "passed a collapse", "a.h5 passed a collapse"),
+        ("a.h5", "an inelastic collapse occurred: 9", "a.h5: an inelastic collapse occurred"),
         ("a.h5.part", "", "a.h5.part is unfinished: going on, stopped, or broken off"),
         ("a.h5.part", "an inelastic collapse", "broke off: an inelastic collapse; last"),
     ],
@@ -304,6 +304,16 @@ def test_a_run_that_met_no_stop_rule_says_so(tmp_path, monkeypatch, capsys, name
     assert run_script("snapshot", run) == 0
     warned = capsys.readouterr().err
     assert said in warned and said in texts[0] and bool(said) == bool(warned) == bool(texts[0])
+
+
+def test_a_file_with_the_names_of_an_earlier_version_is_refused_in_one_line(tmp_path, capsys):
+    path = tiny(tmp_path / "a.h5", 4, 3)
+    with h5py.File(path, "r+") as file:
+        file["observables/wall_collisions"] = 0
+    with pytest.raises(RunError, match=r"a\.h5: was written by an earlier version of Ri"):
+        read_run(path)
+    assert run_script("snapshot", path) == 2
+    assert capsys.readouterr().err.count("\n") == 1
 
 
 def test_of_an_ensemble_the_finished_members_are_taken_and_the_others_counted(tmp_path, capsys):

@@ -79,8 +79,23 @@ def test_a_checkpoint_of_another_version_is_refused_by_name(ricochet, before):
     with h5py.File(before, "r+") as file:
         del file["checkpoint/program"]
         file["checkpoint/program"] = np.bytes_("ricochet 0.0.9")
+        del file["parameters/overrides"]  # with a name that is not one any more
+        file["parameters/overrides"] = np.bytes_("side.left.speed=1\n")
     run = ricochet(*COMMAND, "--resume")
-    assert run.returncode == USAGE and "ricochet 0.0.9" in one_line(run)
+    assert run.returncode == USAGE and "was written by ricochet 0.0.9, but this" in one_line(run)
+
+
+@pytest.mark.parametrize("name", ["input", "overrides"])
+def test_an_input_in_the_output_with_a_wrong_bit_is_damaged(ricochet, before, name):
+    rng = random.Random(name)
+    with h5py.File(before, "r+") as file:
+        text = bytearray(file[f"parameters/{name}"][()])
+        text[rng.randrange(len(text))] ^= 1 << rng.randrange(7)
+        del file[f"parameters/{name}"]
+        file[f"parameters/{name}"] = np.bytes_(bytes(text))
+    run = ricochet(*COMMAND, "--resume")
+    assert run.returncode == FILES
+    assert one_line(run) == f"{before.name}: cannot be read: its input is damaged"
 
 
 def flip(path, slot, rng):

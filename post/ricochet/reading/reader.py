@@ -547,8 +547,8 @@ class Run:
         """Why the run did not end by a stop rule; empty if it did."""
         note = "".join(filter(str.isprintable, str(self.provenance.get("note", ""))))
         if self.path.suffix != ".part":
-            early = "" if note.startswith("passed") else "ended early: "
-            return f"{self.path.name} {early}{note}" if note else ""
+            early = ":" if note.startswith("an inelastic collapse occurred") else " ended early:"
+            return f"{self.path.name}{early} {note}" if note else ""
         state = f"broke off: {note}" if note else "is unfinished: going on, stopped, or broken off"
         return f"{self.path.name} {state}; last frame at t = {self.time[-1]:.6g}"
 
@@ -605,7 +605,8 @@ def run_of(path: Path, file: h5py.File) -> Run:
     """Return the run in an open file."""
     disks, count = file[DISKS], committed(file, DISKS)
     if {"pressure", "wall_collisions"} & set(file["observables"]):
-        raise Unsound("is of an earlier version of Ricochet, with other names: run its input anew")
+        old = "was written by an earlier version of Ricochet, with other names"
+        raise Unsound(f"{old}: run its input again")
     if count == 0:
         raise Unsound("holds no frame yet")
     frames = {
