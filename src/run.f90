@@ -244,8 +244,8 @@ contains
       text = "output = "//legible(run%command%output)// &
         eol//"disks = "//written(int(sim%n_disks()))// &
         eol//"collisions = "//written(sim%tally%collisions)// &
-        eol//"side_collisions = "//written(sum(sim%tally%hits(:n_sides)))// &
-        eol//"obstacle_collisions = "//written(sum(sim%tally%hits(n_sides + 1:)))// &
+        eol//"side_collisions = "//written(sum(sim%tally%surface_collisions(:n_sides)))// &
+        eol//"obstacle_collisions = "//written(sum(sim%tally%surface_collisions(n_sides + 1:)))// &
         eol//"time = "//written(sim%time())// &
         eol//"kinetic_energy = "//written(energy(1))
       if (sim%with%rotation) text = text//eol//"rotational_energy = "//written(energy(2))

@@ -21,7 +21,7 @@ module event_driven
   use simulation_state, only: simulation_t
   use signals, only: stop_requested
   use tracks, only: tracks_t
-  use wall_hits, only: collide_wall
+  use wall_collisions, only: collide_wall
   implicit none
   private
   public :: event_driven_t

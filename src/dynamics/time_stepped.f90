@@ -6,7 +6,7 @@
 module time_stepped
   use images, only: images_t
   use kinds, only: int32, int64, most_exact, never, real64
-  use box_geometry, only: strike_velocity, wall_normal
+  use box_geometry, only: normal_surface_velocity, wall_normal
   use box_sides, only: bounds
   use encounters, only: collide, encounter_text, is_periodic_side, pass_side
   use errors, only: error_t, exit_broken, fail
@@ -210,7 +210,7 @@ contains
       real(real64) :: normal(2)
 
       normal = wall_normal(sim%box, code, [self%x(i, 1), self%x(i, 2)], sim%velocity(i))
-      if (dot_product(sim%velocity(i) - strike_velocity(sim%box, code, normal, sim%now), normal) < 0) &
+      if (dot_product(sim%velocity(i) - normal_surface_velocity(sim%box, code, normal, sim%now), normal) < 0) &
         call collide(sim, i, code, sim%now, .true., log)
     end subroutine meet_wall
 

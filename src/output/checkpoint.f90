@@ -455,9 +455,9 @@ contains
         call record%exchange(file, tally%simultaneous)
         call record%exchange(file, tally%collapse)
         call exchange_sums(tally%sum)
-        call record%exchange(file, tally%hits)
-        do k = 1, size(tally%at_surface, 1)
-          call exchange_sums(tally%at_surface(k, :))
+        call record%exchange(file, tally%surface_collisions)
+        do k = 1, size(tally%surface_sums, 1)
+          call exchange_sums(tally%surface_sums(k, :))
         end do
       end associate
     end subroutine exchange_tally

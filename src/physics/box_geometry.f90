@@ -11,7 +11,7 @@ module box_geometry
   implicit none
   private
   public :: box_t, surface_t
-  public :: meet_image, next_obstacle, obstacle_gap, strike_velocity, surface_velocity, wall_normal, free_area
+  public :: free_area, meet_image, next_obstacle, normal_surface_velocity, obstacle_gap, tangential_surface_velocity, wall_normal
 
   !> A side of the box, or a group of obstacles. All obstacles of a group share one contact law, and sums over their collisions.
   type :: surface_t
@@ -369,7 +369,7 @@ contains
   end function obstacle_gap
 
   !> Tangential velocity of a surface at a point where it has this normal.
-  pure function surface_velocity(box, code, normal) result(u)
+  pure function tangential_surface_velocity(box, code, normal) result(u)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
     real(real64), intent(in) :: normal(2)       !! unit vector from the surface to a disk
@@ -383,10 +383,10 @@ contains
         u = law%speed*box%obstacle(obstacle_number(code))%shape%direction(normal)
       end if
     end associate
-  end function surface_velocity
+  end function tangential_surface_velocity
 
   !> Normal velocity of a surface; zero for obstacles, which do not move.
-  pure function strike_velocity(box, code, normal, t) result(u)
+  pure function normal_surface_velocity(box, code, normal, t) result(u)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
     real(real64), intent(in) :: normal(2)       !! unit vector from the surface to a disk
@@ -396,7 +396,7 @@ contains
     u = 0
     if (.not. is_side(code)) return
     if (box%surface(1 - code)%motion%kind /= still) u = box%side_velocity(1 - code, t)*normal
-  end function strike_velocity
+  end function normal_surface_velocity
 
   !> Unit vector from a surface to a disk that touches it at x with the velocity v.
   pure function wall_normal(box, code, x, v) result(normal)

@@ -63,9 +63,9 @@ contains
     call list%add("dissipated_energy", [sim%tally%total(dissipated)])
     if (sim%drive%is_on() .or. sim%changes > 0) call list%add("drive_energy", [sim%tally%total(drive_energy)])
     call list%add("collisions", real([sim%tally%collisions], real64), is_count=.true.)
-    associate (hits => sim%tally%hits, at_surface => sim%tally%at_surface)
+    associate (hits => sim%tally%surface_collisions, surface_sums => sim%tally%surface_sums)
       call list%add("side_collisions", real(hits(:n_sides), real64), is_count=.true.)
-      call list%add("side_impulse", abs([at_surface(impulse, 1:2)%value(), at_surface(impulse + 1, 3:4)%value()]))
+      call list%add("side_impulse", abs([surface_sums(impulse, 1:2)%value(), surface_sums(impulse + 1, 3:4)%value()]))
       call list%add("obstacle_collisions", real([sum(hits(n_sides + 1:))], real64), is_count=.true.)
     end associate
     if (sim%box%highest_temperature() > 0 .or. sim%changes > 0) call list%add("heat", [sim%tally%total(heat)])
@@ -83,9 +83,9 @@ contains
     do k = 1, size(sim%box%surface)
       if (.not. sim%box%is_wall(k)) cycle
       path = trim(merge("sides/    ", "obstacles/", k <= n_sides))//sim%box%surface(k)%name
-      call list%add(path//"/impulse", sim%tally%at_surface(impulse:impulse + 1, k)%value())
-      call list%add(path//"/energy_to_disks", [sim%tally%at_surface(gain, k)%value()])
-      call list%add(path//"/collisions", real([sim%tally%hits(k)], real64), is_count=.true.)
+      call list%add(path//"/impulse", sim%tally%surface_sums(impulse:impulse + 1, k)%value())
+      call list%add(path//"/energy_to_disks", [sim%tally%surface_sums(gain, k)%value()])
+      call list%add(path//"/collisions", real([sim%tally%surface_collisions(k)], real64), is_count=.true.)
       if (.not. sim%box%surface(k)%motion%travels()) cycle
       call bounds(sim%box, sim%now, at(:, 1), at(:, 2))
       call list%add(path//"/position", [at((k + 1)/2, 2 - modulo(k, 2))])

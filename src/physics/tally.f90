@@ -41,8 +41,8 @@ module tally
     integer(int64) :: simultaneous = 0             !! simultaneous lossy collisions, see `encounters: count_simultaneous_collision`
     real(real64) :: collapse = never               !! time of the first collapse, since the start of the run [time]
     type(exact_sum_t) :: sum(size(sums))
-    integer(int64), allocatable :: hits(:)         !! (surfaces) number of collisions with each
-    type(exact_sum_t), allocatable :: at_surface(:, :)     !! (3,surfaces) impulse along x and y; energy gained by disks
+    integer(int64), allocatable :: surface_collisions(:)  !! (surfaces) number of collisions with each
+    type(exact_sum_t), allocatable :: surface_sums(:, :)   !! (3,surfaces) impulse along x and y; energy gained by disks
   contains
     procedure :: make_room
     procedure :: choose_units
@@ -58,9 +58,9 @@ contains
     class(tally_t), intent(inout) :: self
     integer, intent(in) :: n
 
-    if (allocated(self%hits)) return
-    allocate (self%hits(n), source=0_int64)
-    allocate (self%at_surface(gain, n))
+    if (allocated(self%surface_collisions)) return
+    allocate (self%surface_collisions(n), source=0_int64)
+    allocate (self%surface_sums(gain, n))
   end subroutine make_room
 
   !> Chooses units that are fine enough for terms up to these bounds.
@@ -69,8 +69,8 @@ contains
     real(real64), intent(in) :: bound(:)           !! bound for each kind of terms
 
     call self%sum%choose_unit(bound(sums%kind))
-    call self%at_surface(:gain - 1, :)%choose_unit(bound(impulses))
-    call self%at_surface(gain, :)%choose_unit(bound(energies))
+    call self%surface_sums(:gain - 1, :)%choose_unit(bound(impulses))
+    call self%surface_sums(gain, :)%choose_unit(bound(energies))
   end subroutine choose_units
 
   !> Fluxes of a disk in free flight: momentum, xx, xy and yy [energy]; kinetic energy along x and y [energy
@@ -102,8 +102,8 @@ contains
     self%simultaneous = self%simultaneous + other%simultaneous
     self%collapse = min(self%collapse, other%collapse)
     call self%sum%include(other%sum)
-    self%hits = self%hits + other%hits
-    call self%at_surface%include(other%at_surface)
+    self%surface_collisions = self%surface_collisions + other%surface_collisions
+    call self%surface_sums%include(other%surface_sums)
   end subroutine include
 
   !> Sets all counters and sums to zero; the units are kept.
@@ -115,8 +115,8 @@ contains
     self%simultaneous = 0
     self%collapse = never
     call self%sum%clear()
-    self%hits = 0
-    call self%at_surface%clear()
+    self%surface_collisions = 0
+    call self%surface_sums%clear()
   end subroutine clear
 
 end module tally

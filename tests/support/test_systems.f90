@@ -225,8 +225,8 @@ contains
     if (any(differ([a%box%epoch, a%now, a%epoch_begin, a%epoch_end, a%negligible_time, a%last_advance, a%tally%sum%value()], &
       [b%box%epoch, b%now, b%epoch_begin, b%epoch_end, b%negligible_time, b%last_advance, b%tally%sum%value()]))) &
       text = "a time or a sum"
-    if (any(a%tally%hits /= b%tally%hits)) text = "collisions with walls"
-    if (any(differ(a%tally%at_surface%value(), b%tally%at_surface%value()))) text = "a sum of a wall"
+    if (any(a%tally%surface_collisions /= b%tally%surface_collisions)) text = "collisions with walls"
+    if (any(differ(a%tally%surface_sums%value(), b%tally%surface_sums%value()))) text = "a sum of a wall"
     if (allocated(a%extra) .neqv. allocated(b%extra)) text = "numbers of the disks"
     do i = 1, a%n_disks()
       if (text /= "") return

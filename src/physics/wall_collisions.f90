@@ -1,7 +1,7 @@
 !> Executes collisions of a disk with a side or an obstacle.
-module wall_hits
+module wall_collisions
   use kinds, only: int32, never, real64
-  use box_geometry, only: next_obstacle, strike_velocity, surface_velocity, wall_normal
+  use box_geometry, only: next_obstacle, normal_surface_velocity, tangential_surface_velocity, wall_normal
   use box_sides, only: side_time
   use collisions, only: tangential_law_t, tangential_impulse, wall_law_t, wall_rebound
   use disks, only: advance_disk
@@ -14,8 +14,8 @@ module wall_hits
   private
   public :: collide_wall
 
-  real(real64), parameter :: while_parted = 0.4_real64  !! a disk at rest on a surface stays away from it for at least this many
-                                                        !! contact durations
+  !> A disk at rest on a surface stays away from it for at least this many contact durations.
+  real(real64), parameter :: shortest_separation = 0.4_real64
 
 contains
 
@@ -25,7 +25,7 @@ contains
     integer(int32), intent(in) :: i, code
     real(real64), intent(in) :: t
     logical, value :: counts                     !! the collision is included in the tally
-    real(real64) :: normal(2), strike(2), u(2), v(2), omega
+    real(real64) :: normal(2), normal_velocity(2), u(2), v(2), omega
     type(wall_law_t) :: law
     logical :: elastic
     integer :: k
@@ -36,44 +36,44 @@ contains
     k = sim%box%surface_of(code)
     law = sim%box%surface(k)%law
     normal = wall_normal(sim%box, code, sim%disk(i)%x, sim%disk(i)%v)
-    strike = strike_velocity(sim%box, code, normal, t)
-    u = surface_velocity(sim%box, code, normal) + strike
+    normal_velocity = normal_surface_velocity(sim%box, code, normal, t)
+    u = tangential_surface_velocity(sim%box, code, normal) + normal_velocity
     v = sim%disk(i)%v
     omega = sim%spin(i)
     if (law%temperature > 0) then
-      call leave_thermally(sim, i, law%temperature, normal, u)
+      call draw_thermal_velocity(sim, i, law%temperature, normal, u)
     else
-      sim%disk(i)%v = wall_rebound(law, v - strike, normal, elastic)
-      if (any(abs(strike) > 0)) then
-        sim%disk(i)%v = sim%disk(i)%v + strike         ! rounding is monotonic, so that the disk is not slower than the side
-        if (law%restitution < 1 .and. .not. elastic) call settle(sim%disk(i)%v, v, strike, normal)
+      sim%disk(i)%v = wall_rebound(law, v - normal_velocity, normal, elastic)
+      if (any(abs(normal_velocity) > 0)) then
+        sim%disk(i)%v = sim%disk(i)%v + normal_velocity  ! rounding is monotonic, so that the disk is not slower than the side
+        if (law%restitution < 1 .and. .not. elastic) call end_bouncing(sim%disk(i)%v, v, normal_velocity, normal)
       end if
       ! Not in time-stepped dynamics.
-      if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call part(sim, i, code, normal)
+      if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call separate_from_surface(sim, i, code, normal)
       if (law%tangential%is_rough()) call apply_tangential_impulse_at_wall(sim, i, law%tangential, normal, u, v)
     end if
-    if (sim%box%surface(k)%motion%kind == piston) call push(sim, i, code, normal, v, u, t)
+    if (sim%box%surface(k)%motion%kind == piston) call move_piston(sim, i, code, normal, v, u, t)
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(i)%last_partner = merge(0, code, is_side(code))
-    if (counts) call count_hit(sim, i, k, law%temperature > 0, u, v, omega)
+    if (counts) call add_wall_sums(sim, i, k, law%temperature > 0, u, v, omega)
   end subroutine collide_wall
 
   !> Ends a series of bounces on a moving side when a collision dissipates less than the rounding error. The series would
   !> otherwise be infinite. The disk then moves with the side.
-  pure subroutine settle(v, before, strike, normal)
+  pure subroutine end_bouncing(v, before, normal_velocity, normal)
     real(real64), intent(inout) :: v(2)          !! velocity of the disk after the collision [length/time]
-    real(real64), intent(in) :: before(2), strike(2)  !! velocities of the disk before the collision and of the side [length/time]
+    real(real64), intent(in) :: before(2), normal_velocity(2)  !! of the disk before, of the side [length/time]
     real(real64), intent(in) :: normal(2)        !! unit vector inwards
     real(real64) :: left
 
-    left = dot_product(v - strike, normal)
-    if (left >= -dot_product(before - strike, normal)) v = v - left*normal
-  end subroutine settle
+    left = dot_product(v - normal_velocity, normal)
+    if (left >= -dot_product(before - normal_velocity, normal)) v = v - left*normal
+  end subroutine end_bouncing
 
   !> Applies the momentum transfer between a disk and a piston. The disk has rebounded as from a piston of infinite mass; both
   !> receive the fraction of this impulse that follows from their masses. On return u contains the mean velocity of the piston
   !> before and after, with which its work is calculated.
-  pure subroutine push(sim, i, code, normal, before, u, t)
+  pure subroutine move_piston(sim, i, code, normal, before, u, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
     real(real64), intent(in) :: normal(2)        !! unit vector inwards
@@ -96,11 +96,11 @@ contains
       side%clock = t
       u = u + (0.5_real64*(side%velocity - v))*normal
     end associate
-  end subroutine push
+  end subroutine move_piston
 
   !> Draws the velocity of disk i after a collision with a thermal wall, as if it came from a gas of that temperature: the normal
   !> component has the density (m v/kT) exp(-m v**2/2kT); the tangential component and the angular velocity are Gaussian.
-  pure subroutine leave_thermally(sim, i, temperature, normal, u)
+  pure subroutine draw_thermal_velocity(sim, i, temperature, normal, u)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: temperature      !! kT [energy]
@@ -115,12 +115,12 @@ contains
     thermal = sqrt(temperature/sim%mass_of(i))
     sim%disk(i)%v = u + thermal*(sqrt(-2*log(1 - uniform))*normal + normals(1)*[-normal(2), normal(1)])
     if (sim%with%rotation) sim%extra(i)%spin = sqrt(temperature/sim%inertia_of(i))*normals(2)
-  end subroutine leave_thermally
+  end subroutine draw_thermal_velocity
 
   !> Separates disk i from a surface on which it rests. With restitution 0 the TC model cannot conserve a normal velocity,
   !> and the next collision would follow at once, infinitely often. The disk gets a normal velocity with which its next contact
   !> is 0.4 to 0.8 contact durations later.
-  pure subroutine part(sim, i, code, normal)
+  pure subroutine separate_from_surface(sim, i, code, normal)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
     real(real64), intent(in) :: normal(2)        !! unit vector from the wall to the disk
@@ -133,12 +133,12 @@ contains
         t = never
         if (is_side(code)) t = side_time(sim%box, disk, code)
         if (.not. is_side(code)) call next_obstacle(sim%box, disk, code, [code], t, partner)
-        if (t - disk%clock > while_parted*contact_time) exit
+        if (t - disk%clock > shortest_separation*contact_time) exit
         disk%v = disk%v + speed*normal
         speed = 2*speed
       end do
     end associate
-  end subroutine part
+  end subroutine separate_from_surface
 
   !> Applies the tangential impulse in a collision of disk i with a rough wall, after the normal impulse.
   pure subroutine apply_tangential_impulse_at_wall(sim, i, law, normal, u, before)
@@ -161,7 +161,7 @@ contains
 
   !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk consists of the work of the
   !> moving surface and of heat from a thermal wall or, at other walls, dissipation.
-  pure subroutine count_hit(sim, i, k, heats, u, v, omega)
+  pure subroutine add_wall_sums(sim, i, k, heats, u, v, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer, intent(in) :: k                     !! index of the surface
@@ -181,8 +181,8 @@ contains
       call sim%tally%sum(dissipated)%add(done - gained)
     end if
     if (abs(done) > 0) call sim%tally%sum(work)%add(done)
-    sim%tally%hits(k) = sim%tally%hits(k) + 1
-    call sim%tally%at_surface(impulse:gain, k)%add([-mass*(sim%disk(i)%v - v), gained])
-  end subroutine count_hit
+    sim%tally%surface_collisions(k) = sim%tally%surface_collisions(k) + 1
+    call sim%tally%surface_sums(impulse:gain, k)%add([-mass*(sim%disk(i)%v - v), gained])
+  end subroutine add_wall_sums
 
-end module wall_hits
+end module wall_collisions
