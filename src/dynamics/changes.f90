@@ -34,7 +34,7 @@ contains
     do k = 1, n_sides                                        ! a piston starts at the position and with the velocity of the side
       if (other%box%surface(k)%motion%kind /= piston) cycle
       v = 0
-      if (sim%box%surface(k)%motion%travels()) v = sim%box%side_velocity(k, sim%now)
+      if (sim%box%surface(k)%motion%moves()) v = sim%box%side_velocity(k, sim%now)
       other%box%side(k) = side_state_t(sim%box%side_position(k, sim%now), v, sim%now)
     end do
     call bounds(sim%box, sim%now, here(:, 1), here(:, 2))

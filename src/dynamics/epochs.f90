@@ -1,7 +1,7 @@
 !> Moves the origin of time and detects collapses. Both depend on the state alone, so that all searches, queues and numbers of
 !> threads agree.
 module epochs
-  use box_sides, only: keep_off_sides
+  use box_sides, only: separate_from_sides
   use kinds, only: int32, int64, never, pi, real64
   use partners, only: n_sides
   use renumbering, only: renumber
@@ -121,9 +121,9 @@ contains
     sim%last_advance = sim%last_advance - shift
     sim%box%epoch = sim%box%epoch + shift
     sim%box%side%clock = sim%box%side%clock - shift
-    if (.not. any(sim%box%surface(:n_sides)%motion%travels())) return    ! only moving sides need this
+    if (.not. any(sim%box%surface(:n_sides)%motion%moves())) return      ! only moving sides need this
     do i = 1, sim%n_disks()
-      call keep_off_sides(sim%box, sim%disk(i), sim%now)
+      call separate_from_sides(sim%box, sim%disk(i), sim%now)
     end do
   end subroutine move_origin
 
@@ -171,7 +171,7 @@ contains
     yes = .true.
     do i = 1, sim%n_disks()
       yes = magnitude(sim%velocity(i)) <= slow .and. abs(sim%spin(i))*sim%disk(i)%radius <= slow
-      if (sim%box%falling()) yes = yes .and. sim%now - sim%disk(i)%clock <= sim%negligible_time
+      if (sim%box%has_gravity()) yes = yes .and. sim%now - sim%disk(i)%clock <= sim%negligible_time
       if (.not. yes) return
     end do
   end function is_at_rest

@@ -98,7 +98,7 @@ contains
     end do
     if (mod(n, 2_int32) == 1) call self%search%predict(sim, n)
     last = never
-    if (sim%drive%reaches_all()) last = sim%drive%time_of(sim%kicks + 1) - sim%box%epoch
+    if (sim%drive%acts_on_all()) last = sim%drive%time_of(sim%kicks + 1) - sim%box%epoch
     last = max(last, minval(sim%disk%event_time))
     do i = 1, n
       if (sim%disk(i)%event_time <= last) then

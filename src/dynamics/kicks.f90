@@ -10,7 +10,7 @@ module kicks
   use tally, only: drive_energy
   implicit none
   private
-  public :: kick, orient
+  public :: kick, draw_orientations
 
 contains
 
@@ -28,7 +28,7 @@ contains
     allocate (kicked(n), draws(2, merge(n, 0_int32, sim%drive%keep_momentum)))
     n = 0
     do i = 1, sim%n_disks()
-      if (.not. sim%drive%reaches(sim%tag(i)%species)) cycle
+      if (.not. sim%drive%acts_on(sim%tag(i)%species)) cycle
       call kick_disk(sim, i, is_hit, z)
       if (.not. is_hit) cycle
       n = n + 1
@@ -89,8 +89,8 @@ contains
         call change_velocity(sim, i, sim%disk(i)%v + sqrt(drive%strength*drive%interval)*z)
         return
       end if
-      v = sim%box%stream(sim%disk(i)%x) + sqrt(drive%temperature/sim%mass_of(i))*z
-      if (drive%kind == active) call swim()
+      v = sim%box%shear_profile(sim%disk(i)%x) + sqrt(drive%temperature/sim%mass_of(i))*z
+      if (drive%kind == active) call add_self_propulsion()
       call change_velocity(sim, i, v)
       if (.not. sim%with%rotation) return
       call stream%draw_normals(spin)
@@ -99,7 +99,7 @@ contains
   contains
 
     !> Applies rotational diffusion to the orientation of disk i, and adds the self-propulsion velocity.
-    subroutine swim()
+    subroutine add_self_propulsion()
       type(random_stream_t) :: stream
       real(real64) :: z(2)
 
@@ -109,23 +109,23 @@ contains
         angle = angle + sqrt(2*drive%rotational_diffusion*drive%interval)*z(1)
         v = v + drive%speed*[cos(angle), sin(angle)]
       end associate
-    end subroutine swim
+    end subroutine add_self_propulsion
   end subroutine kick_disk
 
   !> Draws the initial orientations of active disks from a uniform distribution.
-  subroutine orient(sim)
+  subroutine draw_orientations(sim)
     type(simulation_t), intent(inout) :: sim
     type(random_stream_t) :: stream
     real(real64) :: u
     integer(int32) :: i
 
     do i = 1, sim%n_disks()
-      if (.not. sim%drive%reaches(sim%tag(i)%species)) cycle
+      if (.not. sim%drive%acts_on(sim%tag(i)%species)) cycle
       call stream%seed_draw(sim%seed, orientations, sim%tag(i)%id, sim%kicks)
       call stream%draw_uniform(u)
       sim%extra(i)%angle = 2*pi*u
     end do
-  end subroutine orient
+  end subroutine draw_orientations
 
   !> Sets the velocity of disk i and adds the energy change to the sum.
   subroutine change_velocity(sim, i, v)

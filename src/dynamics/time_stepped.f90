@@ -124,7 +124,7 @@ contains
     logical :: yes
     integer(int32) :: i
 
-    yes = .not. (sim%box%falling() .or. any(sim%box%surface%motion%travels()))
+    yes = .not. (sim%box%has_gravity() .or. any(sim%box%surface%motion%moves()))
     do i = 1, sim%n_disks()
       if (.not. yes) return
       yes = .not. any(abs(sim%disk(i)%v) > slowest)
@@ -286,7 +286,7 @@ contains
       text = "run.dt: at speeds up to "//about(speed)//" a disk moves by "//about(speed*self%dt/radius) &
         //" radii in a step, so that collisions are missed; better: below "//about(longest_way*radius/speed)
     end if
-    if (sim%box%falling() .and. sim%law%contact_time <= self%dt &
+    if (sim%box%has_gravity() .and. sim%law%contact_time <= self%dt &
       .and. (any(sim%law%restitution < 1) .or. sim%box%has_lossy_walls())) then
       if (text /= "") text = text//"; "
       text = text//"contact.contact_time: inelastic disks sink into each other and the floor unless it " &

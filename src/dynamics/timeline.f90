@@ -144,7 +144,7 @@ contains
       return
     end if
     text = "inelastic collapse, "//text
-    if (from_the_start .and. code <= 0 .and. sim%box%falling()) then
+    if (from_the_start .and. code <= 0 .and. sim%box%has_gravity()) then
       text = text//"; a disk that starts at rest on a wall never leaves it: start it higher, "//steps
       return
     end if

@@ -7,21 +7,21 @@ module images
   use kinds, only: never, real64
   implicit none
   private
-  public :: image_t, images_t, sliding_images
+  public :: image_t, images_t, moving_images
 
   !> One image of the box, relative to the box itself.
   type :: image_t
     real(real64) :: shift(2) = 0.0_real64       !! displacement of the image at the epoch [length]
-    real(real64) :: slip = 0.0_real64           !! velocity of the image along x [length/time]
+    real(real64) :: velocity = 0.0_real64       !! velocity of the image along x [length/time]
   end type image_t
 
   !> All images of the box. An image has an index along each axis: (0, 0) is the box itself, (0, 1) the image above. Indices are
   !> integers stored as reals, because disks may be any number of periods apart.
   type :: images_t
     real(real64) :: period(2) = never           !! `never` along axes with walls [length]
-    real(real64) :: slip = 0.0_real64           !! velocity of the image above [length/time]
-    real(real64) :: slide = 0.0_real64          !! displacement of that image at the epoch, modulo the period [length]
-    real(real64) :: left_out = 0.0_real64       !! number of periods removed from it
+    real(real64) :: velocity = 0.0_real64       !! velocity of the image above [length/time]
+    real(real64) :: offset = 0.0_real64         !! displacement of that image at the epoch, modulo the period [length]
+    real(real64) :: removed_periods = 0.0_real64  !! number of periods removed from it
   contains
     procedure :: count => count_around
     procedure :: around
@@ -30,31 +30,31 @@ module images
     procedure :: shift
     procedure :: image
     procedure :: reach
-    procedure :: look_again
-    procedure :: climb
+    procedure :: valid_until
+    procedure :: enter_image_frame
   end type images_t
 
 contains
 
-  !> The images of a box whose image above is displaced by slip*t at the time t of the run. The clocks count from `epoch`.
+  !> The images of a box whose image above is displaced by velocity*t at the time t of the run. The clocks count from `epoch`.
   !> The displacement is reduced modulo the period without rounding error, so that late times are as precise as early ones.
-  pure function sliding_images(period, slip, epoch) result(images)
+  pure function moving_images(period, velocity, epoch) result(images)
     real(real64), intent(in) :: period(2)       !! [length]
-    real(real64), intent(in) :: slip            !! [length/time]
+    real(real64), intent(in) :: velocity        !! [length/time]
     real(real64), intent(in) :: epoch           !! [time]
     type(images_t) :: images
     real(real64) :: s(2), e(2)
 
-    s = halves(slip)
+    s = halves(velocity)
     e = halves(epoch)
     associate (length => period(1))
       images%period = period
-      images%slip = slip
-      images%slide = modulo(modulo(s(1)*e(1), length) + modulo(s(1)*e(2), length) + modulo(s(2)*e(1), length) &
+      images%velocity = velocity
+      images%offset = modulo(modulo(s(1)*e(1), length) + modulo(s(1)*e(2), length) + modulo(s(2)*e(1), length) &
         + s(2)*e(2), length)
-      images%left_out = anint((slip*epoch - images%slide)/length)
+      images%removed_periods = anint((velocity*epoch - images%offset)/length)
     end associate
-  end function sliding_images
+  end function moving_images
 
   !> Splits a number into two with half the digits each. Products of such halves are exact.
   pure function halves(x)
@@ -75,13 +75,13 @@ contains
   end function count_around
 
   !> Largest index of images in reach, along each axis. Two disks in the box can touch only through these images until one of
-  !> them passes a side or `look_again` is due.
+  !> them passes a side or `valid_until` is due.
   pure function reach(self)
     class(images_t), intent(in) :: self
     integer :: reach(2)
 
     reach = merge(1, 0, self%period < never)
-    if (abs(self%slip) > 0) reach(1) = 2
+    if (abs(self%velocity) > 0) reach(1) = 2
   end function reach
 
   !> Index of the k-th image in reach, in the order of rows.
@@ -96,7 +96,7 @@ contains
     associate (in_row => 2*reach(1) + 1)
       number = [modulo(k - 1, in_row) - reach(1), (k - 1)/in_row - reach(2)]
     end associate
-    if (abs(self%slip) > 0 .and. present(now)) &
+    if (abs(self%velocity) > 0 .and. present(now)) &
       number(1) = number(1) - anint(self%displacement(number(2), now)/self%period(1))
   end function around
 
@@ -107,11 +107,11 @@ contains
     real(real64), intent(in) :: now             !! since the epoch [time]
     real(real64) :: displacement                !! [length]
 
-    displacement = rows*(self%slide + self%slip*now)
+    displacement = rows*(self%offset + self%velocity*now)
   end function displacement
 
   !> Time until which only the images in reach now, and images displaced from these by up to `distance`, have to be considered.
-  pure function look_again(self, now, distance) result(t)
+  pure function valid_until(self, now, distance) result(t)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: now             !! [time]
     real(real64), intent(in), optional :: distance    !! default: half a period [length]
@@ -120,8 +120,8 @@ contains
     farthest = 0.5_real64*self%period(1)
     if (present(distance)) farthest = distance
     t = never
-    if (abs(self%slip) > farthest/never) t = now + farthest/abs(self%slip)
-  end function look_again
+    if (abs(self%velocity) > farthest/never) t = now + farthest/abs(self%velocity)
+  end function valid_until
 
   !> Index of the image through which an object at the separation dx is nearest; almost always (0, 0).
   pure function nearest_image(self, dx, now) result(number)
@@ -133,7 +133,7 @@ contains
     number = 0
     if (abs(dx(1)) < 0.5_real64*self%period(1) .and. abs(dx(2)) < 0.5_real64*self%period(2)) return
     number = -anint(dx/self%period)
-    if (abs(self%slip) > 0 .and. present(now)) &
+    if (abs(self%velocity) > 0 .and. present(now)) &
       number(1) = -anint((dx(1) + self%displacement(number(2), now))/self%period(1))
   end function nearest_image
 
@@ -144,7 +144,7 @@ contains
     real(real64) :: shift(2)                    !! [length]
 
     shift = number*self%period
-    shift(1) = shift(1) + number(2)*self%slide
+    shift(1) = shift(1) + number(2)*self%offset
   end function shift
 
   !> The image with this index.
@@ -153,11 +153,11 @@ contains
     real(real64), intent(in) :: number(2)
     type(image_t) :: image
 
-    image = image_t(self%shift(number), number(2)*self%slip)
+    image = image_t(self%shift(number), number(2)*self%velocity)
   end function image
 
   !> Transforms the state of a disk into the frame of the image `rows` above. The disk itself does not move.
-  pure subroutine climb(self, rows, clock, x, v, periods)
+  pure subroutine enter_image_frame(self, rows, clock, x, v, periods)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: rows
     real(real64), intent(in) :: clock           !! time to which x belongs [time]
@@ -166,8 +166,8 @@ contains
     real(real64), intent(inout) :: periods(2)   !! number of periods that the disk has travelled
 
     x = x - [self%displacement(rows, clock), rows*self%period(2)]
-    v(1) = v(1) - rows*self%slip
-    periods = periods + rows*[-self%left_out, 1.0_real64]
-  end subroutine climb
+    v(1) = v(1) - rows*self%velocity
+    periods = periods + rows*[-self%removed_periods, 1.0_real64]
+  end subroutine enter_image_frame
 
 end module images

@@ -17,7 +17,7 @@ module side_motion
   real(real64), parameter :: small_angle = 0.5_real64       !! angle below which differences would suffer from cancellation [radian]
   !> Fraction of a period. Accelerations that act for a shorter time do not change the gap within its precision.
   real(real64), parameter :: negligible = 1.0e-10_real64
-  integer, parameter :: pieces_in_reach = 6  !! number of intervals that is longer than a period, even if some are negligible
+  integer, parameter :: intervals_in_reach = 6  !! number of intervals that is longer than a period, even if some are negligible
 
   !> The state of a piston, which changes in its collisions.
   type :: side_state_t
@@ -32,66 +32,66 @@ module side_motion
     real(real64) :: amplitude = 0.0_real64  !! amplitude; constant velocity: offset and path; piston: width of the box [length]
     real(real64) :: period = 1.0_real64              !! [time]
     real(real64) :: phase = 0.0_real64               !! phase at t = 0, in periods
-    real(real64) :: strike = 0.0_real64              !! velocity inwards, of a sawtooth or constant motion [length/time]
+    real(real64) :: prescribed_velocity = 0.0_real64  !! velocity inwards, of a sawtooth or constant motion [length/time]
     real(real64) :: start_time = 0.0_real64          !! beginning of a motion at constant velocity [time]
     real(real64) :: end_time = 0.0_real64            !! end of a motion at constant velocity [time]
     ! Of a piston, which is moved by disks and by a force:
     real(real64) :: mass = 1.0_real64                !! [mass]
     real(real64) :: pull = 0.0_real64                !! acceleration inwards due to the force [length/time**2]
   contains
-    procedure :: travels
-    procedure :: drifts
-    procedure :: inmost
-    procedure :: top_speed
-    procedure :: moment
-    procedure :: place
+    procedure :: moves
+    procedure :: moves_permanently
+    procedure :: innermost_position
+    procedure :: highest_speed
+    procedure :: local_time
+    procedure :: position
     procedure :: velocity
     procedure :: contact_time
-    procedure, private :: acceleration, displacement, is_soon, lead, velocity_change, piece
+    procedure, private :: acceleration, displacement, is_short, excess_displacement, velocity_change, curvature_interval
   end type side_motion_t
 
 contains
 
   !> Whether the position of the side changes.
-  elemental function travels(self) result(yes)
+  elemental function moves(self) result(yes)
     class(side_motion_t), intent(in) :: self
     logical :: yes
 
-    yes = self%kind == sine .or. self%kind == parabolic .or. self%drifts()
-  end function travels
+    yes = self%kind == sine .or. self%kind == parabolic .or. self%moves_permanently()
+  end function moves
 
   !> Whether the position changes permanently, and with it the accessible area.
-  elemental function drifts(self) result(yes)
+  elemental function moves_permanently(self) result(yes)
     class(side_motion_t), intent(in) :: self
     logical :: yes
 
     yes = self%kind == constant_velocity .or. self%kind == piston
-  end function drifts
+  end function moves_permanently
 
   !> Largest displacement inwards; for a piston the initial one.
-  elemental function inmost(self) result(x)
+  elemental function innermost_position(self) result(x)
     class(side_motion_t), intent(in) :: self
     real(real64) :: x                                !! [length]
 
     x = self%amplitude
-    if (self%drifts()) x = self%offset
-    if (self%kind == constant_velocity) x = x + max(0.0_real64, self%strike*(self%end_time - self%start_time))
-  end function inmost
+    if (self%moves_permanently()) x = self%offset
+    if (self%kind == constant_velocity) x = x + max(0.0_real64, self%prescribed_velocity*(self%end_time - self%start_time))
+  end function innermost_position
 
   !> Highest speed of the side; for a piston the speed of free fall through the box.
-  elemental function top_speed(self) result(speed)
+  elemental function highest_speed(self) result(speed)
     class(side_motion_t), intent(in) :: self
     real(real64) :: speed                            !! [length/time]
 
-    speed = abs(self%strike)
+    speed = abs(self%prescribed_velocity)
     if (self%kind == sine) speed = 2*pi*self%amplitude/self%period
     if (self%kind == parabolic) speed = 8*self%amplitude/self%period
     if (self%kind == piston) speed = sqrt(2*abs(self%pull)*self%amplitude)
-  end function top_speed
+  end function highest_speed
 
   !> Time since the beginning of the period, of the motion, or of the free flight of a piston, at the time epoch + t of the run. The
   !> remainders are exact, so that late times are as precise as early ones.
-  elemental function moment(self, epoch, t, state) result(tau)
+  elemental function local_time(self, epoch, t, state) result(tau)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! [time]
     type(side_state_t), intent(in), optional :: state     !! state of a piston
@@ -104,12 +104,12 @@ contains
     else
       tau = modulo(modulo(epoch, self%period) + modulo(t, self%period) + self%phase*self%period, self%period)
     end if
-  end function moment
+  end function local_time
 
   !> Displacement of the side inwards from its mean position.
-  elemental function place(self, tau, state) result(x)
+  elemental function position(self, tau, state) result(x)
     class(side_motion_t), intent(in) :: self
-    real(real64), intent(in) :: tau                  !! time as returned by `moment` [time]
+    real(real64), intent(in) :: tau                  !! time as returned by `local_time` [time]
     type(side_state_t), intent(in), optional :: state     !! state of a piston
     real(real64) :: x                                !! [length]
     real(real64) :: s
@@ -121,26 +121,26 @@ contains
     else if (self%kind == parabolic) then
       x = 16*self%amplitude*merge(s*(0.5_real64 - s), (s - 0.5_real64)*(s - 1), s < 0.5_real64)
     else if (self%kind == constant_velocity) then
-      x = self%offset + self%strike*min(max(tau, 0.0_real64), self%end_time - self%start_time)
+      x = self%offset + self%prescribed_velocity*min(max(tau, 0.0_real64), self%end_time - self%start_time)
     else if (self%kind == piston) then
       x = flight(state%position, state%velocity, self%pull, tau)
     end if
-  end function place
+  end function position
 
   !> Velocity of the side inwards.
   elemental function velocity(self, tau, state) result(v)
     class(side_motion_t), intent(in) :: self
-    real(real64), intent(in) :: tau                  !! time as returned by `moment` [time]
+    real(real64), intent(in) :: tau                  !! time as returned by `local_time` [time]
     type(side_state_t), intent(in), optional :: state     !! state of a piston
     real(real64) :: v                                !! [length/time]
     real(real64) :: s
 
-    v = self%strike
+    v = self%prescribed_velocity
     s = modulo(tau, self%period)/self%period
     if (self%kind == sine) then
-      v = self%top_speed()*cos(2*pi*s)
+      v = self%highest_speed()*cos(2*pi*s)
     else if (self%kind == parabolic) then
-      v = self%top_speed()*merge(1 - 4*s, 4*s - 3, s < 0.5_real64)
+      v = self%highest_speed()*merge(1 - 4*s, 4*s - 3, s < 0.5_real64)
     else if (self%kind == constant_velocity .and. (tau < 0 .or. tau >= self%end_time - self%start_time)) then
       v = 0
     else if (self%kind == piston) then
@@ -151,34 +151,34 @@ contains
   !> Acceleration of the side inwards, just after a time.
   elemental function acceleration(self, tau) result(a)
     class(side_motion_t), intent(in) :: self
-    real(real64), intent(in) :: tau                  !! time as returned by `moment` [time]
+    real(real64), intent(in) :: tau                  !! time as returned by `local_time` [time]
     real(real64) :: a                                !! [length/time**2]
 
     a = 0
     if (self%kind == sine) then
-      a = -(2*pi/self%period)**2*self%place(tau)
+      a = -(2*pi/self%period)**2*self%position(tau)
     else if (self%kind == parabolic) then
       a = sign(32*self%amplitude/self%period**2, modulo(tau, self%period) - 0.5_real64*self%period)
     end if
   end function acceleration
 
   !> Displacement of the side from the time tau on, during the time s.
-  elemental function displacement(self, tau, s) result(way)
+  elemental function displacement(self, tau, s) result(distance)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
-    real(real64) :: way                              !! [length]
+    real(real64) :: distance                         !! [length]
     real(real64) :: half
 
     half = pi*modulo(s, self%period)/self%period
     if (self%kind == sine) then
-      way = 2*self%amplitude*cos(2*pi*tau/self%period + half)*sin(half)
+      distance = 2*self%amplitude*cos(2*pi*tau/self%period + half)*sin(half)
     else
-      way = self%place(tau + modulo(s, self%period)) - self%place(tau)
+      distance = self%position(tau + modulo(s, self%period)) - self%position(tau)
     end if
   end function displacement
 
-  !> Whether s is so short that `lead` is valid.
-  elemental function is_soon(self, tau, s) result(yes)
+  !> Whether s is so short that `excess_displacement` is valid.
+  elemental function is_short(self, tau, s) result(yes)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
     logical :: yes
@@ -188,24 +188,24 @@ contains
     else                                             ! still on the same parabola
       yes = s <= 0.5_real64*self%period - modulo(tau, 0.5_real64*self%period)
     end if
-  end function is_soon
+  end function is_short
 
   !> Displacement relative to a side that keeps its velocity of the time tau, in full precision.
-  elemental function lead(self, tau, s) result(way)
+  elemental function excess_displacement(self, tau, s) result(distance)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
-    real(real64) :: way                              !! [length]
+    real(real64) :: distance                         !! [length]
     real(real64) :: angle, angle2
 
     if (self%kind == sine) then
       angle = 2*pi*s/self%period
       angle2 = angle*angle
-      way = angle*angle2/6*(1 - angle2/20*(1 - angle2/42*(1 - angle2/72*(1 - angle2/110*(1 - angle2/156)))))  ! x - sin x
-      way = -self%amplitude*(cos(2*pi*tau/self%period)*way + 2*sin(2*pi*tau/self%period)*sin(0.5_real64*angle)**2)
+      distance = angle*angle2/6*(1 - angle2/20*(1 - angle2/42*(1 - angle2/72*(1 - angle2/110*(1 - angle2/156)))))  ! x - sin x
+      distance = -self%amplitude*(cos(2*pi*tau/self%period)*distance + 2*sin(2*pi*tau/self%period)*sin(0.5_real64*angle)**2)
     else
-      way = 0.5_real64*self%acceleration(tau)*s*s
+      distance = 0.5_real64*self%acceleration(tau)*s*s
     end if
-  end function lead
+  end function excess_displacement
 
   !> Change of the velocity of the side from the time tau on, during the time s.
   elemental function velocity_change(self, tau, s) result(v)
@@ -216,8 +216,8 @@ contains
 
     half = pi*modulo(s, self%period)/self%period
     if (self%kind == sine) then
-      v = -2*self%top_speed()*sin(2*pi*tau/self%period + half)*sin(half)
-    else if (self%is_soon(tau, s)) then
+      v = -2*self%highest_speed()*sin(2*pi*tau/self%period + half)*sin(half)
+    else if (self%is_short(tau, s)) then
       v = self%acceleration(tau)*s
     else
       v = self%velocity(tau + modulo(s, self%period)) - self%velocity(tau)
@@ -226,9 +226,9 @@ contains
 
   !> Time from tau on during which the gap to a disk with the acceleration g stays convex or concave: until the acceleration
   !> of the side equals g. At most half a period.
-  elemental function piece(self, tau, g) result(s)
+  elemental function curvature_interval(self, tau, g) result(s)
     class(side_motion_t), intent(in) :: self
-    real(real64), intent(in) :: tau                  !! time as returned by `moment` [time]
+    real(real64), intent(in) :: tau                  !! time as returned by `local_time` [time]
     real(real64), intent(in) :: g                    !! [length/time**2]
     real(real64) :: s                                !! [time]
     real(real64) :: bend(2), ratio
@@ -241,7 +241,7 @@ contains
     bend = modulo(bend*self%period - tau, self%period)
     where (bend < negligible*self%period) bend = self%period
     s = minval(bend)
-  end function piece
+  end function curvature_interval
 
   !> Time until the side touches the boundary of a disk on a parabola; `never` if it does not. A disk that stays in the range of the
   !> side for a whole period is touched, unless it is at the very end of the range and hardly moves; then more and more periods are
@@ -254,60 +254,60 @@ contains
     real(real64), intent(in) :: g                    !! acceleration of the disk [length/time**2]
     type(side_state_t), intent(in), optional :: state     !! state of a piston
     real(real64) :: s, from, to, above, entry
-    integer :: pieces
+    integer :: intervals
 
     if (self%kind == constant_velocity) then
-      s = time_in_stroke(self, tau, gap, v, g)
+      s = contact_time_of_stroke(self, tau, gap, v, g)
       return
     else if (self%kind == piston) then
       s = time_to_line(gap, self%velocity(tau, state) - v, self%pull - g)
       return
     end if
-    above = gap + self%place(tau) - self%amplitude   ! distance from the range of the side
+    above = gap + self%position(tau) - self%amplitude  ! distance from the range of the side
     entry = time_to_line(above, -v, -g)              ! time of the last entry into the range
     s = never
     from = 0
-    pieces = 0
+    intervals = 0
     do
       if (flight(above, v, g, from) > 0) then
         if (from < entry) then
           from = entry
-          pieces = 0
+          intervals = 0
         else if (.not. flight_velocity(v, g, from) < 0) then
           return
         end if
       end if
       if (.not. from < never) return
-      to = from + self%piece(modulo(tau + modulo(from, self%period), self%period), g)
-      s = strike_between(self, tau, gap, v, g, from, to)
+      to = from + self%curvature_interval(modulo(tau + modulo(from, self%period), self%period), g)
+      s = contact_time_between(self, tau, gap, v, g, from, to)
       if (s < never) return
-      pieces = pieces + 1
+      intervals = intervals + 1
       from = to
-      if (modulo(pieces, pieces_in_reach) == 0) from = scale(to, 1) + self%period
+      if (modulo(intervals, intervals_in_reach) == 0) from = scale(to, 1) + self%period
     end do
   end function contact_time
 
   !> Time until contact with a side that is at rest, moves at constant velocity, and is at rest again.
-  pure function time_in_stroke(motion, tau, gap, v, g) result(s)
+  pure function contact_time_of_stroke(motion, tau, gap, v, g) result(s)
     class(side_motion_t), intent(in) :: motion
     real(real64), intent(in) :: tau, gap, v, g       !! as in `contact_time`
-    real(real64) :: s, from, to(3), apart
+    real(real64) :: s, from, to(3), gap_at
     integer :: k
 
     to = [-tau, (motion%end_time - motion%start_time) - tau, never]
     from = 0
     do k = 1, 3
       if (.not. to(k) > from) cycle
-      apart = gap + (flight(0.0_real64, v, g, from) - (motion%place(tau + from) - motion%place(tau)))
-      s = from + time_to_line(max(apart, 0.0_real64), merge(motion%strike, 0.0_real64, k == 2) - (v + g*from), -g)
+      gap_at = gap + (flight(0.0_real64, v, g, from) - (motion%position(tau + from) - motion%position(tau)))
+      s = from + time_to_line(max(gap_at, 0.0_real64), merge(motion%prescribed_velocity, 0.0_real64, k == 2) - (v + g*from), -g)
       if (s <= to(k)) return
       from = to(k)
     end do
     s = never
-  end function time_in_stroke
+  end function contact_time_of_stroke
 
   !> Time of contact within an interval in which the gap is convex or concave; `never` if there is none.
-  pure function strike_between(motion, tau, gap, v, g, from, to) result(s)
+  pure function contact_time_between(motion, tau, gap, v, g, from, to) result(s)
     class(side_motion_t), intent(in) :: motion
     real(real64), intent(in) :: tau, gap, v, g       !! as in `contact_time`
     real(real64), intent(in) :: from, to             !! the interval [time]
@@ -316,20 +316,20 @@ contains
     relative = v - motion%velocity(tau)
     curvature = g - motion%acceleration(tau + modulo(from, motion%period) + 0.5_real64*(to - from))
     if (motion%kind == parabolic) then
-      s = from + time_to_line(max(apart(from), 0.0_real64), -opening(from), -curvature)
+      s = from + time_to_line(max(gap_at(from), 0.0_real64), -gap_rate(from), -curvature)
       if (s > to) s = never
       return
     end if
     s = from
-    if (.not. apart(from) > 0 .and. opening(from) < 0) return
+    if (.not. gap_at(from) > 0 .and. gap_rate(from) < 0) return
     s = never
     high = to
     if (curvature > 0) then                          ! the gap has its minimum where it stops decreasing
-      if (.not. opening(from) < 0) return
+      if (.not. gap_rate(from) < 0) return
       low = from
-      if (opening(to) > 0) call bisect(.true., low, high)
+      if (gap_rate(to) > 0) call bisect(.true., low, high)
     end if
-    if (.not. apart(high) < 0) return
+    if (.not. gap_at(high) < 0) return
     low = from
     call bisect(.false., low, high)
     s = low
@@ -337,24 +337,24 @@ contains
   contains
 
     !> The gap after the time t.
-    pure function apart(t) result(distance)
+    pure function gap_at(t) result(distance)
       real(real64), intent(in) :: t
       real(real64) :: distance
 
-      if (motion%is_soon(tau, t)) then
-        distance = gap + (relative*t + (0.5_real64*g*t*t - motion%lead(tau, t)))
+      if (motion%is_short(tau, t)) then
+        distance = gap + (relative*t + (0.5_real64*g*t*t - motion%excess_displacement(tau, t)))
       else
         distance = gap + (flight(0.0_real64, v, g, t) - motion%displacement(tau, t))
       end if
-    end function apart
+    end function gap_at
 
     !> Rate of change of the gap after the time t.
-    pure function opening(t) result(speed)
+    pure function gap_rate(t) result(speed)
       real(real64), intent(in) :: t
       real(real64) :: speed
 
       speed = relative + (g*t - motion%velocity_change(tau, t))
-    end function opening
+    end function gap_rate
 
     !> Bisects an interval to the last bit. Beyond the result the gap increases, or is negative.
     pure subroutine bisect(to_smallest, left, right)
@@ -367,14 +367,14 @@ contains
         middle = 0.5_real64*(left + right)
         if (middle <= left .or. middle >= right) exit
         if (to_smallest) then
-          beyond = opening(middle) > 0
+          beyond = gap_rate(middle) > 0
         else
-          beyond = apart(middle) < 0
+          beyond = gap_at(middle) < 0
         end if
         if (beyond) right = middle
         if (.not. beyond) left = middle
       end do
     end subroutine bisect
-  end function strike_between
+  end function contact_time_between
 
 end module side_motion

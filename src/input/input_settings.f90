@@ -225,13 +225,13 @@ contains
       call refuse(any(box%periodic .and. abs(box%gravity) > 0), "box.gravity", "a periodic axis along it (box.boundary): disks " &
         //"would fall for ever; make its sides walls")
       call refuse(shear .and. .not. all(box%periodic), "box.shear_rate", "walls; make box.boundary 'periodic', 'periodic'")
-      call refuse(shear .and. box%falling(), "box.shear_rate", "box.gravity")
+      call refuse(shear .and. box%has_gravity(), "box.shear_rate", "box.gravity")
       call refuse(shear .and. any(groups%name == "obstacle"), "box.shear_rate", "&obstacle")
       call refuse(shear .and. any(groups%name == "wall"), "box.shear_rate", "&wall")
       call refuse(shear .and. settings%run%dynamics == "steps", "box.shear_rate", "run.dynamics = 'steps'")
       call refuse(settings%run%dynamics == "steps" .and. any(box%surface%motion%kind == piston), "run.dynamics", &
         "side.motion = 'piston'")
-      call refuse(settings%output%helfand .and. box%falling(), "output.helfand", &
+      call refuse(settings%output%helfand .and. box%has_gravity(), "output.helfand", &
         "box.gravity: velocities change between collisions")
       call refuse(settings%output%helfand .and. shear, "output.helfand", &
         "box.shear_rate: velocities change at its periodic boundary")

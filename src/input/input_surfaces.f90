@@ -170,9 +170,9 @@ contains
         axis = (side + 1)/2
         width = box%upper(axis) - box%lower(axis)
         call take_motion(sides(k), box%surface(side)%motion)
-        if (.not. box%surface(side)%motion%travels()) cycle
+        if (.not. box%surface(side)%motion%moves()) cycle
         ! Sides must not meet, whenever each is how far inwards.
-        if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%inmost()) >= width) call sides(k)%complain( &
+        if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%innermost_position()) >= width) call sides(k)%complain( &
           culprit(box%surface(side)%motion), "lets the sides meet, which are "// &
           written(width)//" apart (box.upper)", problems)
       end if
@@ -214,8 +214,8 @@ contains
       character(len=:), allocatable :: name
 
       name = "amplitude"
-      if (motion%drifts()) name = "position"
-      if (motion%kind == constant_velocity .and. motion%strike > 0) name = "end_time"
+      if (motion%moves_permanently()) name = "position"
+      if (motion%kind == constant_velocity .and. motion%prescribed_velocity > 0) name = "end_time"
     end function culprit
 
     !> How a side moves.
@@ -228,17 +228,17 @@ contains
       motion%amplitude = group%real_of("amplitude", 0.0_real64)
       motion%period = group%real_of("period", 1.0_real64)
       motion%phase = group%real_of("phase", 0.0_real64)
-      motion%strike = group%real_of("velocity", 0.0_real64)
+      motion%prescribed_velocity = group%real_of("velocity", 0.0_real64)
       if (group%given("position") .and. .not. group%faulty("position")) motion%offset = merge( &
         group%real_of("position", 0.0_real64) - box%lower(axis), box%upper(axis) - group%real_of("position", 0.0_real64), &
         modulo(side, 2) == 1)
       if (motion%kind == still .and. abs(motion%offset) > 0) motion%kind = constant_velocity    ! which is 0
-      if (motion%kind == sawtooth .and. group%given("velocity") .and. .not. motion%strike > 0) call group%complain( &
+      if (motion%kind == sawtooth .and. group%given("velocity") .and. .not. motion%prescribed_velocity > 0) call group%complain( &
         "velocity", "must be > 0 with motion = 'sawtooth': the side strikes inwards", problems)
       if (motion%kind == constant_velocity) then
         motion%start_time = group%real_of("start_time", 0.0_real64)
         motion%end_time = group%real_of("end_time", 0.0_real64)
-        motion%amplitude = abs(motion%offset) + abs(motion%strike)*(motion%end_time - motion%start_time)
+        motion%amplitude = abs(motion%offset) + abs(motion%prescribed_velocity)*(motion%end_time - motion%start_time)
         if (group%given("end_time") .and. motion%end_time <= motion%start_time) call group%complain( &
           "end_time", "is not after start_time, "//written(motion%start_time), problems)
         if (motion%amplitude > largest) call group%complain("end_time", "the side moves as far as "//written(motion%amplitude) &
@@ -248,9 +248,9 @@ contains
         motion%pull = group%real_of("force", 0.0_real64)/motion%mass
         motion%amplitude = width
         box%side(side)%position = motion%offset
-      else if (motion%top_speed() > largest) then
+      else if (motion%highest_speed() > largest) then
         call group%complain("period", "the side moves at up to "// &
-          written(motion%top_speed())//"; allowed: up to "//written(largest), problems)
+          written(motion%highest_speed())//"; allowed: up to "//written(largest), problems)
       end if
     end subroutine take_motion
   end subroutine take_wall_laws

@@ -3,7 +3,7 @@
 module box_geometry
   use collisions, only: wall_law_t
   use disks, only: disk_t
-  use images, only: images_t, sliding_images
+  use images, only: images_t, moving_images
   use kinds, only: int32, never, real64
   use partners, only: axis_of, is_side, n_sides, obstacle_number, sense_of, side_name
   use shapes, only: shape_t, spare
@@ -11,7 +11,8 @@ module box_geometry
   implicit none
   private
   public :: box_t, surface_t
-  public :: free_area, meet_image, next_obstacle, normal_surface_velocity, obstacle_gap, tangential_surface_velocity, wall_normal
+  public :: find_image_contact, free_area, next_obstacle, normal_surface_velocity, obstacle_gap, tangential_surface_velocity
+  public :: wall_normal
 
   !> A side of the box, or a group of obstacles. All obstacles of a group share one contact law, and sums over their collisions.
   type :: surface_t
@@ -41,10 +42,10 @@ module box_geometry
     procedure :: edges
     procedure :: periods
     procedure :: images => images_of
-    procedure :: falling
+    procedure :: has_gravity
     procedure :: is_sheared
-    procedure :: slip
-    procedure :: stream
+    procedure :: shear_velocity
+    procedure :: shear_profile
     procedure :: add_obstacles
     procedure :: has_obstacles
     procedure :: n_obstacles
@@ -56,7 +57,7 @@ module box_geometry
     procedure :: highest_speed
     procedure :: does_work
     procedure :: gives_energy
-    procedure :: reach
+    procedure :: side_excursion
     procedure :: side_position
     procedure :: side_velocity
   end type box_t
@@ -129,16 +130,16 @@ contains
 
     images = images_t(self%periods())
     if (self%is_sheared() .and. present(epoch)) &
-      images = sliding_images(self%periods(), self%slip(), epoch)
+      images = moving_images(self%periods(), self%shear_velocity(), epoch)
   end function images_of
 
   !> Whether there is gravity, so that disks move on parabolas.
-  pure function falling(self) result(yes)
+  pure function has_gravity(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
 
     yes = any(abs(self%gravity) > 0)
-  end function falling
+  end function has_gravity
 
   !> Whether the box is sheared (Lees and Edwards, J. Phys. C 5, 1921 (1972)): the image above moves along x.
   pure function is_sheared(self) result(yes)
@@ -149,21 +150,21 @@ contains
   end function is_sheared
 
   !> Velocity of the image above along x.
-  pure function slip(self) result(v)
+  pure function shear_velocity(self) result(v)
     class(box_t), intent(in) :: self
     real(real64) :: v                           !! [length/time]
 
     v = self%shear_rate*(self%upper(2) - self%lower(2))
-  end function slip
+  end function shear_velocity
 
   !> Velocity profile imposed by the shear at x. Properties relative to this profile are uniform.
-  pure function stream(self, x) result(v)
+  pure function shear_profile(self, x) result(v)
     class(box_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
     real(real64) :: v(2)                        !! [length/time]
 
     v = [self%shear_rate*(x(2) - 0.5_real64*(self%lower(2) + self%upper(2))), 0.0_real64]
-  end function stream
+  end function shear_profile
 
   !> Whether the box has obstacles.
   pure function has_obstacles(self) result(yes)
@@ -234,7 +235,7 @@ contains
     class(box_t), intent(in) :: self
     real(real64) :: highest                     !! [length/time]
 
-    highest = max(maxval(abs(self%surface%law%speed)), maxval(self%surface%motion%top_speed()), abs(self%slip()))
+    highest = max(maxval(abs(self%surface%law%speed)), maxval(self%surface%motion%highest_speed()), abs(self%shear_velocity()))
   end function highest_speed
 
   !> Whether boundaries can do work on disks: by tangential or normal motion, as a piston, or by shear.
@@ -254,12 +255,12 @@ contains
   end function gives_energy
 
   !> Largest distances of moving sides from their mean positions, outwards, where disks can be as well.
-  pure function reach(self) result(length)
+  pure function side_excursion(self) result(length)
     class(box_t), intent(in) :: self
     real(real64) :: length(2, 2)                !! (axis, lower or upper) [length]
 
     length = transpose(reshape(self%surface(:n_sides)%motion%amplitude, [2, 2]))
-  end function reach
+  end function side_excursion
 
   !> Displacement of side k at a time, inwards from its mean position.
   pure function side_position(self, k, t) result(x)
@@ -269,7 +270,7 @@ contains
     real(real64) :: x                           !! [length]
 
     associate (motion => self%surface(k)%motion, state => self%side(k))
-      x = motion%place(motion%moment(self%epoch, t, state), state)
+      x = motion%position(motion%local_time(self%epoch, t, state), state)
     end associate
   end function side_position
 
@@ -281,7 +282,7 @@ contains
     real(real64) :: v                           !! [length/time]
 
     associate (motion => self%surface(k)%motion, state => self%side(k))
-      v = motion%velocity(motion%moment(self%epoch, t, state), state)
+      v = motion%velocity(motion%local_time(self%epoch, t, state), state)
     end associate
   end function side_velocity
 
@@ -301,7 +302,7 @@ contains
     do k = 1, size(list)
       images = merge(images_t(), box%images(), box%obstacle(obstacle_number(list(k)))%shape%encloses)
       do image = 1, images%count()
-        call meet_image(box, disk, last, list(k), images%shift(images%around(image)), t, code)
+        call find_image_contact(box, disk, last, list(k), images%shift(images%around(image)), t, code)
       end do
     end do
   end subroutine next_obstacle
@@ -309,7 +310,7 @@ contains
   !> Finds the contact of a disk with one image of an obstacle, if it is earlier than a known event. Obstacles that disks touch
   !> from outside are convex: a disk that leaves one on a straight line cannot return, and contacts predicted from rounding errors
   !> are skipped.
-  pure subroutine meet_image(box, disk, last, obstacle, shift, t, code)
+  pure subroutine find_image_contact(box, disk, last, obstacle, shift, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int32), intent(in) :: last          !! code of the obstacle that the disk left last, if it has had no event since
@@ -321,22 +322,22 @@ contains
 
     associate (shape => box%obstacle(obstacle_number(obstacle))%shape)
       d = disk%x - (shape%middle + shift)
-      if (last == obstacle .and. .not. (shape%encloses .or. box%falling())) then
+      if (last == obstacle .and. .not. (shape%encloses .or. box%has_gravity())) then
         if (all(abs(d - shape%from_nearest(disk%x, box%images(), heading=disk%v)) < 0.5_real64*box%edges())) return
       end if
-      if (box%falling()) then
-        if (passes_by(d, disk%v, box%gravity, t - disk%clock, shape%extent + disk%radius)) return
+      if (box%has_gravity()) then
+        if (stays_outside(d, disk%v, box%gravity, t - disk%clock, shape%extent + disk%radius)) return
       end if
       t_image = disk%clock + shape%contact_time(d, disk%v, box%gravity, disk%radius)
     end associate
     if (.not. t_image < t) return
     t = t_image
     code = obstacle
-  end subroutine meet_image
+  end subroutine find_image_contact
 
   !> Whether a point that falls for some time surely stays outside of a rectangle around the origin; .false. if in doubt. The
   !> rectangle around the path is a rough but cheap bound compared with the roots of a quartic.
-  pure function passes_by(d, v, g, s, half) result(yes)
+  pure function stays_outside(d, v, g, s, half) result(yes)
     real(real64), intent(in) :: d(2)            !! initial position [length]
     real(real64), intent(in) :: v(2)            !! [length/time]
     real(real64), intent(in) :: g(2)            !! [length/time**2]
@@ -354,7 +355,7 @@ contains
       slack = spare*(abs(d(axis)) + max(-low, high))
       yes = yes .or. d(axis) + high < -(half(axis) + slack) .or. d(axis) + low > half(axis) + slack
     end do
-  end function passes_by
+  end function stays_outside
 
   !> Distance between the m-th obstacle and the boundary of a disk at x; negative if they overlap.
   pure function obstacle_gap(box, m, x, radius) result(length)

@@ -9,7 +9,7 @@ module box_sides
   use side_motion, only: piston, side_motion_t
   implicit none
   private
-  public :: bounds, keep_off_sides, next_side, side_time
+  public :: bounds, separate_from_sides, next_side, side_time
 
   real(real64), parameter :: rounding = 16*epsilon(1.0_real64)  !! rounding error of the gap to a moving side, relative to the
                                                                 !! coordinates
@@ -26,7 +26,7 @@ contains
 
     inwards = 0
     do k = 1, n_sides
-      if (box%surface(k)%motion%travels()) inwards(k) = box%side_position(k, t)
+      if (box%surface(k)%motion%moves()) inwards(k) = box%side_position(k, t)
     end do
     lower = box%lower + inwards([1, 3])
     upper = box%upper - inwards([2, 4])
@@ -51,7 +51,7 @@ contains
       gap = (box%upper(axis) - inset) - disk%x(axis)
     end if
     associate (motion => box%surface(1 - side)%motion, state => box%side(1 - side))
-      if (motion%travels()) then
+      if (motion%moves()) then
         since = disk%clock
         v = -sense*disk%v(axis)
         if (motion%kind == piston) then             ! neither clock is later than the contact
@@ -60,9 +60,9 @@ contains
           gap = gap + flight(0.0_real64, v, -sense*box%gravity(axis), after)
           v = flight_velocity(v, -sense*box%gravity(axis), after)
         end if
-        tau = motion%moment(box%epoch, since, state)
-        gap = gap - motion%place(tau, state)
-        if (gap < no_gap(disk, axis, motion)) gap = 0
+        tau = motion%local_time(box%epoch, since, state)
+        gap = gap - motion%position(tau, state)
+        if (gap < gap_rounding_error(disk, axis, motion)) gap = 0
         t = since + motion%contact_time(tau, gap, v, -sense*box%gravity(axis), state)
       else
         t = disk%clock + time_to_line(max(gap, 0.0_real64), sense*disk%v(axis), sense*box%gravity(axis))
@@ -93,7 +93,7 @@ contains
   !> Moves a disk away from the sides that it would touch before `now`, after a change of the origin of its clock. The change
   !> also rounds the position and velocity of a moving side, so that a disk almost in contact could collide in the past. The
   !> displacement is of the order of the rounding error.
-  pure subroutine keep_off_sides(box, disk, now)
+  pure subroutine separate_from_sides(box, disk, now)
     type(box_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk
     real(real64), intent(in) :: now             !! since the epoch [time]
@@ -102,24 +102,24 @@ contains
 
     do side = 0, 1 - n_sides, -1
       associate (motion => box%surface(1 - side)%motion, x => disk%x(axis_of(side)))
-        if (.not. motion%travels()) cycle
-        step = no_gap(disk, axis_of(side), motion)
+        if (.not. motion%moves()) cycle
+        step = gap_rounding_error(disk, axis_of(side), motion)
         do while (side_time(box, disk, side) < now)
           x = x - sense_of(side)*step
           step = 2*step
         end do
       end associate
     end do
-  end subroutine keep_off_sides
+  end subroutine separate_from_sides
 
   !> Rounding error of the gap between a disk and a moving side.
-  pure function no_gap(disk, axis, motion) result(gap)
+  pure function gap_rounding_error(disk, axis, motion) result(gap)
     type(disk_t), intent(in) :: disk
     integer, intent(in) :: axis
     type(side_motion_t), intent(in) :: motion
     real(real64) :: gap                         !! [length]
 
     gap = rounding*(abs(disk%x(axis)) + disk%radius + motion%amplitude)
-  end function no_gap
+  end function gap_rounding_error
 
 end module box_sides

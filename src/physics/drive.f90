@@ -23,8 +23,8 @@ module drive
     integer :: species = 0                           !! index of the only driven species; 0: all are driven
   contains
     procedure :: is_on
-    procedure :: reaches
-    procedure :: reaches_all
+    procedure :: acts_on
+    procedure :: acts_on_all
     procedure :: time_of
     procedure :: speed2
   end type drive_t
@@ -40,21 +40,21 @@ contains
   end function is_on
 
   !> Whether the driving acts on a species.
-  elemental function reaches(self, species) result(yes)
+  elemental function acts_on(self, species) result(yes)
     class(drive_t), intent(in) :: self
     integer, intent(in) :: species                   !! index of the species
     logical :: yes
 
     yes = self%is_on() .and. (self%species == 0 .or. self%species == species)
-  end function reaches
+  end function acts_on
 
   !> Whether each kick changes the velocities of all disks.
-  pure function reaches_all(self) result(yes)
+  pure function acts_on_all(self) result(yes)
     class(drive_t), intent(in) :: self
     logical :: yes
 
     yes = self%is_on() .and. self%species == 0 .and. .not. (self%kind == andersen .and. self%fraction < 1)
-  end function reaches_all
+  end function acts_on_all
 
   !> Time of kick k. It is computed as a product, because a sum would accumulate rounding errors.
   pure function time_of(self, k) result(t)
@@ -74,7 +74,7 @@ contains
     real(real64) :: speed2
 
     speed2 = 0
-    if (.not. self%reaches(species)) return
+    if (.not. self%acts_on(species)) return
     if (self%kind == noise) speed2 = 2*self%strength*self%interval
     if (self%kind >= andersen) speed2 = 2*self%temperature/mass + self%speed**2
   end function speed2

@@ -278,12 +278,12 @@ contains
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: change(2)        !! momentum change of disk i [mass length/time]
     real(real64), intent(in) :: transferred_energy  !! energy transferred to disk i [energy]
-    real(real64) :: r(2), slip(2)
+    real(real64) :: r(2), image_velocity(2)
     integer :: a, b
 
     r = sim%disk(i)%x - sim%disk(j)%x
-    slip = 0
-    call use_nearest_image(sim, sim%disk(i)%clock, r, slip)
+    image_velocity = 0
+    call use_nearest_image(sim, sim%disk(i)%clock, r, image_velocity)
     do a = 1, 2
       do b = 1, 2
         call sim%tally%sum(stress + 2*(a - 1) + b - 1)%add(change(a)*r(b))
@@ -291,7 +291,7 @@ contains
     end do
     if (sim%with%helfand) call sim%tally%sum(heat_virial:heat_virial + 1)%add(transferred_energy*r)
     if (.not. sim%box%is_sheared()) return
-    call sim%tally%sum(work)%add(-slip(1)*change(1))
+    call sim%tally%sum(work)%add(-image_velocity(1)*change(1))
     call remove_residual_approach(sim, i, j)
   end subroutine add_pair_sums
 
@@ -307,8 +307,8 @@ contains
     if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! true for nearly all pairs
     images = sim%images()
     image = images%image(images%nearest_image(dx, t))
-    dx = dx + [image%shift(1) + image%slip*t, image%shift(2)]
-    dv(1) = dv(1) + image%slip
+    dx = dx + [image%shift(1) + image%velocity*t, image%shift(2)]
+    dv(1) = dv(1) + image%velocity
   end subroutine use_nearest_image
 
   !> True if disks i and j, which touch at the time t, are still in contact after their last collision, through the same
@@ -337,18 +337,18 @@ contains
   pure subroutine remove_residual_approach(sim, i, j)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
-    real(real64) :: dx(2), dv(2), slip, step, mass_i, mass_j
+    real(real64) :: dx(2), dv(2), image_velocity, step, mass_i, mass_j
 
     associate (p => sim%disk(i), q => sim%disk(j))
       dx = q%x - p%x
       dv = 0
       call use_nearest_image(sim, p%clock, dx, dv)
-      slip = dv(1)
+      image_velocity = dv(1)
       mass_i = sim%mass_of(i)
       mass_j = sim%mass_of(j)
       step = max(epsilon(step)*maxval(abs([p%v, q%v]))/magnitude(dx)*(mass_i*mass_j/(mass_i + mass_j)), tiny(step))
       do
-        dv = q%v - p%v + [slip, 0.0_real64]
+        dv = q%v - p%v + [image_velocity, 0.0_real64]
         if (dx(1)*dv(1) + dx(2)*dv(2) >= 0) exit
         p%v = p%v - (step/mass_i)*dx
         q%v = q%v + (step/mass_j)*dx
@@ -402,7 +402,7 @@ contains
     images = sim%images()
     associate (d => sim%disk(i), periods => sim%extra(i)%image, length => sim%box%upper(1) - sim%box%lower(1))
       v = d%v(1)
-      call images%climb(real(rows, real64), d%clock, d%x, d%v, periods)
+      call images%enter_image_frame(real(rows, real64), d%clock, d%x, d%v, periods)
       columns = floor((flight(d%x(1), d%v(1), 0.0_real64, t - d%clock) - sim%box%lower(1))/length, int64)
       d%x(1) = d%x(1) - columns*length
       periods(1) = periods(1) + columns

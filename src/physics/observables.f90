@@ -86,7 +86,7 @@ contains
       call list%add(path//"/impulse", sim%tally%surface_sums(impulse:impulse + 1, k)%value())
       call list%add(path//"/energy_to_disks", [sim%tally%surface_sums(gain, k)%value()])
       call list%add(path//"/collisions", real([sim%tally%surface_collisions(k)], real64), is_count=.true.)
-      if (.not. sim%box%surface(k)%motion%travels()) cycle
+      if (.not. sim%box%surface(k)%motion%moves()) cycle
       call bounds(sim%box, sim%now, at(:, 1), at(:, 2))
       call list%add(path//"/position", [at((k + 1)/2, 2 - modulo(k, 2))])
       call list%add(path//"/velocity", [sim%box%side_velocity(k, sim%now)])
@@ -229,7 +229,7 @@ contains
     integer(int32) :: i
     integer :: s, k
 
-    falling = sim%box%falling()
+    falling = sim%box%has_gravity()
     sheared = sim%box%is_sheared()
     driven = sim%is_driven()
     sums = 0
@@ -239,7 +239,7 @@ contains
       s = sim%tag(i)%species
       v = sim%velocity(i)
       own_v = v
-      if (sheared) own_v = v - sim%box%stream(sim%position(i))
+      if (sheared) own_v = v - sim%box%shear_profile(sim%position(i))
       term(mass) = sim%mass_of(i)
       term(speed) = sqrt(dot_product(v, v))
       term(momentum:momentum + 1) = term(mass)*v
@@ -273,7 +273,7 @@ contains
     pressure = kinetic
     if (sim%time() > 0) pressure = pressure + 0.5_real64*sim%tally%total(virial)/sim%time()
     box = sim%box
-    if (any(box%surface%motion%drifts())) call bounds(sim%box, sim%now, box%lower, box%upper)
+    if (any(box%surface%motion%moves_permanently())) call bounds(sim%box, sim%now, box%lower, box%upper)
     pressure = pressure/free_area(box)
   end function pressure
 

@@ -91,7 +91,7 @@ contains
         periods = floor((x(axis) - lower)/(upper - lower), int64)
         if (x(axis) - periods*(upper - lower) >= upper) periods = periods + 1
         if (axis == 2) then
-          call images%climb(periods, sim%now, x, v, image)
+          call images%enter_image_frame(periods, sim%now, x, v, image)
         else
           x(1) = x(1) - periods*(upper - lower)
           image(1) = image(1) + periods

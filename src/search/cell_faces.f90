@@ -195,10 +195,10 @@ contains
 
     self%width = patch%width
     self%overlap = max(self%width - patch%reach, 0.0_real64)
-    self%moving = any(box%surface(:n_sides)%motion%travels())
-    self%falling = box%falling() .or. self%moving
+    self%moving = any(box%surface(:n_sides)%motion%moves())
+    self%falling = box%has_gravity() .or. self%moving
     self%periodic = box%periodic
-    self%beyond = box%reach()
+    self%beyond = box%side_excursion()
     where (transpose(reshape(box%surface(:n_sides)%motion%kind == piston, [2, 2]))) self%beyond = never
     call cut(1, self%column)
     call cut(2, self%row)
@@ -234,10 +234,10 @@ contains
       type(line_t), intent(inout) :: line(0:, :)
       real(real64) :: reach(2, 2)
 
-      reach = box%reach()
+      reach = box%side_excursion()
       associate (side => box%surface(2*axis - 1:2*axis)%motion, within => (reach(axis, :) + patch%small)*(1 + spare))
-        line(0, :)%struck = side(1)%travels() .and. line(0, :)%place <= box%lower(axis) + within(1)
-        line(1, :)%struck = side(2)%travels() .and. line(1, :)%place >= box%upper(axis) - within(2)
+        line(0, :)%struck = side(1)%moves() .and. line(0, :)%place <= box%lower(axis) + within(1)
+        line(1, :)%struck = side(2)%moves() .and. line(1, :)%place >= box%upper(axis) - within(2)
       end associate
     end subroutine find_struck
   end subroutine set

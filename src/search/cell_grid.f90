@@ -2,7 +2,7 @@
 !> which is an event, it can only touch disks in its own cell and the eight cells around it. Wide cells overlap (see `cell_faces`).
 module cell_grid
   use kinds, only: int16, int32, never, real64
-  use box_geometry, only: box_t, meet_image, next_obstacle
+  use box_geometry, only: box_t, find_image_contact, next_obstacle
   use box_sides, only: next_side
   use cell_contents, only: cell_contents_t, gather
   use cell_faces, only: cell_faces_t, patch_t
@@ -532,7 +532,7 @@ contains
 
       near%cell = self%cells%number(sim%tag(i)%cell)
       if (self%patch%at_seam(sim%tag(i)%cell)) then
-        t = self%images%look_again(sim%now, self%patch%width(1))
+        t = self%images%valid_until(sim%now, self%patch%width(1))
         if (t < near%time) near%partner = looks_again
         near%time = min(t, near%time)
         call scan_around_seam(self%cells, self%patch, sim, self%images, near)
@@ -557,7 +557,7 @@ contains
           else
             number = entry%image
             shift = self%images%shift(number)
-            call meet_image(sim%box, sim%disk(i), sim%tag(i)%last_partner, entry%code, shift, near%time, near%partner)
+            call find_image_contact(sim%box, sim%disk(i), sim%tag(i)%last_partner, entry%code, shift, near%time, near%partner)
           end if
           e = entry%next
         end associate

@@ -144,10 +144,10 @@ contains
       first = -1
       columns = 3
       periods = 0
-      if (y /= 0 .and. abs(images%slip) > 0) then
+      if (y /= 0 .and. abs(images%velocity) > 0) then
         displacement = images%displacement(real(y, real64), sim%now)
         periods = anint(displacement/images%period(1))
-        first = -nint((displacement - periods*images%period(1))/patch%width(1)) - merge(3, 2, y*images%slip > 0)
+        first = -nint((displacement - periods*images%period(1))/patch%width(1)) - merge(3, 2, y*images%velocity > 0)
         columns = 6
       end if
       do k = 1, columns

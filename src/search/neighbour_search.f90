@@ -86,9 +86,9 @@ contains
       dy = moved(yj, vj, gravity(2), sj, falling) - y
       du = sped_up(uj, gravity(1), sj, falling) - u
       dv = sped_up(vj, gravity(2), sj, falling) - v
-      if (present(image)) dx = dx + (image%shift(1) + image%slip*late)
+      if (present(image)) dx = dx + (image%shift(1) + image%velocity*late)
       if (present(image)) dy = dy + image%shift(2)
-      if (present(image)) du = du + image%slip
+      if (present(image)) du = du + image%velocity
       sigma2 = (ri + rj)**2
       b = dx*du + dy*dv
       c = dx*dx + dy*dy - sigma2

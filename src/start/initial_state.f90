@@ -5,7 +5,7 @@ module initial_state
   use errors, only: error_t
   use input_groups, only: range_of
   use input_problems, only: problem_list_t
-  use kicks, only: orient
+  use kicks, only: draw_orientations
   use placement, only: place_disks
   use settings, only: run_input_t, settings_t
   use simulation_state, only: simulation_t
@@ -34,7 +34,7 @@ contains
     associate (settings => input%settings, groups => input%groups(s(1):s(2)))
       call describe_system(settings, sim)
       call sim%list_disks()
-      if (sim%drive%kind == active) call orient(sim)
+      if (sim%drive%kind == active) call draw_orientations(sim)
       call place_disks(settings%species, groups, settings%run%seed, line, sim, problems)
       if (problems%count == 0) call set_in_motion(settings, groups, sim, problems)
       if (problems%count == 0) call check_speeds(sim, problems)

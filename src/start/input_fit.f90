@@ -67,7 +67,7 @@ contains
     o = range_of(groups, obstacle_groups)
     s = range_of(groups, ["species"])
     associate (box => settings%box, species => settings%species)
-      beyond = box%reach()                                    ! range beyond the box that moving sides reach
+      beyond = box%side_excursion()                           ! range beyond the box that moving sides reach
       do k = 1, box%n_obstacles()                             ! each shape checks its own position
         misfit = box%obstacle(k)%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
         if (misfit /= "") call complain_of_obstacle(box, k, groups(o(1) + box%obstacle(k)%surface - n_sides - 1), misfit, &
@@ -118,14 +118,14 @@ contains
       side = place_of(trim(groups(k)%instance), side_name)
       axis = (side + 1)/2
       associate (motion => box%surface(side)%motion)
-        if (motion%kind /= constant_velocity .or. motion%strike < 0) cycle
+        if (motion%kind /= constant_velocity .or. motion%prescribed_velocity < 0) cycle
         call bounds(box, motion%end_time, low, high)
         if (product(high - low) > disks) cycle
-        if (.not. motion%strike > 0) then
+        if (.not. motion%prescribed_velocity > 0) then
           call groups(k)%complain("position", "leaves the disks less than their own area, "//written(disks), problems)
           cycle
         end if
-        last = motion%end_time - (disks/(high(3 - axis) - low(3 - axis)) - (high(axis) - low(axis)))/motion%strike
+        last = motion%end_time - (disks/(high(3 - axis) - low(3 - axis)) - (high(axis) - low(axis)))/motion%prescribed_velocity
         call groups(k)%complain("end_time", "the side would crush the disks, which need at least their own area, "// &
           written(disks)//"; allowed: a time before "//written(last), problems)
       end associate

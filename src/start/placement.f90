@@ -143,7 +143,7 @@ contains
       outside = 0
       overlapping = 0
       taken = ""
-      if (any(packing%box%surface%motion%travels())) taken = ", less the part that a moving side takes at the start"
+      if (any(packing%box%surface%motion%moves())) taken = ", less the part that a moving side takes at the start"
       call centre_range(species(s)%region, packing%box, 0.0_real64, lower, upper)
       call packing%open_species(int(s, int32), maxval(radius), size(radius), &
         min(max(minval(x, dim=2), lower), upper), max(min(maxval(x, dim=2), upper), lower))

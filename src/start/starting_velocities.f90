@@ -29,7 +29,7 @@ contains
     integer :: s, i, first, last
 
     mass = sim%masses()
-    balanced = all(sim%box%periodic) .and. .not. sim%box%has_obstacles() .and. .not. sim%box%falling()
+    balanced = all(sim%box%periodic) .and. .not. sim%box%has_obstacles() .and. .not. sim%box%has_gravity()
     do s = 1, size(settings%species)
       call find_disks()
       call stream%seed(settings%run%seed, [s, purpose])
@@ -183,7 +183,7 @@ contains
 
       if (.not. sim%box%is_sheared()) return
       do i = first, last
-        sim%disk(i)%v = sim%disk(i)%v + factor*sim%box%stream(sim%disk(i)%x)
+        sim%disk(i)%v = sim%disk(i)%v + factor*sim%box%shear_profile(sim%disk(i)%x)
       end do
     end subroutine add_stream
   end subroutine set_in_motion
