@@ -6,7 +6,9 @@ One line for each problem.  Public are the names in `__all__` of the package and
 """
 
 import sys
+from functools import cached_property
 from importlib import import_module
+from types import FunctionType
 
 MODULES = (
     "statistics",
@@ -20,6 +22,7 @@ MODULES = (
     "cooling",
     "transport",
     "fields",
+    "streams",
 )
 #: Rules that do not apply here, and why.
 IGNORED = {
@@ -34,6 +37,9 @@ IGNORED = {
     "RT05": "likewise",
     "YD01": "generators have Yields only where a caller uses them",
 }
+#: Classes whose public methods and properties are held to the standard, too.
+CLASSES = ("Run", "Simulation")
+METHODS = (FunctionType, classmethod, staticmethod)
 #: A named tuple needs no example: functions return it.
 OF_CLASSES = {"EX01", "PR01", "PR02"}
 
@@ -51,6 +57,22 @@ def problems() -> list[str]:
             for code, text in validate(f"{loaded.__name__}.{name}")["errors"]:
                 if code not in ignored:
                     found.append(f"{module}.{name}: {code} {text}")
+    return found + [problem for name in CLASSES for problem in of_methods(name)]
+
+
+def of_methods(name: str) -> list[str]:
+    """The problems of the methods and properties of a class of the package."""
+    from numpydoc.validate import validate
+
+    found = []
+    for member, value in vars(getattr(import_module("ricochet"), name)).items():
+        is_property = isinstance(value, property | cached_property)
+        if member.startswith("_") or not (is_property or isinstance(value, METHODS)):
+            continue
+        ignored = IGNORED.keys() | ({"EX01"} if is_property else set())
+        for code, text in validate(f"ricochet.{name}.{member}")["errors"]:
+            if code not in ignored:
+                found.append(f"ricochet.{name}.{member}: {code} {text}")
     return found
 
 

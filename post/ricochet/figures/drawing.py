@@ -266,7 +266,8 @@ def points_per_length(axes: Axes) -> float:
     """Return how many points on paper a length of 1 takes, in axes of equal scales."""
     (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
     pixels = min(axes.bbox.width / (x1 - x0), axes.bbox.height / (y1 - y0))
-    return float(72 * pixels / axes.get_figure(root=True).dpi)
+    figure = axes.get_figure(root=True)
+    return float(72 * pixels / (figure.dpi if figure else 72))
 
 
 def drawn_diameters(axes: Axes, run: Run) -> np.ndarray:

@@ -245,9 +245,25 @@ class Run:
         return [self.parameters.get("side", {}).get(name, {}) for name in SIDES]
 
     def corners_at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the lower left and the upper right corner of the box at some times, (..., 2) each.
+        """Return the corners of the box at some times.
 
         Sides may move.  The position of a piston is interpolated between the observables.
+
+        Parameters
+        ----------
+        time : float or numpy.ndarray
+            (...) times
+
+        Returns
+        -------
+        lower, upper : numpy.ndarray
+            (..., 2) lower left and upper right corners [length]
+
+        Examples
+        --------
+        >>> lower, upper = run.corners_at(0.5)
+        >>> upper.tolist()
+        [1.0, 1.0]
         """
         inwards = np.stack([displaced(side, np.asarray(time)) for side in self.sides], axis=-1)
         inwards = inwards + self._offsets
@@ -290,23 +306,93 @@ class Run:
         )
 
     def of_species(self, name: str) -> np.ndarray:
-        """Return an (N,) mask of the disks of a species."""
+        """Return which disks belong to a species.
+
+        Parameters
+        ----------
+        name : str
+            name of the species
+
+        Returns
+        -------
+        numpy.ndarray
+            (N,) mask
+
+        Raises
+        ------
+        RunError
+            if there is no species of that name
+
+        Examples
+        --------
+        >>> int(run.of_species("gas").sum())
+        64
+        """
         if name not in self.names:
             raise RunError(f"{self.path}: no species '{name}', there are {', '.join(self.names)}")
         return self.species == self.names.index(name) + 1
 
     def speed(self, frame: Index) -> np.ndarray:
-        """Return the speeds (..., N) in some frames [length/time]."""
+        """Return the speeds of all disks in some frames.
+
+        Parameters
+        ----------
+        frame : int, slice, list of int or numpy.ndarray
+            which frames
+
+        Returns
+        -------
+        numpy.ndarray
+            (..., N) speeds [length/time]
+
+        Examples
+        --------
+        >>> run.speed(-1).shape, run.speed([0, -1]).shape
+        ((64,), (2, 64))
+        """
         return np.linalg.norm(self.velocity[as_index(frame)], axis=-1)
 
     def kinetic_energy(self, frame: Index) -> np.ndarray:
-        """Return the translational kinetic energies (..., N) in some frames."""
+        """Return the translational kinetic energy of each disk in some frames.
+
+        Parameters
+        ----------
+        frame : int, slice, list of int or numpy.ndarray
+            which frames
+
+        Returns
+        -------
+        numpy.ndarray
+            (..., N) energies [energy]
+
+        Examples
+        --------
+        >>> energy = run.observable("all/kinetic_energy").value[0]
+        >>> bool(np.isclose(run.kinetic_energy(0).mean(), energy))
+        True
+        """
         return 0.5 * self.mass * np.sum(self.velocity[as_index(frame)] ** 2, axis=-1)
 
     def unwrapped(self, frame: Index) -> np.ndarray:
-        """Return positions (..., N, 2) that are continuous in time: whole periods are added.
+        """Return positions that are continuous in time: whole periods are added.
 
         In a sheared box (Lees and Edwards) the image above is displaced by gamma L_y t along x.
+
+        Parameters
+        ----------
+        frame : int, slice, list of int or numpy.ndarray
+            which frames
+
+        Returns
+        -------
+        numpy.ndarray
+            (..., N, 2) positions [length]; along an axis that is not periodic those of `position`
+
+        Examples
+        --------
+        >>> apart = (run.unwrapped(-1) - run.position[-1]) / run.edges
+        >>> bool(np.allclose(apart, np.round(apart), atol=1e-9))
+        True
         """
         frame = as_index(frame)
         if self.image is None:
@@ -319,11 +405,50 @@ class Run:
         return place
 
     def displacement(self, frame: Index, origin: int = 0) -> np.ndarray:
-        """Return distances (..., N) from the positions in the frame `origin` [length]."""
+        """Return how far disks are from their positions in another frame, through periodic sides.
+
+        Parameters
+        ----------
+        frame : int, slice, list of int or numpy.ndarray
+            which frames
+        origin : int
+            frame from which distances count
+
+        Returns
+        -------
+        numpy.ndarray
+            (..., N) distances [length]
+
+        Examples
+        --------
+        >>> float(run.displacement(0).max())
+        0.0
+        """
         return np.linalg.norm(self.unwrapped(frame) - self.unwrapped(origin), axis=-1)
 
     def per_disk(self, name: str) -> Frames:
-        """Return a quantity (T, N) that only some runs have, such as 'angular_velocity'."""
+        """Return a quantity of each disk that only some runs have.
+
+        Parameters
+        ----------
+        name : str
+            name in the file, such as "angular_velocity" or "orientation"; `disk_data` has them all
+
+        Returns
+        -------
+        Frames
+            (T, N) read from the file when it is indexed
+
+        Raises
+        ------
+        RunError
+            if the frames do not have the quantity
+
+        Examples
+        --------
+        >>> rough_runs[0].per_disk("angular_velocity")[-1].shape
+        (64,)
+        """
         if name not in self.disk_data:
             raise RunError(f"{self.path}: has no {name} in its frames")
         return self.disk_data[name]
@@ -344,7 +469,29 @@ class Run:
         return float(self.parameter("contact", "inertia", 0.5)) * self.mass * self.radius**2
 
     def observable(self, name: str) -> Series:
-        """Return an observable by its name, such as 'total_energy' or 'sides/left/impulse'."""
+        """Return an observable with its times.
+
+        Parameters
+        ----------
+        name : str
+            name in the file, such as "total_energy" or "sides/left/impulse"; `observables` has all
+
+        Returns
+        -------
+        Series
+            times (T',) and values (T', ...)
+
+        Raises
+        ------
+        RunError
+            if the file has no observable of that name
+
+        Examples
+        --------
+        >>> time, energy = run.observable("total_energy")
+        >>> bool(np.ptp(energy) < 1e-9 * energy[0])
+        True
+        """
         with open_file(self.path) as file:
             return series_of(file, name, self._samples)
 
@@ -366,6 +513,17 @@ class Run:
         The index is the time.  Columns are named as the observables, such as `all/kinetic_energy`;
         vectors and tensors have a column for each component, such as `momentum_x` or
         `virial_tensor_xy`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            (T', columns) of numbers
+
+        Examples
+        --------
+        >>> table = run.to_dataframe()
+        >>> table.index.name, "all/kinetic_energy" in table.columns
+        ('time', True)
         """
         import pandas
 
@@ -385,6 +543,21 @@ class Run:
 
         Its dimensions are time, disk and component ("x", "y").  It contains all quantities of the
         frames, mass, radius and species; path and seed are in its `attrs`.
+
+        Returns
+        -------
+        xarray.Dataset
+            positions, velocities and the other quantities of the frames
+
+        Raises
+        ------
+        ImportError
+            if xarray is not installed
+
+        Examples
+        --------
+        >>> dict(run.to_xarray().sizes)["disk"] if has_xarray else 64
+        64
         """
         try:
             import xarray
@@ -405,7 +578,25 @@ class Run:
         return xarray.Dataset(data, axes, {"path": str(self.path), "seed": self.seed})
 
     def event_log(self) -> EventLog:
-        """Return the event log; RunError unless the input has `output.event_log = .true.`."""
+        """Return the event log, collisions of any kind in chronological order.
+
+        Returns
+        -------
+        EventLog
+            (E,) times, partners and impulses of all events
+
+        Raises
+        ------
+        RunError
+            unless the input has `output.event_log = .true.`
+
+        Examples
+        --------
+        >>> log = run.event_log()
+        >>> pairs = int(np.sum(log.j > 0))
+        >>> bool(pairs == run.observable("collisions").value[-1])
+        True
+        """
         return self._event_log
 
     @cached_property
@@ -432,6 +623,22 @@ class Run:
         """Return the number of pair collisions per disk at other times, by interpolation.
 
         Where frames are more frequent than observables, it is interpolated in the number of events.
+
+        Parameters
+        ----------
+        time : numpy.ndarray
+            (...) times, such as those of the frames
+
+        Returns
+        -------
+        numpy.ndarray
+            (...) collisions of two disks per disk since the start
+
+        Examples
+        --------
+        >>> tau = run.collisions_per_disk_at(run.time)
+        >>> float(tau[0]), bool(tau[-1] > 50)
+        (0.0, True)
         """
         known, tau = self.collisions_per_disk
         if self.event_count is None or len(known) >= self.n_frames:
@@ -451,11 +658,26 @@ class Run:
         return np.array([self.event_count[k].mean() for k in range(self.n_frames)])
 
     def accessible_area(self, time: float | np.ndarray) -> np.ndarray:
-        """Return the area (...) that disks can reach at some times: the box less its obstacles.
+        """Return the area that disks can reach at some times: the box less its obstacles.
 
         A round container replaces the box.  The box is that of the moment where a side moves at
         constant velocity or is a piston; a side that oscillates counts at its mean position, as in
         the pressure that the program writes.
+
+        Parameters
+        ----------
+        time : float or numpy.ndarray
+            (...) times
+
+        Returns
+        -------
+        numpy.ndarray
+            (...) areas [length^2]
+
+        Examples
+        --------
+        >>> float(run.accessible_area(0.0))
+        1.0
         """
         drifts = np.array([side.get("motion") in DRIFTING for side in self.sides])
         lower, upper = self.corners_at(time)
@@ -473,6 +695,27 @@ class Run:
         It is (<K> + dW / 2 dt) / <A>: K is the kinetic energy relative to the flow of a sheared
         box, W the virial, A the accessible area.  Means over time are by trapezoids over the
         samples.
+
+        Parameters
+        ----------
+        t1, t2 : float
+            times
+
+        Returns
+        -------
+        float
+            pressure [energy/length^2]
+
+        Raises
+        ------
+        RunError
+            if there are fewer than two samples of the observables
+
+        Examples
+        --------
+        >>> ideal = run.observable("all/kinetic_energy").value[-1] * run.n_disks
+        >>> bool(run.pressure(0, run.time[-1]) > 1.5 * ideal)
+        True
         """
         if self.shear_rate:
             return float(np.trace(self.pressure_tensor(t1, t2)) / 2)
@@ -486,6 +729,27 @@ class Run:
 
         It is (<sum of m v_a v_b> + dW_ab / dt) / <A>, with the virial tensor W; its trace is twice
         the `pressure`.  Some runs need `output.virial_tensor = .true.` for it.
+
+        Parameters
+        ----------
+        t1, t2 : float
+            times
+
+        Returns
+        -------
+        numpy.ndarray
+            (2, 2) pressure tensor [energy/length^2]
+
+        Raises
+        ------
+        RunError
+            if there are fewer than two samples of the observables, or no virial tensor
+
+        Examples
+        --------
+        >>> tensor = run.pressure_tensor(0, run.time[-1])
+        >>> bool(np.isclose(np.trace(tensor) / 2, run.pressure(0, run.time[-1])))
+        True
         """
         time, kinetic = self._between("kinetic_tensor", t1, t2)
         virial = np.subtract(*self._between("virial_tensor", t1, t2).value[[-1, 0]])
@@ -504,7 +768,25 @@ class Run:
         return Series(time[first : last + 1], value[first : last + 1])
 
     def parameter(self, group: str, variable: str, default: Any = None) -> Any:
-        """Return a variable of the input as it was used, or the default if it has no value."""
+        """Return a variable of the input as it was used.
+
+        Parameters
+        ----------
+        group, variable : str
+            names in the input, such as "contact" and "restitution"
+        default : object
+            result if the variable has no value
+
+        Returns
+        -------
+        object
+            a number, a text or an array
+
+        Examples
+        --------
+        >>> run.parameter("stop", "collisions_per_disk"), run.parameter("stop", "events", "none")
+        (60.0, 'none')
+        """
         return self.parameters.get(group, {}).get(variable, default)
 
     @property

@@ -126,6 +126,17 @@ class Simulation:
         -------
         Simulation
             the simulation, at the time of the checkpoint
+
+        Raises
+        ------
+        ProgramError
+            if the file has no checkpoint that can be used
+
+        Examples
+        --------
+        >>> with ricochet.Simulation.load(run.path) as box:
+        ...     bool(box.time == run.time[-1]), box.n_disks
+        (True, 64)
         """
         self = cls.__new__(cls)
         load = library(files=True).ricochet_load
@@ -152,6 +163,18 @@ class Simulation:
         -------
         Path
             `path` with `.part` at its end
+
+        Raises
+        ------
+        ProgramError
+            if the file exists already, or cannot be written
+
+        Examples
+        --------
+        >>> with ricochet.Simulation(small) as box:
+        ...     saved = box.advance(collisions=10).save(folder / "saved.h5")
+        >>> saved.name
+        'saved.h5.part'
         """
         path = Path(path)
         if input is not None:
@@ -163,7 +186,13 @@ class Simulation:
         return path.with_name(f"{path.name}.part")
 
     def close(self) -> None:
-        """Free the memory; the simulation cannot be used afterwards."""
+        """Free the memory; the simulation cannot be used afterwards.
+
+        Examples
+        --------
+        >>> box = ricochet.Simulation(small)
+        >>> box.close()
+        """
         handle = getattr(self, "_handle", None)
         if handle:
             with self._lock:
@@ -192,12 +221,39 @@ class Simulation:
         collisions: int | None = None,
         events: int | None = None,
     ) -> Self:
-        """Go on until the first of these values is reached, counted from the start of the run.
+        """Continue until the first of these values is reached, counted from the start of the run.
 
-        Without any it is the stop rule of the input that counts, if it has one.  As a run of the
-        program, it ends before that when nothing will ever happen, or when a gas that only loses
-        energy has cooled to 1e-25 of its first temperature.  An interrupt (Ctrl-C) leaves the
-        simulation where it is then.
+        Without any, the stop rule of the input decides, if it has one.  As a run of the program,
+        it ends before that when nothing will ever happen, or when a gas that only loses energy has
+        cooled to 1e-25 of its first temperature.  An interrupt (Ctrl-C) leaves the simulation in
+        the state of that moment.
+
+        Parameters
+        ----------
+        time : float, optional
+            time since the start
+        collisions : int, optional
+            number of collisions of two disks
+        events : int, optional
+            number of collisions of any kind; events of one moment are never separated
+
+        Returns
+        -------
+        Simulation
+            this one
+
+        Raises
+        ------
+        ValueError
+            if the time is past, or if neither a value nor the input says how far
+        ProgramError
+            if the simulation breaks off, as in an inelastic collapse
+
+        Examples
+        --------
+        >>> with ricochet.Simulation(small) as box:
+        ...     box.advance(time=0.1).time, box.advance(collisions=20).collisions
+        (0.1, 20)
         """
         limits = (
             math.inf if time is None else float(time),
@@ -237,11 +293,31 @@ class Simulation:
         return self._settled
 
     def change(self, values: Mapping[str, Any]) -> Self:
-        """Let something else act on the disks from now on: `{"box.gravity": (0, -1)}`.
+        """Change variables of the running simulation from this moment on.
 
-        It may be gravity, the drive, and the laws of contacts, sides, walls and obstacles with
-        their temperatures, speeds and motions.  What this does to the total energy counts as work.
-        What cannot change raises `ProgramError`, and nothing changes.
+        These may be gravity, the drive, and the laws of contacts, sides, walls and obstacles with
+        their temperatures, velocities and motions.  The change of the total energy counts as work.
+
+        Parameters
+        ----------
+        values : mapping of str to object
+            values of variables by their full names, such as {"box.gravity": (0, -1)}
+
+        Returns
+        -------
+        Simulation
+            this one
+
+        Raises
+        ------
+        ProgramError
+            if a variable cannot change; then nothing has changed
+
+        Examples
+        --------
+        >>> with ricochet.Simulation(small) as box:
+        ...     box.change({"box.gravity": (0, -1)}).changes
+        [(0.0, 'box.gravity', '0, -1')]
         """
         return self._change(settings_of(values))
 
@@ -423,16 +499,58 @@ class Simulation:
         return list(self._observed())
 
     def observable(self, name: str) -> Any:
-        """Return the present value of an observable: a number, or an array of its components."""
+        """Return the present value of an observable.
+
+        Parameters
+        ----------
+        name : str
+            name as in the output file, such as "all/kinetic_energy"; `observables` has all
+
+        Returns
+        -------
+        float, int or numpy.ndarray
+            a number, or an array of its components
+
+        Raises
+        ------
+        RunError
+            if there is no observable of that name
+
+        Examples
+        --------
+        >>> with ricochet.Simulation(small) as box:
+        ...     box.advance(collisions=20).observable("collisions")
+        20
+        """
         found = self._observed()
         if name not in found:
             raise RunError(f"there is no observable {name}{did_you_mean(name, found)}")
         return found[name].item() if len(found[name]) == 1 else found[name]
 
     def next_events(self, most: int) -> list[tuple[float, int, int]]:
-        """Return the next collisions in order, as time, i and j of the event log.
+        """Return the next events in chronological order.
 
-        There may be fewer than `most`.  A simulation by time steps cannot predict them: RunError.
+        Parameters
+        ----------
+        most : int
+            number of events; there may be fewer
+
+        Returns
+        -------
+        list of tuple
+            (time, i, j) of each event, i and j as in `EventLog`
+
+        Raises
+        ------
+        RunError
+            if the simulation is by time steps, which cannot predict events
+
+        Examples
+        --------
+        >>> with ricochet.Simulation(small) as box:
+        ...     times = [time for time, _, _ in box.next_events(3)]
+        >>> times == sorted(times), len(times)
+        (True, 3)
         """
         records = np.empty((max(int(most), 0), 6))
         with self._open() as handle:
