@@ -12,7 +12,7 @@ from textwrap import dedent
 
 from input_page import GROUPS, LAW, said, variables, written
 
-#: What a paragraph of --help is about, by the word before the colon at its beginning.
+#: Section of the manual page for each paragraph of --help, by the word before its colon.
 SECTIONS = {
     "usage": "SYNOPSIS",
     "members": "OPTIONS",

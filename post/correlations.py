@@ -64,7 +64,7 @@ from ricochet.script import by_packing, command_line, launch, measured, over_run
 import numpy as np
 
 PLAIN = {"walls"}  # traits of plain disks: equal, smooth, elastic
-#: What has no equilibrium, but a structure.
+#: Traits of runs without an equilibrium, which nevertheless have a structure.
 RESTLESS = (
     "inelastic",
     "soft_contacts",

@@ -205,8 +205,8 @@ def viscosity(run: Run) -> Curves:
     return {"": (time[1:], -stress / (run.shear_rate * np.prod(run.edges)))}
 
 
-#: What is shown: words and dimension of its label, its curves, the law of what should last, and
-#: what of a mean is compared with it.
+#: Quantities that are drawn: words and dimension of the label, curves, the conservation law, and
+#: the mean that is compared with it.
 QUANTITIES = {
     "width": (("width of the box", "length"), width, width_law, np.asarray),
     "temperature": (("kT", "energy"), temperature, temperature_law, np.asarray),

@@ -50,7 +50,7 @@ from ricochet.script import command_line, grouped, late_frames, launch, measured
 import numpy as np
 
 BINS = np.linspace(0, 3, 51)  # u = 1 lies inside a bin
-#: What the late frames of all runs are, in words; the first two have one kT.
+#: State of the late frames of all runs, in words; the first two have one kT.
 EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
 COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each frame at its own kT"
 UNSTEADY = "No steady kT yet: each frame at its own"
@@ -119,7 +119,7 @@ def pooled(
 
 
 class Scale(NamedTuple):
-    """What the reduced speed u = 1 is drawn as, and the label of the axis."""
+    """Return the value at which the reduced speed u = 1 is drawn, and the label of the axis."""
 
     thermal: float = 1.0  # sqrt(2 kT / m), or 1
     label: str = "speed $u = v\\,/\\,\\sqrt{2kT/m}$"

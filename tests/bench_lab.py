@@ -55,7 +55,7 @@ def opened(browser, address):
 
 
 def measured(browser, address, repeats):
-    """What is measured, its goal, and whether less is better."""
+    """A measured quantity, its goal, and whether less is better."""
     script = {"cmd": "Page.addScriptToEvaluateOnNewDocument", "params": {"source": OPENING}}
     browser.call("POST", "/goog/cdp/execute", script)
 

@@ -1,4 +1,4 @@
-"""What all tests share: the program under test and a way to run it."""
+"""Fixtures of all tests: the program under test and a way to run it."""
 
 import os
 import signal

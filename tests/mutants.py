@@ -59,7 +59,7 @@ def check_out(commit: str) -> Path:
 
 
 class Mutant(NamedTuple):
-    """What replaces which text of a file."""
+    """A text of a file and its replacement."""
 
     file: str
     old: str
@@ -67,7 +67,7 @@ class Mutant(NamedTuple):
 
 
 def mutants() -> dict[str, Mutant]:
-    """Those of mutants.diff by name."""
+    """The mutants of mutants.diff by name."""
     found = {}
     for name, file, change in MUTANT.findall((ROOT / "tests" / "mutants.diff").read_text()):
         lines = change.splitlines()
@@ -83,7 +83,7 @@ def applies(mutant: Mutant, tree: Path) -> bool:
 
 
 def outcome(tree: Path, mutant: Mutant | None, jobs: int, log: Path) -> str:
-    """What the tests say of a tree with a fault, or without any."""
+    """Outcome of the tests in a tree with a fault, or without any."""
     steps = [*UNIT_TESTS, PROGRAM, PYTEST + "tests"]
     if mutant:
         if not applies(mutant, tree):

@@ -46,7 +46,7 @@ def of_box(found: Found) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def imbalance(found: Found) -> float:
     """How far the energy is from what was given and lost, in parts of the greatest of them.
 
-    What cancels counts in full: kinetic and potential energy, kicks of noise whose momentum is
+    Terms that cancel count in full: kinetic and potential energy, kicks of noise whose momentum is
     taken back, and the kT that a thermal wall gives at one hit and may take back at the next.
     """
     signs = {"total_energy": 1, "dissipated_energy": 1, "heat": -1, "work": -1, "drive_energy": -1}

@@ -14,7 +14,7 @@ from ricochet import read_run
 from ricochet.script import launch
 
 ROOT = Path(__file__).resolve().parents[1]
-#: Those that read runs; the laboratory makes them.
+#: Scripts that read runs; the laboratory makes runs.
 SCRIPTS = sorted(
     path.stem for path in (ROOT / "post").glob("*.py") if "command_line(" in path.read_text()
 )

@@ -1,4 +1,4 @@
-"""What the tests of whole runs share: inputs, and ways to look at and compare output files."""
+"""Tools of the tests of whole runs: inputs, and functions that compare output files."""
 
 import contextlib
 import os
@@ -111,7 +111,7 @@ def executable(path, text, shell="sh") -> Path:
 
 
 def environment(**more) -> dict[str, str]:
-    """That of the tests with more variables; no `make` in it takes itself for a part of another."""
+    """The environment of the tests and more variables, without those of a `make` around it."""
     own = {name: value for name, value in os.environ.items() if "MAKE" not in name}
     return own | {name: str(value) for name, value in more.items()}
 
@@ -173,12 +173,12 @@ def wait_for(condition):
 
 
 def facts_of(pid) -> list[str]:
-    """What the system knows of a process, from its state on (proc(5), /proc/PID/stat, field 3)."""
+    """Data of the system about a process, from its state on (proc(5), /proc/PID/stat, field 3)."""
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
 
 
 def processor_time(pid) -> float:
-    """What a process has used so far, with the children that it has waited for [s]."""
+    """Processor time of a process so far, with the children that it has waited for [s]."""
     return sum(map(int, facts_of(pid)[11:15])) / os.sysconf("SC_CLK_TCK")
 
 

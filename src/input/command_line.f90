@@ -203,7 +203,7 @@ contains
     call print_text(text, error)
   end subroutine answer
 
-  !> What a bug report should name.
+  !> Answer to `--version`: all that a bug report should state.
   function version_text() result(text)
     character(len=:), allocatable :: text
 

@@ -296,7 +296,7 @@ contains
     range(2) = range(1) + count(named) - 1
   end function range_of
 
-  !> What gives a variable its value: `species.bed.radius = 0.005`.
+  !> Assignment that gives a variable its value: `species.bed.radius = 0.005`.
   pure function value_line(self, k, most) result(text)
     class(group_t), intent(in) :: self
     integer, intent(in) :: k                   !! its place in the group

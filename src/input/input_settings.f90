@@ -164,7 +164,7 @@ contains
       end associate
     end subroutine take_stop
 
-    !> What is written, and when.
+    !> Contents of the output and the schedule of its samples.
     subroutine take_output(group)
       type(group_t), intent(in) :: group
       integer :: k
@@ -204,8 +204,8 @@ contains
     end subroutine take_sampling
   end subroutine resolve_settings
 
-  !> The table of what cannot be together in an input, across its groups, and of intervals that are too short. What excludes
-  !> each other within a group is in the table of variables.
+  !> Table of settings of different groups that cannot be combined, and of intervals that are too short. Variables of one group
+  !> that exclude each other are marked in the table of variables.
   subroutine check_conflicts(settings, groups, must_end, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)

@@ -109,7 +109,7 @@ contains
       end associate
     end subroutine take_pairs
 
-    !> The number of disks, given or following from the grid or the list of positions. That in a file is counted later.
+    !> Number of disks, given or implied by the grid or the list of positions. Disks of a starting file are counted later.
     subroutine take_count(group, s)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(inout) :: s

@@ -82,7 +82,7 @@ contains
       end if
     end subroutine check_number
 
-    !> What to say when `0,9` stands where one real number is expected.
+    !> Hint for `0,9` in place of one real number.
     function decimal_hint() result(hint)
       character(len=:), allocatable :: hint
 

@@ -11,12 +11,12 @@ module radii
   integer, parameter :: purpose = 7                         !! of this module's random streams
   real(real64), parameter :: part = 9.0_real64/11           !! of the mean, by which radii differ from it at most
   real(real64), parameter :: powers = 0.5_real64*log(10.0_real64)   !! the same of logarithms
-  real(real64), parameter :: deviations = 3                 !! of a normal law that lie within, at least
+  real(real64), parameter :: deviations = 3                 !! standard deviations of a Gaussian within these limits, at least
 
 contains
 
-  !> The radius of each disk. Logarithms of a lognormal law have the variance ln(1 + spread**2); last bits of that law and of
-  !> the normal one may depend on the mathematical library.
+  !> The radius of each disk. The logarithm of a lognormal radius has the variance ln(1 + spread**2). The last bits of lognormal
+  !> and Gaussian radii may depend on the mathematical library.
   pure function drawn_radii(species, s, seed) result(radius)
     class(species_settings_t), intent(in) :: species
     integer, intent(in) :: s                                !! its number

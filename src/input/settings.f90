@@ -63,11 +63,11 @@ module settings
     real(real64) :: rotational_temperature = -1.0_real64  !! mean of I omega**2, instead; negative: not given [energy]
   end type species_settings_t
 
-  !> What the intervals of samples are of, in the names of variables.
+  !> Quantities by which samples are scheduled, as in the names of variables.
   character(len=19), parameter, public :: sampled_by(4) = [character(len=19) :: "time", "collisions", "events", &
     "collisions_per_disk"]
 
-  !> What is sampled, in the names of variables.
+  !> Kinds of samples, as in the names of variables.
   character(len=11), parameter, public :: sampled(2) = [character(len=11) :: "frames", "observables"]
 
   !> When it is; an interval that is not set is `never`.
@@ -99,7 +99,7 @@ module settings
     procedure :: wants_domains
   end type settings_t
 
-  !> What a run was asked for, in all its forms.
+  !> Input of a run in all its forms.
   type :: run_input_t
     character(len=:), allocatable :: path                !! of the input file, for messages
     character(len=:), allocatable :: text                !! the input file as it is

@@ -134,7 +134,7 @@ contains
       end do
     end subroutine remove_drift
 
-    !> Sets the angular velocities. Those of 'file' were set together with the positions.
+    !> Sets the angular velocities. With 'file' they were set together with the positions.
     subroutine draw_spins()
       real(real64) :: normals(2)
 

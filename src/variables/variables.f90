@@ -123,7 +123,7 @@ contains
     if (size(words) > 0) read (line, *) words
   end function words_of
 
-  !> What may be written: `a number > 0`, `'wall' or 'periodic'`.
+  !> Allowed values in words: `a number > 0`, `'wall' or 'periodic'`.
   pure function allowed(row) result(words)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: words

@@ -1,4 +1,4 @@
-"""What tests of post/ share."""
+"""Fixtures of the tests of post/."""
 
 from pathlib import Path
 

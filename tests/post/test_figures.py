@@ -1,4 +1,4 @@
-"""What figures show beside the measured curves: bands of single runs, panels, explanations."""
+"""Additions of figures to the measured curves: bands of single runs, panels, explanations."""
 
 from types import SimpleNamespace
 

@@ -69,7 +69,7 @@ class Film:
         return await self.until("scene", "problems")
 
     async def next(self):
-        """What comes next: its kind and itself."""
+        """The next message: its kind and its content."""
         async with asyncio.timeout(PATIENCE):
             message = await self.socket.receive()
         if message.type == aiohttp.WSMsgType.BINARY:
@@ -92,7 +92,7 @@ class Film:
                 return news
 
     async def kept(self, part):
-        """What is downloaded; what is said if that is nothing."""
+        """The download, or the answer if there is none."""
         await self.say("keep", part=part)
         news = await self.until("file", "problems")
         return base64.b64decode(news["body"]) if news["is"] == "file" else news
@@ -479,7 +479,7 @@ def children(pid):
 
 
 def alive(pids):
-    """Those which are no corpse."""
+    """The processes that are alive."""
     found = []
     for pid in pids:
         try:

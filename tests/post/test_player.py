@@ -35,7 +35,7 @@ def still_run(path, position, **more):
 
 
 def filmed(run, frames, traced=()):
-    """What the page needs to know."""
+    """The data of the page."""
     return player.film(run, frames, "speed", list(traced))
 
 
@@ -165,7 +165,7 @@ def test_the_policy_of_the_page_stops_what_is_not_its_own(opened):
 
 
 def stage(browser) -> str:
-    """What is drawn, all layers in one text."""
+    """All layers of the drawing in one text."""
     return browser.run("return layers.map(layer => layer.toDataURL()).join()")
 
 

@@ -185,7 +185,7 @@ def test_scripts_answer_a_bad_file_with_one_line_and_exit_2(tmp_path, script, ca
 
 @pytest.fixture
 def unfinished(ricochet, tmp_path) -> Path:
-    """What a run has written that its wall clock stopped."""
+    """The output of a run that its wall clock stopped."""
     write_input(tmp_path, MIXTURE)
     run = ricochet("gas.nml", "-o", "gas.h5", "--set", "stop.wall_clock=1e-9")
     assert run.returncode == STOPPED

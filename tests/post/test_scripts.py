@@ -37,7 +37,7 @@ TWO = statistics.student(2)  # what an error of two runs is larger by
 
 
 def refusal(capsys, script, *arguments, code=2):
-    """What a script says that refuses its arguments, in one line; code 1 where a law fails."""
+    """The message of a script that refuses its arguments; exit code 1 where a law fails."""
     assert run_script(script, *arguments) == code
     said = capsys.readouterr().err
     assert said.startswith(f"{script}.py: ") and said.count("\n") == 1
@@ -135,7 +135,7 @@ def test_the_law_of_fixed_energy_is_used_only_where_it_holds(tmp_path, rng, syst
 
 @pytest.fixture
 def figures(monkeypatch):
-    """Those that scripts draw."""
+    """The figures that scripts draw."""
     found, save = [], script.save
     monkeypatch.setattr(script, "save", lambda *all_of: (found.append(all_of[0]), save(*all_of)))
     return found

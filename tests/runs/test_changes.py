@@ -336,7 +336,7 @@ def without_ways(text: str) -> str:
 
 
 def faults(program: Path, seed: str) -> list[str]:
-    """What is wrong with the changes of a random system."""
+    """Faults of the changes of a random system."""
     course = Course(program, seed)
     first = course.run()
     for name in ("again", "other"):

@@ -23,7 +23,7 @@ ELSEWHERE = ("http://", "https://", "mailto:", "#")
 
 
 def section(page, heading):
-    """What stands in docs/ under a heading, and the headings below it."""
+    """The text in docs/ under a heading, and the headings below it."""
     text = (ROOT / "docs" / f"{page}.md").read_text()
     level = len(heading) - len(heading.lstrip("#"))
     return re.search(rf"^{heading}$(.*?)(?=^#{{1,{level}}} |\Z)", text, re.M | re.S)[1]
@@ -202,7 +202,7 @@ def test_the_numbers_of_the_tasks_are_those_of_their_tables():
 
 @pytest.mark.check
 def test_the_studies_give_the_numbers_of_the_tasks(program, tmp_path, monkeypatch):
-    """Those that take no minute; from other trajectories, within their errors."""
+    """Cases that take less than a minute; from other trajectories, within their errors."""
     (tmp_path / "runs").mkdir()
     for script in (ROOT / "runs").glob("*.sh"):
         shutil.copy(script, tmp_path / "runs")
@@ -335,7 +335,7 @@ def test_the_code_that_the_page_on_output_shows_finds_what_disks_carry(program, 
 
 
 def test_there_is_one_version(program):
-    """That of the program; the newest section of the changes and its date are those to cite."""
+    """The version of the program, the newest section of the changes, and the date to cite."""
     said = ran(program, "--version", check=True).stdout
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     page, cited = ((ROOT / name).read_text() for name in ("CHANGELOG.md", "CITATION.cff"))
@@ -348,7 +348,7 @@ COMPLETION = ROOT / "docs" / "ricochet-completion.bash"
 
 
 def completed(program, *words):
-    """What bash proposes for the last word."""
+    """The proposals of bash for the last word."""
     script = """source "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _ricochet
     printf '%s\\n' "${COMPREPLY[@]}" """
     command = ["bash", "-c", script, "bash", COMPLETION, program, *words]
@@ -546,7 +546,7 @@ def test_each_cell_shows_what_it_promises(program, monkeypatch):
 
 
 def shown(cell):
-    """What a cell shows, as one text."""
+    """The output of a cell as one text."""
     return "\n".join(
         str(output.get("text", "")) + "\n".join(map(str, output.get("data", {}).items()))
         for output in cell.outputs
@@ -554,6 +554,6 @@ def shown(cell):
 
 
 def showing(cells, code):
-    """What the one cell shows that contains this code."""
+    """The output of the only cell that contains this code."""
     (found,) = [output for source, output in cells if code in source]
     return found

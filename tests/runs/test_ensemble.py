@@ -546,7 +546,7 @@ def disturb(process, folder, rng):
 
 
 def differences_of(one, other) -> list[str]:
-    """What is not the same in the six members of two ensembles."""
+    """Differences between the six members of two ensembles."""
     names = [f"seed_{k}.h5" for k in range(1, 7)]
     return [f"{name}: {what}" for name in names for what in differences(one / name, other / name)]
 

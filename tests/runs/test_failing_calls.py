@@ -23,7 +23,7 @@ SMALL = """&box boundary = 'periodic', 'wall' /
 COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet"]
 #: How the run begins: over an earlier result, from a stopped run, from a finished one.
 OPTIONS = ("--force", "--resume", "--resume --quiet")
-#: What the program calls, and how each call fails: once, or with + from then on.
+#: Calls of the program, and how each fails: once, or with + from then on.
 WAYS = {
     "openat": ["EIO", "EIO+"],
     "read": ["EIO", "EIO+"],
@@ -104,7 +104,7 @@ def chosen(stage, option, call, step) -> list[int]:
 
 
 def outcome(check, program, stage, option, call, inject) -> str:
-    """What is wrong after a run in which something happened to a call; empty if nothing is."""
+    """Faults after a run in which a call was disturbed; empty if there are none."""
     folder = stage / f"{option} {call} {inject}"
     copy_folder(stage / option, folder)
     try:
@@ -149,7 +149,7 @@ def check_after_failure(program, stage, folder, option, call, inject):
 
 
 def go_on(program, stage, folder, option):
-    """What was left is good, and the run goes on from there, or from its start."""
+    """The file that was left is good, and the run goes on from there, or from its start."""
     part = folder / "gas.h5.part"
     if part.exists():
         found = committed(part)
@@ -164,7 +164,7 @@ def go_on(program, stage, folder, option):
 
 
 def check_after_kill(program, stage, folder, option, call, inject):
-    """What the final name names is an earlier result or the whole one; the other file goes on."""
+    """The final name has an earlier result or the whole one; the other file continues."""
     result = folder / "gas.h5"
     earlier = result.read_bytes() if result.exists() else None
     run = traced(program, folder, option, "-e", f"trace={call}", "-e", inject)
@@ -204,7 +204,7 @@ def contents_of(folder) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "trace"}
 
 
-#: What meets a call, as strace says it, and what must hold then.
+#: Disturbances of a call in the words of strace, and the property that must hold then.
 KILLED = ("pwrite64", "ftruncate", "fsync", "rename", "unlink", "openat")
 MEETINGS = [(check_after_failure, call, [f"error={way}" for way in WAYS[call]]) for call in WAYS]
 MEETINGS += [(check_after_signal, call, ["signal=SIGTERM"]) for call in WAYS]

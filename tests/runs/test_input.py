@@ -1,4 +1,4 @@
-"""What the program makes of input files, good, bad and absurd, and of its command line."""
+"""Input files, good, bad and absurd, and the command line of the program."""
 
 import itertools
 import json
@@ -22,7 +22,7 @@ OTHERS = """&obstacle name = 'pin' centre = 0.5, 0.5 radius = 0.1 /
 GOOD = """&species name = 'gas' count = 20 radius = 0.02 speed = 1 /
 &stop time = 0.1 /
 """
-#: What is refused, with all that is said of it.
+#: Inputs that are refused, with their messages.
 ROWS = Path(__file__).with_name("refused.txt").read_text().splitlines()
 DISKS, STARTED = (
     "&species count = 10 radius = .01 /",
@@ -65,7 +65,7 @@ def test_the_reference_file_is_what_print_defaults_prints(ricochet):
 
 
 def groups_of(ricochet, *words) -> list[dict]:
-    """What --print-input says."""
+    """The output of --print-input."""
     run = ricochet("--print-input", *words)
     assert (run.returncode, run.stderr) == (0, "")
     return json.loads(run.stdout)

@@ -1,4 +1,4 @@
-"""What a kill, a signal, a full disk, a twin or a curious reader can do to a run: nothing."""
+"""A kill, a signal, a full disk, a twin or a reader never harms a run."""
 
 import contextlib
 import itertools
@@ -37,7 +37,7 @@ LOGGED = """&box boundary = 'periodic', 'wall' /
 &output frames_every_time = 0.4 observables_every_time = 0.4 event_log = .true.
   checkpoint_every = 600 /
 """
-#: What a run says on a disk without room: which file, how much is wanted, how much is free ...
+#: Message of a run on a full disk: which file, how much is wanted, how much is free ...
 NO_ROOM = r"^disk/gas\.h5(\.part)?: .*(\d+ bytes needed, \d+ bytes free|.* are free)"
 #: ... and what to do, at the start and later.
 MAKE_ROOM = NO_ROOM + "(; choose fewer frames or make room)?$"
@@ -100,7 +100,7 @@ def test_files_never_take_the_place_of_closed_standard_streams(program, tmp_path
 
 
 def shown_until_stopped(program, folder, enough):
-    """What a run writes to its terminal, line by line; TERM stops it when there is enough."""
+    """The lines that a run writes to its terminal; TERM stops it when there are enough."""
     screen, keyboard = pty.openpty()
     run = subprocess.Popen([program, "gas.nml"], cwd=folder, stdout=keyboard, stderr=keyboard)
     os.close(keyboard)

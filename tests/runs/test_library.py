@@ -39,7 +39,7 @@ ENDLESS = {"contact.restitution": 1, "contact.tangential_restitution": 1}
 
 @pytest.fixture(scope="module")
 def whole(program, tmp_path_factory):
-    """What the program makes of it."""
+    """The settings that the program reads from it."""
     folder = tmp_path_factory.mktemp("whole")
     (folder / "gas.nml").write_text(GAS)
     ran(program, "gas.nml", "-o", "gas.h5", "--quiet", cwd=folder, check=True)
@@ -320,7 +320,7 @@ def test_numbers_that_c_may_give_are_refused_or_count_as_none():
     assert gas.advance(events=9).events == 9 and np.isfinite(gas.velocity).all()
 
 
-#: What a caller in C may give, sensible or not.
+#: Arguments that a caller in C may give, sensible or not.
 NUMBERS = np.nan, np.inf, -np.inf, -1.0, 0.0, 0.1, 0.3, 1e-300, 1e100, 1e308
 COUNTS = -(2**31), -5, -1, 0, 1, 5, 60, 500
 SETTINGS = (
@@ -477,7 +477,7 @@ def test_the_library_has_no_fault_that_checks_would_find(program):
 
 
 def test_the_library_needs_no_hdf5_and_shows_its_functions_only():
-    """Those of the header."""
+    """The functions of the header."""
     path = library()._name
     assert "hdf5" not in ran("ldd", path, check=True).stdout
     listed = ran("nm", "-D", "--defined-only", path, check=True).stdout.split()[2::3]

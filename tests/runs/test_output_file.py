@@ -1,6 +1,6 @@
 """The output file of whole runs: layout, parameters, cadences, and places that are refused.
 
-What its numbers mean is asserted of all systems (test_random_systems.py, tests/unit/).
+The meaning of its numbers is asserted of all systems (test_random_systems.py, tests/unit/).
 """
 
 import time

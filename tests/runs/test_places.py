@@ -1,4 +1,4 @@
-"""What may stand where a run reads and writes: links, pipes, devices, files of others."""
+"""Objects in the places where a run reads and writes: links, pipes, devices, files of others."""
 
 import os
 import shutil
@@ -196,7 +196,7 @@ def put(kind, place, other):
 
 
 def what_stands(place):
-    """What a name stands for, so that it can be compared."""
+    """The object of a name, so that it can be compared."""
     return place.readlink() if place.is_symlink() else place.is_file() and place.read_bytes()
 
 

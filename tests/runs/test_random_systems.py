@@ -41,7 +41,7 @@ KILLED = (STOPPED, -signal.SIGTERM, -signal.SIGKILL)
 NOT_THE_END = ("warning:", "note:", "stopped; the run is finished")
 #: How a system is refused whose disks do not fit into its box.
 NO_ROOM = re.compile(r"species\.(radius|placement|file|position): ")
-#: What does not belong to the results: what says how they were computed.
+#: Data that describe how the results were computed.
 ASIDE = re.compile(
     r"^/parameters(/run@(search|queue)|/overrides|/output@checkpoint_every|/stop@wall_clock)$"
 )
@@ -74,7 +74,7 @@ class Case:
         return end_of(self.begin(name, *options, **more))
 
     def result(self, name: str) -> Path:
-        """What a run left: its finished file, or that of one that broke off."""
+        """The file that a run left: finished, or of a run that broke off."""
         path = self.folder / f"{name}.h5"
         return path if path.exists() else Path(f"{path}.part")
 
@@ -272,7 +272,7 @@ def last_samples(found: dict) -> dict:
 
 
 def faults(program: Path, folder: Path, seed: str) -> str:
-    """What is wrong with a random system; empty if nothing is."""
+    """Faults of a random system; empty if there are none."""
     case = Case(program, folder, seed)
     began = time.monotonic()
     plain = case.whole("plain")

@@ -33,7 +33,7 @@ COLLAPSE = """&box gravity = 0, -1 /
 
 @pytest.fixture(params=["stopped", "finished"])
 def before(request, ricochet, tmp_path):
-    """What a run has left that can go on: the path; its command is COMMAND with a later end."""
+    """Path of the output of a run that can continue, by COMMAND with a later end."""
     write_input(tmp_path, MIXTURE)
     end = AT_ONCE if request.param == "stopped" else ["--set", "stop.time=0.5"]
     run = ricochet(*COMMAND, *end)

@@ -50,7 +50,7 @@ def finished(ricochet, path, *options):
 
 
 def disks_in(path, frame):
-    """What each disk has at a frame."""
+    """The data of each disk at a frame."""
     with h5py.File(path) as file:
         disks = file["particles/disks"]
         moving = ("position", "velocity", "angular_velocity", "orientation")

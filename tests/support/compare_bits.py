@@ -28,7 +28,7 @@ from whole_runs import contents, ran, unlike, write_input  # noqa: E402
 
 SYSTEMS = 60
 
-# What a program of before the names were changed has to read: by group, a pattern and its word.
+# Input for a program with the old names: by group, a pattern and its word.
 OLD_WORDS = {
     "side": {
         r"\bstart_time(?= *=)": "begin",
@@ -87,7 +87,7 @@ def for_old(text: str) -> str:
 
 
 def of_old(found: dict) -> dict:
-    """What a program of before wrote, under the names of now."""
+    """The output of an earlier program under the present names."""
     renamed = dict(found)
     for pattern, words in OLD_VALUES.items():
         for path in filter(re.compile(pattern).fullmatch, found):
@@ -125,7 +125,7 @@ def is_near(name: str, old: dict, new: dict, share: float) -> bool:
 
 
 def compare(programs: tuple[str, str], path: Path, work: Path, share: float) -> list[str]:
-    """What differs between the two programs: how they end, or names in their files."""
+    """Differences between the two programs: their ends, or names in their files."""
     ends, files, text = [], [], path.read_text()
     for name, program in zip(("old", "new"), programs, strict=True):
         output, source = work / name / path.with_suffix(".h5").name, path.resolve()

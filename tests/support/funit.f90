@@ -1,5 +1,5 @@
 !> Runs `.pf` tests where pFUnit is not installed: its rules of comparison, its words, its exit codes.
-!> `translate_pf.py` turns each `@assert` into a call of what is below. What pFUnit refuses does not
+!> `translate_pf.py` turns each `@assert` into a call of what is below. Comparisons that pFUnit refuses do not
 !> compile here either: comparisons exist only for combinations of types that pFUnit accepts.
 module funit
   use, intrinsic :: iso_fortran_env, only: error_unit, int32, int64, output_unit, real64
@@ -12,7 +12,7 @@ module funit
   integer, parameter :: pair_length = 132     !! enough for two numbers; long texts are cut
   character(len=*), parameter :: pair_format = "(""expected <"",g0,""> actual <"",g0,"">"")"
 
-  !> What differs, by the rules of `@assertEqual`; '' if nothing does.
+  !> The first difference by the rules of `@assertEqual`; '' if there is none.
   interface pf_unequal
     module procedure unequal_int32, unequal_int32_int64, unequal_int64, unequal_real64, unequal_logical, unequal_text
   end interface pf_unequal
@@ -168,7 +168,7 @@ contains
     if (adjustl(expected) /= adjustl(actual)) write (pair, pair_format) trim(shown(1)), trim(shown(2))
   end function unequal_text
 
-  !> What differs by more than an absolute tolerance.
+  !> The first difference of more than an absolute tolerance.
   elemental character(len=pair_length) function pf_apart(expected, actual, tolerance) result(pair)
     real(real64), intent(in) :: expected, actual, tolerance
     pair = ""

@@ -30,7 +30,7 @@ class System(NamedTuple):
     draw: "Draw"  #: draws more that fits, for changes
 
     def features(self) -> set[str]:
-        """What it draws: variables, kinds, and how the box is closed."""
+        """Random choices: variables, kinds, and how the box is closed."""
         found = {"many disks"} if self.disks > 2500 else set()
         for group, words in re.findall(r"^&(\w+)(.*)/$", self.text, re.MULTILINE):
             found |= {f"{group}.{name}" for name in re.findall(r"(\w+) =", words)}
@@ -121,7 +121,7 @@ class Draw:
     # --- walls ---
 
     def law(self) -> str:
-        """What one side, wall or obstacle has of its own: often nothing."""
+        """Collision rule of one side, wall or obstacle: often none of its own."""
         rng = self.rng
         if self.chance(0.5):
             return ""

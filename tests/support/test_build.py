@@ -17,7 +17,7 @@ import pytest
 from whole_runs import environment, executable, ran
 
 ROOT = Path(__file__).resolve().parents[2]
-#: What pages lead to and no install brings: see there in a clone.
+#: Files to which pages lead and that are not installed: they are in a clone.
 SOURCES = {"src", "post", "runs", "tests", "CONTRIBUTING.md"}
 PFUNIT_DIR = os.environ.get("PFUNIT_DIR", "")
 SUITE = """module test_it

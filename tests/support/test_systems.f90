@@ -26,7 +26,7 @@ module test_systems
   public :: total_energy, momentum, tightest_gap
   public :: draw_between, draw_vector, draw_magnitude, meeting, time_to_contact
 
-  !> What has to hold in every system holds in these, each feature with and without most others.
+  !> Systems in which all general properties must hold, each feature with and without most others.
   character(len=*), parameter :: systems(*) = [character(len=40) :: "walls", "walls dilute", &
     "walls dense mixture", "walls few", "walls giant bed inelastic", "walls mixture smooth inelastic", &
     "walls gravity mixture", "walls gravity pegs inelastic contact", "walls round mixture", &
@@ -212,7 +212,7 @@ contains
     if (allocated(error)) failure = error%message
   end subroutine evolve
 
-  !> The first difference between two states, to the last bit; '' if there is none. What the search and the
+  !> The first difference between two states, to the last bit; '' if there is none. Data of the search and the
   !> queue note in the disks does not count.
   pure function difference(a, b) result(text)
     type(simulation_t), intent(in) :: a, b

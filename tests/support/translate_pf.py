@@ -25,7 +25,7 @@ class Suite(NamedTuple):
 
 
 ORDER = "pf_unordered(real(e_, pf_real), real(a_, pf_real), e_ {} a_)"
-# What is wrong with `a_` where `e_` is expected.
+# Condition under which `a_` fails where `e_` is expected.
 COMPARISON = {
     "equal": "pf_unequal(e_, a_)",
     "equal within": "pf_apart(e_, a_, {tolerance})",

@@ -106,7 +106,7 @@ def heated(run: Run) -> np.ndarray:
 
 
 def pressed() -> np.ndarray:
-    """What it is on the adiabat; without layers at the walls 1.413 at the end, not 1.462."""
+    """Its value on the adiabat; without layers at the walls 1.413 at the end, not 1.462."""
     radius, widths = sqrt(0.4 / PRESSED_DISKS / pi), np.array([2, 1.75, 1.5, 1.25, 1])
     return np.log(adiabat(widths, 1.0, PRESSED_DISKS, radius, walled=True))[1:]
 

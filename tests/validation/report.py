@@ -133,7 +133,7 @@ def line(*cells: str) -> str:
 
 
 def outcome(cases: list[dict], seconds: float) -> str:
-    """What came out, in one line."""
+    """The result in one line."""
     bad = [case["case"] for case in cases if case["verdict"] != "pass"]
     result = f"failed: {', '.join(bad)}" if bad else "all pass"
     return f"{len(cases)} cases in {seconds / 60:.1f} minutes: {result}"

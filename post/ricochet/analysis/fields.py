@@ -36,7 +36,7 @@ FEWEST_DISKS = 3  # smallest number in a cell without any one block, for kT, str
 LONG = 1.5  # memories in a block
 POINTS = 1 << 16  # in a box with obstacles, to find where centres can be
 ACROSS = SIDES[:2], SIDES[2:]  # the two sides across each axis
-#: What a gas between two walls may be to have a theory.
+#: Traits that a gas between two walls may have where the theory applies.
 LAWFUL = {"walls", "thermal_walls", "unequal_temperatures", "sliding_surfaces"}
 Cells = tuple[int, int]
 

@@ -33,7 +33,7 @@ OUTLINE = 0.12  # width of an outline over the diameter
 LEAST_POINTS = 4.0  # drawn diameter up to which small disks are enlarged
 WALL: dict[str, Any] = {"color": "0.25", "linewidth": 1.2}
 
-#: What disks can be coloured by, apart from their species: label of the scale, and its quantity.
+#: Quantities by which disks can be coloured, apart from species: label and name of the quantity.
 COLOURINGS = {
     "speed": ("speed", "speed"),
     "displacement": ("displacement", "length"),

@@ -309,9 +309,7 @@ class Pictured(Run):
         value = np.asarray(self.simulation.observable(name))
         return Series(np.array([self.simulation.time]), value[None])
 
-    piston_positions = property(
-        Run.piston_positions.func
-    )  # at each look: sides that disks push move on
+    piston_positions = property(Run.piston_positions.func)  # not cached: pistons move
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:

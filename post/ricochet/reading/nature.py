@@ -17,7 +17,7 @@ import numpy as np
 from .files import RunError
 
 ROUNDING = 1e-6  # share of the energy: smaller losses are rounding
-#: What a run may be, and the words in which that is a reason.
+#: Traits of a run, and the words in which each is given as a reason.
 TRAITS = {
     "changed": "was changed while it ran",
     "collapsed": "passed a collapse, and is decided by rounding from then on",
