@@ -66,7 +66,7 @@ def momentum_drift(found: Found) -> float:
     """Largest change of a component of the momentum over the sum of m |v|, where it is kept."""
     drive = found["/parameters/drive@kind"] != b"none"
     kept = of_box(found)[2].all() and not found.get("/parameters/box@shear_rate")
-    if not kept or "/parameters/wall/from" in found or "/parameters/obstacle/centre" in found:
+    if not kept or "/parameters/wall/name" in found or "/parameters/obstacle/name" in found:
         return 0.0
     if drive and not found.get("/parameters/drive@keep_momentum"):
         return 0.0
@@ -130,18 +130,29 @@ def wall_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
             yield inwards - shift_of(found, name, time) - radius, radius
     images = [np.array([x, y]) * edges for x in (-1, 0, 1) for y in (-1, 0, 1)]
     images = [image for image in images if not image[~periodic].any()]
-    circles, walls = (
-        [found.get(f"/parameters/{kind}/{name}", ()) for name in names]
-        for kind, names in (("obstacle", ("centre", "radius", "inside")), ("wall", ("from", "to")))
-    )
+    circles, circle_groups = rows_of(found, "obstacle", "centre", "radius")
+    walls, _ = rows_of(found, "wall", "from", "to")
+    insides = np.array(found.get("/parameters/obstacle/inside", ()))[circle_groups]
     for image in images:
-        for centre, size, inside in zip(*circles, strict=True):
+        for centre, size, inside in zip(*circles, insides, strict=True):
             away = np.linalg.norm(place - centre - image, axis=1) - size
             yield (-away if inside else away) - radius, radius
         for begin, end in zip(*walls, strict=True):
             along, start = end - begin, place - begin - image
             part = np.clip(start @ along / (along @ along), 0, 1)
             yield np.linalg.norm(start - part[:, None] * along, axis=1) - radius, radius
+
+
+def rows_of(found: Found, kind: str, *names: str) -> tuple[list, np.ndarray]:
+    """Some values of all circles or straight walls, and the number of the group of each, from 0.
+
+    They stand in a table of their own where a group has more than one.
+    """
+    table = f"/parameters/{kind}_rows"
+    if f"{table}/group" in found:
+        return [found[f"{table}/{name}"] for name in names], found[f"{table}/group"] - 1
+    values = [found.get(f"/parameters/{kind}/{name}", ()) for name in names]
+    return values, np.arange(len(values[0]))
 
 
 def shift_of(found: Found, side: str, time: float) -> float:
@@ -180,9 +191,13 @@ def log_error(found: Found) -> float:
     if "/events/j" not in found:
         return 0.0
     i, j = found["/events/i"], found["/events/j"]
-    walls = [(-k, f"sides/{name}") for k, name in enumerate(SIDES)]
-    names = [*found.get("/parameters/obstacle/name", ()), *found.get("/parameters/wall/name", ())]
-    walls += [(-4 - k, f"obstacles/{name.decode()}") for k, name in enumerate(names)]
+    codes = {f"sides/{name}": [-k] for k, name in enumerate(SIDES)}
+    code = -len(SIDES)
+    for kind, place in (("obstacle", "centre"), ("wall", "from")):
+        names = found.get(f"/parameters/{kind}/name", ())
+        for group in rows_of(found, kind, place)[1]:  # several rows have one code each, and one sum
+            codes.setdefault(f"obstacles/{names[group].decode()}", []).append(code)
+            code -= 1
     change = found["/events/momentum_change"]
     wrong = [np.sum(np.diff(found["/events/time"]) < 0)]
     wrong.append(np.sum(j > 0) - series(found, "collisions")[-1])
@@ -190,11 +205,12 @@ def log_error(found: Found) -> float:
         of_disks = found["/particles/disks/event_count/value"][-1]
         mine = np.bincount(np.concatenate([i, j[j > 0]]), minlength=len(of_disks) + 1)
         wrong += list(mine[1:] - of_disks)
-    for code, name in walls:
+    for name, rows in codes.items():
         count, last = series(found, f"{name}/collisions"), series(found, f"{name}/impulse")
         if len(count):
-            wrong.append(np.sum(j == code) - count[-1])
-            mine = change[j == code]
+            struck = np.isin(j, rows)
+            wrong.append(np.sum(struck) - count[-1])
+            mine = change[struck]
             scale = 1e-12 * np.abs(mine).sum() + 1e-300
             wrong += list((mine.sum(axis=0) + last[-1]) / scale)
     return max(np.abs(wrong))

@@ -38,7 +38,7 @@ PARTS = 5
 BYTES = os.environ.get("BYTES", "4000000000")  # of address space
 LATEST = 1e100  # that an input can name
 KILLED = (STOPPED, -signal.SIGTERM, -signal.SIGKILL)
-NOT_THE_END = ("warning:", "note:", "stopped; the run is finished")
+NOT_THE_END = ("placing disks:", "warning:", "note:", "stopped; the run is finished")
 #: How a system is refused whose disks do not fit into its box.
 NO_ROOM = re.compile(r"species\.(radius|placement|file|position): ")
 #: Data that describe how the results were computed.
@@ -317,15 +317,16 @@ def test_all_ways_end_alike_and_the_laws_hold(program, tmp_path, seed):
 
 #: Variables that say how a run is done, or need another run.
 NOT_DRAWN = {"run.title", "run.search", "run.queue", "run.threads", "stop.wall_clock"}
-NOT_DRAWN |= {"species.scale_positions", "stop.at_rest", "obstacle.file"}
-NOT_DRAWN |= {"wall.file", "wall.points"}
+NOT_DRAWN |= {"species.scale_positions", "obstacle.file"}
+NOT_DRAWN |= {"wall.file"}
 #: Features that are refused together, or of which a system has only one.
 APART = [
     ("box.shear_rate", r"obstacle|wall|side|box\.gravity|run\.d|stop\.energy"),
     (
-        r"stop\.energy",
+        r"stop\.(energy|at_rest)",
         r"drive|box\.shear|(side|wall|obstacle)\.(temp|surf)|side\.[aefmpv]|side\.start",
     ),
+    (r"stop\.at_rest", r"run\.d|contact\.contact_time|restitution = 1"),
     (r"obstacle|wall\.", r"species\.(file|position|grid|placement = (lattice|dense))"),
     (r"species\.(file|position)", r"species|contact\.pair|many"),
     (r"species\.(grid|placement = |packing)", r"species\.(grid|placement = |packing)|many"),

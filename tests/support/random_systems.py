@@ -74,6 +74,8 @@ class Draw:
         self.driven = self.chance(0.3)
         self.falls = self.chance(0.3) and not all(self.periodic)
         self.sheared = all(self.periodic) and not self.steps and self.chance(0.5)
+        self.loses = False  # energy in each collision
+        self.bouncing = False  # for ever, by a contact time
         self.worked = False  # by walls: the energy that is left says nothing
         self.drifts = all(self.periodic)  # all disks together, for ever, if none moves at random
         self.columns: list[str] = []
@@ -203,6 +205,10 @@ class Draw:
                     two[axis] = one[axis]
                 name = self.maybe(0.3, f"name = 'w{k}'")
                 ends = f" from = {numbers(*one)} to = {numbers(*two)}"
+                if self.chance(0.3):  # a triangle, or a polyline whose ends are apart
+                    last = rng.choice([one, self.place(rng.random(), rng.random())])
+                    middle = self.place(rng.random(), rng.random())
+                    ends = f" points = {numbers(*one, *two, *middle, *last)}"
                 groups.append(f"&wall{name}{ends}{self.law()} /")
         if self.chance(0.15) and not any(self.periodic):
             size = f"centre = {numbers(*self.place(0.5, 0.5))} radius = {0.5 * small!r}"
@@ -354,6 +360,7 @@ class Draw:
     def contact(self) -> str:
         rng = self.rng
         restitution = max(self.least, rng.choice([0, 0, 1, 1, 0.5, 0.9, 0.99, rng.random()]))
+        self.loses = restitution < 1
         words = f"&contact restitution = {restitution}"
         if self.kinds > 1 and self.chance(0.4):
             table = [[rng.choice([0, 1, 0.9, rng.random()]) for _ in range(6)] for _ in range(6)]
@@ -375,6 +382,7 @@ class Draw:
             words += self.maybe(0.4, f"inertia = {rng.choice([1, 0.01, rng.uniform(0.1, 1)])}")
         if self.chance(0.6 if restitution < 1 else 0.1):
             size = math.sqrt(math.prod(self.edges) / self.disks)
+            self.bouncing = True
             words += f" contact_time = {size / self.speed * 10.0 ** -rng.randint(1, 5)!r}"
         return words + " /"
 
@@ -412,6 +420,8 @@ class Draw:
         words += self.maybe(0.2, f"collisions_per_disk = {rate!r}")
         if not (self.driven or self.sheared or self.worked):
             words += self.maybe(0.3, f"energy_fraction = {rng.uniform(0.05, 0.95)!r}")
+            if self.loses and not (self.bouncing or self.steps):
+                words += self.maybe(0.5, " at_rest = .true.")
         if self.chance(0.3) or self.steps or self.driven or self.drifts or self.disks < 4:
             words += f" time = {rng.uniform(0.01, 1) * min(self.edges) / self.speed!r}"
         return words + " /"
