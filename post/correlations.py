@@ -55,7 +55,13 @@ from ricochet.analysis.structure import (
     pair_correlation,
     structure_factor,
 )
-from ricochet.analysis.thermodynamics import FLUID, all_settle, later, mean_free_time
+from ricochet.analysis.thermodynamics import (
+    FLUID,
+    all_settle,
+    later,
+    mean_free_time,
+    motion_notes,
+)
 from ricochet.figures.drawing import band, caption, colours, dilute_limit, noise_band, plt
 from ricochet.predictions.theory import RELAXATION
 from ricochet.reading.nature import Refused, allow
@@ -71,6 +77,7 @@ RESTLESS = (
     "pair_restitution",
     "unequal_temperatures",
     "noise_driven",
+    "random_walk",
     "active",
     "sliding_surfaces",
 )
@@ -346,6 +353,7 @@ def main() -> None:
     groups = by_packing(args.runs)
     results = [analysed(members, args.equilibration, args.wavenumber) for _, members in groups]
     rows, notes = table(groups, results)
+    notes += motion_notes(args.runs)
     if not all("vacf" in found.curves for found in results):
         notes.append("no steady state without flow: no memory and no diffusion coefficient")
     figure = draw(groups, results, rows, args.wavenumber)

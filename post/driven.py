@@ -62,7 +62,8 @@ def temperature(run: Run) -> Curves:
 def noise_law(run: Run) -> float | None:
     """Return the temperature at which driving balances dissipation."""
     drive = run.parameters.get("drive", {})
-    known = {"noise_driven", "inelastic"} <= run.nature <= {"noise_driven", "inelastic", "rotating"}
+    needs = {"noise_driven", "inelastic"}
+    known = needs <= run.nature <= needs | {"rotating", "random_walk"}
     if not known or drive.get("species"):
         return None
     gas = packing(run), 2 * run.radius[0], run.mass[0]
@@ -199,6 +200,9 @@ def viscosity(run: Run) -> Curves:
     """Return -P_xy over the shear rate."""
     if "sheared" not in run.nature:
         raise Refused(f"{run.path}: is not sheared; a viscosity takes box.shear_rate")
+    if "random_walk" in run.nature:
+        why = "noise moves its centre of mass through the flow, and so changes the stress"
+        raise Refused(f"{run.path}: {why}; set drive.keep_momentum = .true.")
     time, first = np.unique(run.observable("kinetic_tensor").time, return_index=True)
     flown, handed = (run.observable(f"{k}_tensor").value[first, 1] for k in ("kinetic", "virial"))
     stress = (flown[1:] + flown[:-1]) / 2 + np.diff(handed) / np.diff(time)

@@ -31,6 +31,7 @@ from ricochet import Run
 from ricochet.analysis.fields import ACROSS, fields, has_theory, places, prediction
 from ricochet.analysis.statistics import Estimate
 from ricochet.analysis.streams import stream_function
+from ricochet.analysis.thermodynamics import motion_notes
 from ricochet.figures.drawing import band, draw_box, plt, titled
 from ricochet.reading.reader import SIDES
 from ricochet.reading.units import Units
@@ -214,7 +215,8 @@ def main() -> None:
     if len(cells) != 2:
         parser.error("--cells takes one number, --grid two")
     cooling = [run.path.name for run in runs if run.nature.cooling]
-    notes = [f"{name} loses energy and gets none: means of what is not steady" for name in cooling]
+    notes = motion_notes(runs)
+    notes += [f"{name} loses energy and gets none: means of what is not steady" for name in cooling]
     own = fields(runs, args.equilibration, cells)
     found = own.found
     middles = places(runs[0], cells)

@@ -182,7 +182,7 @@ def table(runs: list[Run], start: float, means: dict, path: Estimate | None) -> 
     begin = "equilibrium_from" if means else "from_time"
     exact = {"packing": td.packing(runs[0]), begin: start}
     momentum = np.mean([td.drift(run) * run.mass.sum() for run in runs], axis=0)
-    axes = zip(("momentum_x", "momentum_y"), momentum, td.conserved(runs[0]), strict=True)
+    axes = zip(("momentum_x", "momentum_y"), momentum, td.comoving(runs[0]), strict=True)
     exact |= {name: float(value) for name, value, kept in axes if kept}
     rows = [(name, value, "exact", "") for name, value in exact.items()]
     rows += [("mean_free_path", path.mean, float(path.error), "")] if path else []

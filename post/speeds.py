@@ -42,6 +42,7 @@ from ricochet.analysis.statistics import (
     correlated_mean,
     rounded_to_error,
 )
+from ricochet.analysis.thermodynamics import motion_notes
 from ricochet.figures.drawing import bars, caption, colours, dilute_limit, noise_band, plt
 from ricochet.predictions.theory import RELAXATION, maxwell_cdf, maxwell_pdf
 from ricochet.reading.nature import TRAITS, Refused, allow
@@ -274,7 +275,7 @@ def main() -> None:
         pooled(runs, own, state, kts)
         for (_, runs), own, kts in zip(groups, picked, found, strict=True)
     ]
-    data, notes = {"u_low": BINS[:-1], "u_high": BINS[1:]}, []
+    data, notes = {"u_low": BINS[:-1], "u_high": BINS[1:]}, motion_notes(args.runs)
     for (count, _), (density, row) in zip(groups, pools, strict=True):
         data[f"density_N{count}"], data[f"density_error_N{count}"] = density
         if state in (COOLING, UNSTEADY):

@@ -4,7 +4,7 @@ module input_settings
   use box_geometry, only: box_t
   use collisions, only: tangential_law_t, restitution_laws, series_terms, wall_law_t, wall_rules
   use disks, only: names_of
-  use drive, only: drive_kinds
+  use drive, only: drive_kinds, noise
   use input_groups, only: group_t, range_of
   use input_problems, only: problem_list_t
   use input_species, only: take_species
@@ -134,7 +134,7 @@ contains
         drive%kind = place_of(group%text_of("kind"), words_of(drive_kinds))
         drive%interval = group%real_of("interval", never)
         drive%strength = group%real_of("strength", 0.0_real64)
-        drive%keep_momentum = group%text_of("keep_momentum") == ".true."
+        drive%keep_momentum = drive%kind == noise .and. group%text_of("keep_momentum") == ".true."
         drive%fraction = group%real_of("fraction", 1.0_real64)
         drive%temperature = group%real_of("temperature", 0.0_real64)
         drive%speed = group%real_of("self_propulsion_speed", 0.0_real64)
@@ -252,6 +252,8 @@ contains
         "elastic collisions"//other_rule//", or a restitution below 1")
       call refuse(single .and. counted .and. .not. (timed .or. by_energy .or. rule%events < unlimited), "stop.collisions", &
         "a single disk (species.count), which has no collision partner; give time or events")
+      call refuse(settings%drive%keep_momentum .and. settings%n_driven() == 1, "drive.keep_momentum", &
+        "a single driven disk, whose velocity would never change; set it to .false.")
       call refuse(alone .and. (shear .or. kicks) .and. .not. timed, "stop", &
         "a single disk in a periodic box that is sheared (box.shear_rate) or driven (drive.kind): no event ever occurs; give time")
     end associate

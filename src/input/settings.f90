@@ -95,6 +95,7 @@ module settings
     type(output_settings_t) :: output
   contains
     procedure :: n_disks
+    procedure :: n_driven
     procedure :: choose_features
     procedure :: wants_domains
   end type settings_t
@@ -119,6 +120,15 @@ contains
 
     n = sum(int(self%species%count, int64))
   end function n_disks
+
+  !> The number of disks that are driven.
+  pure function n_driven(self) result(n)
+    class(settings_t), intent(in) :: self
+    integer(int64) :: n
+    integer :: k
+
+    n = sum(int(self%species%count, int64), mask=self%drive%acts_on([(k, k=1, size(self%species))]))
+  end function n_driven
 
   !> Decides what the disks have and what is summed, when starting files have been looked at.
   pure subroutine choose_features(self)

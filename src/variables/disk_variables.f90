@@ -142,7 +142,7 @@ module disk_variables
     variable_t("drive", "strength", "real", 1, "required", "0.1", &
       "Strength of the noise: growth per time of the variance of each velocity component, the same for all masses.", &
       positive, "velocity**2/time", goes_with="kind noise", may_change=in_motion), &
-    variable_t("drive", "keep_momentum", "logical", 1, "fallback", ".false.", &
+    variable_t("drive", "keep_momentum", "logical", 1, "fallback", ".true.", &
       "Conservation of the total momentum of the driven disks: the mean velocity that a kick would add is subtracted from " &
       //"it.", goes_with="kind noise", may_change=in_motion), &
     variable_t("drive", "fraction", "real", 1, "required", "0.1", &

@@ -412,3 +412,13 @@ def test_chattering_and_crushing_is_a_collapse(ricochet, tmp_path, floor, disk, 
     )
     run = ricochet("gas.nml", "-o", "gas.h5")
     assert run.returncode == BROKEN and "inelastic collapse" in one_line(run)
+
+
+def test_noise_leaves_the_centre_of_mass_alone_unless_told_otherwise(ricochet, tmp_path):
+    text = """&box boundary = 'periodic', 'periodic' / &species count = 30 radius = .02 /
+        &drive kind = 'noise' interval = .01 strength = 1 / &stop time = 1 /"""
+    for setting, kept in (([], True), (["--set", "drive.keep_momentum=.false."], False)):
+        path = write_input(tmp_path, text)
+        assert ricochet(path, *setting, "--force", "-o", "run.h5").returncode == FINISHED
+        momentum = read_run(tmp_path / "run.h5").observable("momentum").value
+        assert (np.ptp(momentum, axis=0).max() < 1e-9) == kept

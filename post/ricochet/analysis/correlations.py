@@ -14,7 +14,8 @@ for "all" disks; r is the displacement of a disk from t0 to t:
     overlap    share of the disks with r < `reach` [0.3 mean diameters]
     F_s(k)     <J0(k r)>, the mean of exp(i k r) over all directions, for each k of `waves`
 
-Displacements are relative to the centre of mass along axes where its velocity is conserved.
+Displacements and velocities are relative to the centre of mass along axes where its velocity is
+conserved, or performs a random walk that noise drives (drive.keep_momentum = .false.).
 
 In each twelfth of a power of ten the lag is used that most pairs of samples have, so that samples
 at equal steps, in decades, in bursts, or a mixture of these are all exploited.  In each sixteenth
@@ -38,7 +39,7 @@ from ..reading.nature import KICKED, TRAITS, allow
 from ..reading.reader import Run
 from ..running.simulation import Simulation
 from .statistics import FEWEST, Curve, Estimate, estimate, correlated_mean
-from .thermodynamics import ALONG_WALLS, later, refuse_others, unmoved
+from .thermodynamics import ALONG_WALLS, later, refuse_others, unforced
 
 __all__ = [
     "Correlator",
@@ -160,7 +161,7 @@ class Correlator:
         self.reach = REACH * 2 * float(source.radius.mean()) if reach is None else float(reach)
         self.kicked = bool(source.nature & KICKED)
         walls = "walls" in source.nature and source.nature & ALONG_WALLS
-        self.kept = unmoved(source) & (not walls)
+        self.kept = unforced(source) & (not walls)
         names = source.names if isinstance(source, Run) else source.parameters["species"]
         self.mass, self.names = source.mass, ("all", *names)
         species = np.arange(len(self.names))

@@ -19,7 +19,7 @@ from ..reading.files import RunError
 from ..reading.reader import SIDES, Run
 from .statistics import Estimate, statistical_inefficiency, student
 from .structure import periods
-from .thermodynamics import after_start, free_disks, refuse_others
+from .thermodynamics import after_start, free_disks, refuse_others, unforced
 
 __all__ = [
     "Fields",
@@ -120,13 +120,23 @@ def steady_frames(run: Run, skip: float | None) -> list[int]:
     return frames
 
 
+def own_motion(run: Run, frames: list[int]) -> np.ndarray:
+    """Return velocities (F, N, 2) relative to the sheared profile, and to a centre that walks."""
+    v = run.velocity[frames]
+    if run.shear_rate:
+        height = run.position[frames][..., 1] - run.lower[1]
+        v[..., 0] -= run.shear_rate * (height - run.edges[1] / 2)
+    if "random_walk" in run.nature:
+        v -= (unforced(run) * np.average(v, axis=1, weights=run.mass))[:, None]
+    return v
+
+
 def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
     """Return the largest statistical inefficiency of slow quantities, in frames.
 
     These are mass, momentum and energy, in total and in their longest waves across the cells.
     """
-    place, v = (run.position[frames] - run.lower) / run.edges, run.velocity[frames]
-    v[..., 0] -= run.shear_rate * run.edges[1] * (place[..., 1] - 0.5)
+    place, v = (run.position[frames] - run.lower) / run.edges, own_motion(run, frames)
     waves, found = [np.ones(place.shape[:2])], 1.0
     for axis in np.flatnonzero(np.array(cells) > 1):
         angle = np.pi * (1 + run.periodic[axis]) * place[..., axis]
@@ -247,14 +257,14 @@ def sums(block: Block, cells: Cells, areas: list[np.ndarray]) -> np.ndarray:
     """Return sums (12, C) over the disks of some frames in each cell.
 
     They are the numbers of frames and of disks, disks per area, and the sums of m, m v, m v v (xx,
-    xy, yy), m v^2 v / 2 and I omega^2.  In a sheared box v is relative to the profile.
+    xy, yy), m v^2 v / 2 and I omega^2.  In a sheared box v is relative to the profile; where noise
+    moves the centre of mass, v is relative to that.
     """
     run, frames, _ = block
     place = run.position[frames].reshape(-1, 2) - run.lower
     cell = np.clip((place / run.edges * cells).astype(int), 0, np.array(cells) - 1) @ (1, cells[0])
     mass, count = np.tile(run.mass, len(frames)), int(np.prod(cells))
-    x, y = run.velocity[frames].reshape(-1, 2).T
-    x = x - run.shear_rate * (place[:, 1] - run.edges[1] / 2)
+    x, y = own_motion(run, frames).reshape(-1, 2).T
     square = mass * (x**2 + y**2) / 2
     area = np.array(areas)[np.tile(run.species - 1, len(frames)), cell]
     dense = 1 / np.where(area > 0, area, run.edges.prod() / np.prod(cells))  # beyond a moving side

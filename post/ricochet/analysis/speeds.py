@@ -9,7 +9,7 @@ from ..reading.arrays import Index, chosen
 from ..reading.nature import Refused
 from ..reading.reader import Run
 from .statistics import Estimate, estimate, excess_kurtosis, correlated_mean
-from .thermodynamics import conserved, drift, free_disks
+from .thermodynamics import comoving, free_disks, thermal_energy
 
 __all__ = [
     "exact_law",
@@ -21,18 +21,6 @@ __all__ = [
 ]
 
 MEMORY = 5.0  # collisions per disk after which a speed is independent
-
-
-def thermal_energy(run: Run, frames: Index) -> np.ndarray:
-    """Return m v^2 / 2 (F, N) with v relative to the flow and to the conserved drift."""
-    frames = chosen(run.n_frames, frames)
-    velocity = run.velocity[frames]
-    if run.shear_rate:
-        velocity[..., 0] -= run.shear_rate * run.position[frames][..., 1]
-        velocity -= np.average(velocity, axis=1, weights=run.mass)[:, None]
-    else:
-        velocity -= drift(run)
-    return 0.5 * run.mass * np.sum(velocity**2, axis=-1)
 
 
 def kt_of_frames(run: Run, frames: Index) -> np.ndarray:
@@ -186,7 +174,7 @@ def exact_law(run: Run) -> Law | None:
     >>> float(speeds.exact_law(run)(0.0))
     0.0
     """
-    axes = int(conserved(run).sum())
+    axes = int(comoving(run).sum())
     free = not run.nature.keeps_kinetic_energy or run.n_disks < 2 + axes / 2
     if free or "round_container" in run.nature or axes == 1 or (axes == 2 and np.ptp(run.mass) > 0):
         return None

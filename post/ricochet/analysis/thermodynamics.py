@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..predictions import hard_disks
+from ..reading.arrays import Index, chosen
 from ..reading.files import RunError
 from ..reading.nature import KICKED, ROUNDING, SETTLED, Refused, allow
 from ..reading.reader import SIDES, Run, Species
@@ -156,15 +157,16 @@ def examined(run: Run) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     if len(run.names) == 1 and run.nature.keeps_kinetic_energy:
         return time, series
     if few:
-        energy = np.array([run.kinetic_energy(frame) for frame in range(1, run.n_frames)])
+        energy = np.concatenate([thermal_energy(run, [k]) for k in range(1, run.n_frames)])
         return time, series | {
             f"kinetic energy of {kind.name}": energy[:, kind.disks].mean(axis=1)
             for kind in run.by_species
         }
+    kinetic = "temperature" if "random_walk" in run.nature else "kinetic_energy"
     for name in sorted(run.names):
-        for kind in ("kinetic", "potential", "rotational"):
-            if (known := f"{name}/{kind}_energy") in run.observables:
-                series[f"{kind} energy of {name}"] = run.observable(known).value[1:]
+        for kind in (kinetic, "potential_energy", "rotational_energy"):
+            if (known := f"{name}/{kind}") in run.observables:
+                series[f"{kind.replace('_', ' ')} of {name}"] = run.observable(known).value[1:]
     return time, series
 
 
@@ -248,29 +250,55 @@ def later(run: Run, skip: float | None = None) -> slice:
 # --- temperature ---
 
 
-def unmoved(source: Run | Simulation) -> np.ndarray:
-    """Return along which axes (2,) nothing changes the total momentum, of a run or a simulation.
+def motion_notes(runs: Sequence[Run]) -> list[str]:
+    """Return the note that all motion is relative to the centre of mass, if noise moves that."""
+    walks = any("random_walk" in run.nature for run in runs)
+    note = "noise moves the centre of mass (drive.keep_momentum): motion is measured relative to it"
+    return [note] * walks
+
+
+def unforced(source: Run | Simulation) -> np.ndarray:
+    """Return along which axes (2,) nothing but noise changes the total momentum.
 
     Walls along the axis are not considered; they conserve it unless the run has `ALONG_WALLS`.
+    Refused is a run whose centre of mass noise moves and such walls may stop.
     """
-    box, drive = source.parameters.get("box", {}), source.parameters.get("drive", {})
-    kicked = source.nature & KICKED and not drive.get("keep_momentum", False)
-    if kicked or source.nature & {"obstacles", "sheared", "changed"}:
+    box, nature = source.parameters.get("box", {}), source.nature
+    if nature & (KICKED - {"noise_driven"}) or nature & {"obstacles", "changed"}:
         return np.zeros(2, dtype=bool)
-    return (np.array(box["boundary"]) == "periodic") & (np.array(box.get("gravity", 0.0)) == 0)
+    axes = (np.array(box["boundary"]) == "periodic") & (np.array(box.get("gravity", 0.0)) == 0)
+    if axes.any() and "random_walk" in nature and "walls" in nature and nature & ALONG_WALLS:
+        name = getattr(source, "path", "the simulation")
+        why = "noise moves its centre of mass, and walls may stop it"
+        raise Refused(f"{name}: {why}; set drive.keep_momentum = .true.")
+    return axes & ("sheared" not in nature or "random_walk" in nature)
 
 
-def conserved(run: Run) -> np.ndarray:
-    """Return along which axes (2,) the total momentum is conserved."""
-    kept = unmoved(run)
-    if run.nature & ALONG_WALLS:
+def comoving(run: Run) -> np.ndarray:
+    """Return along which axes (2,) all motion is measured relative to the centre of mass.
+
+    Along these the total momentum is conserved, or changes by noise alone.
+    """
+    kept = unforced(run)
+    if run.nature & ALONG_WALLS and "random_walk" not in run.nature:
         carried = run.mass[:, None] * run.velocity[[0, -1]]
         kept &= np.abs(np.ptp(carried.sum(axis=1), axis=0)) < ROUNDING * np.abs(carried).sum()
     return kept
 
 
+def thermal_energy(run: Run, frames: Index) -> np.ndarray:
+    """Return m v^2 / 2 (F, N) with v relative to the flow and, where `comoving`, to the mean."""
+    frames = chosen(run.n_frames, frames)
+    velocity = run.velocity[frames]
+    if run.shear_rate:
+        velocity[..., 0] -= run.shear_rate * run.position[frames][..., 1]
+    axes = comoving(run) | bool(run.shear_rate)
+    velocity -= axes * np.average(velocity, axis=1, weights=run.mass)[:, None]
+    return 0.5 * run.mass * np.sum(velocity**2, axis=-1)
+
+
 def free_disks(run: Run) -> float:
-    """Return N, less a half for each axis along which the total momentum is conserved.
+    """Return N, less a half for each axis along which motion is relative to the centre of mass.
 
     Parameters
     ----------
@@ -287,13 +315,13 @@ def free_disks(run: Run) -> float:
     >>> thermodynamics.free_disks(run)
     63.0
     """
-    return float(run.n_disks - conserved(run).sum() / 2)
+    return float(run.n_disks - comoving(run).sum() / 2)
 
 
 def drift(run: Run) -> np.ndarray:
     """Return the conserved velocity (2,) of the centre of mass; 0 along other axes."""
     centre = np.average(run.velocity[0], axis=0, weights=run.mass)
-    return np.where(conserved(run), centre, 0.0)
+    return np.where(comoving(run), centre, 0.0)
 
 
 def kt_of(run: Run, energy: np.ndarray) -> np.ndarray:

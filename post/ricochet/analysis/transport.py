@@ -72,7 +72,7 @@ def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
 
     They are relative to the centre of mass where its velocity is conserved.
     """
-    kept = td.conserved(run)
+    kept = td.comoving(run)
     place, velocity = (
         values - kept * np.average(values, axis=1, weights=run.mass, keepdims=True)
         for values in (run.unwrapped(frames), run.velocity[frames])

@@ -24,6 +24,7 @@ TRAITS = {
     "time_stepped": "is made by time steps",
     "sheared": "is sheared (box.shear_rate)",
     "noise_driven": "is heated by noise (&drive)",
+    "random_walk": "has a centre of mass that noise moves (drive.keep_momentum)",
     "active": "has disks that drive themselves (&drive)",
     "moving_sides": "has sides that move",
     "piston": "has sides that disks push",
@@ -139,6 +140,9 @@ def nature_of(
         "time_stepped": parameters.get("run", {}).get("dynamics") == "steps",
         "sheared": box.get("shear_rate", 0.0) != 0,
         "noise_driven": kind == "noise",
+        "random_walk": kind == "noise"
+        and not drive.get("keep_momentum", False)
+        and drifts(parameters),
         "active": kind == "active",
         "moving_sides": bool(motions - {"still", "piston"}),
         "piston": "piston" in motions,
@@ -168,6 +172,15 @@ def nature_of(
     )
     found["round_container"] = held_round(parameters) and not any(found[name] for name in torques)
     return Nature(name for name, there in found.items() if there)
+
+
+def drifts(parameters: Mapping[str, Any]) -> bool:
+    """Whether along some axis nothing in the box acts on the centre of mass."""
+    if "obstacle" in parameters or "wall" in parameters:
+        return False
+    box = parameters.get("box", {})
+    periodic = np.array(box.get("boundary", ("wall", "wall"))) == "periodic"
+    return bool(np.any(periodic & (np.array(box.get("gravity", (0.0, 0.0))) == 0)))
 
 
 def held_round(parameters: Mapping[str, Any]) -> bool:

@@ -23,7 +23,7 @@ import numpy as np
 
 from .arrays import Index, as_index
 from .files import RunError, Unsound, did_you_mean, open_file, tree
-from .nature import Nature, nature_of
+from .nature import TRAITS, Nature, allow, nature_of
 from .units import UNNAMED, Units
 
 if TYPE_CHECKING:
@@ -719,6 +719,7 @@ class Run:
         """
         if self.shear_rate:
             return float(np.trace(self.pressure_tensor(t1, t2)) / 2)
+        allow(self, "its kinetic energy is no pressure", *TRAITS.keys() - {"random_walk"})
         time, kinetic = self._between("all/kinetic_energy", t1, t2)
         virial = np.diff(self._between("virial", t1, t2).value[[0, -1]])[0]
         duration, area = time[-1] - time[0], time_mean(time, self.accessible_area(time))
@@ -751,6 +752,7 @@ class Run:
         >>> bool(np.isclose(np.trace(tensor) / 2, run.pressure(0, run.time[-1])))
         True
         """
+        allow(self, "its kinetic energy is no pressure", *TRAITS.keys() - {"random_walk"})
         time, kinetic = self._between("kinetic_tensor", t1, t2)
         virial = np.subtract(*self._between("virial_tensor", t1, t2).value[[-1, 0]])
         duration, area = time[-1] - time[0], time_mean(time, self.accessible_area(time))
