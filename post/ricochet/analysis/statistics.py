@@ -129,6 +129,7 @@ def goodness_of_fit(
     )
 
 
+MANY = 1e12  # degrees of freedom: as good as known
 ONE_SIGMA = float(scipy.special.ndtr(1))  # importing scipy.stats takes a second
 
 
@@ -150,7 +151,7 @@ def student(samples: ArrayLike) -> Any:
     >>> round(float(student(4)), 3)
     1.197
     """
-    return scipy.special.stdtrit(np.maximum(1.0, np.subtract(samples, 1.0)), ONE_SIGMA)
+    return scipy.special.stdtrit(np.clip(np.subtract(samples, 1.0), 1.0, MANY), ONE_SIGMA)
 
 
 def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
@@ -213,6 +214,8 @@ def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estim
 
 FINE, COARSE = 64, 16  # parts of a series; their means resolve slow modes
 FEWEST = 8  # smallest number of independent samples for an error
+LEAST_WAVES, MOST_WAVES = 2, 8  # of the slow waves in a series that its error is from
+PER_WAVE = 6  # largest number of these waves times the statistical inefficiency, over the length
 
 
 class SeriesMean(NamedTuple):
@@ -221,7 +224,8 @@ class SeriesMean(NamedTuple):
     mean: float
     error: float  # half the 68 % interval; NaN if worth fewer than `FEWEST` samples
     samples: float  # number of independent samples
-    drift: float  # second half less first half, over the error of that difference
+    drift: float  # slope over its error, as a Gaussian number of variance 1 if there is none
+    freedom: float = np.inf  # degrees of freedom of the error
 
     def scaled(self, factor: float, offset: float = 0.0) -> "SeriesMean":
         """Return the mean of offset + factor x."""
@@ -276,8 +280,7 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
 def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
     """Estimate the mean of a correlated series, or the ratio of the sums of two series.
 
-    The error is that of the mean of amount - ratio * per, from the autocorrelation of its means
-    over a few parts of the series, with Student's t.
+    The error is that of the mean of amount - ratio * per, from the slowest waves in that series.
 
     Parameters
     ----------
@@ -307,18 +310,31 @@ def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> Series
     if worth < FEWEST:
         return SeriesMean(mean, np.nan, worth, 0.0)
     rest = (amount - mean * per) / np.mean(per)
-    coarse = cells(rest, COARSE)
-    least = min(
-        1.0, statistical_inefficiency(cells(rest, FINE))
-    )  # few parts may look anticorrelated
-    free = len(coarse) / statistical_inefficiency(coarse, least)
-    error = float(np.std(coarse, ddof=1) / np.sqrt(free))
+    error, freedom, drift = slow_waves(rest)
     if not error > 1e-12 * np.max(np.abs(amount)) / np.mean(per):  # constant up to rounding
         return SeriesMean(mean, 0.0, float(len(rest)), 0.0)
-    early, late = (half.mean() for half in np.array_split(rest, 2))
     samples = min(float(len(rest)), float(np.var(rest)) / error**2)
-    interval = error * float(student(min(free, len(coarse))))
-    return SeriesMean(mean, interval, samples, float(late - early) / (2 * error))
+    return SeriesMean(mean, error * float(student(freedom + 1)), samples, drift, freedom)
+
+
+def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
+    """Return the standard error of the mean of a series (T,), its freedom, and the drift.
+
+    The square of the error is the mean square of the first coefficients of the cosine transform
+    over the length: E. Lazarus, D. J. Lewis, J. H. Stock and M. W. Watson, J. Bus. Econ. Stat. 36,
+    541 (2018).  There are so few of them that their waves are slow for the series.  The drift is
+    the first coefficient over the next ones.
+    """
+    parts = cells(series, FINE)
+    per_sample = max(1e-9, statistical_inefficiency(parts))
+    most = min(MOST_WAVES, len(parts) // 2)
+    waves = int(np.clip(len(parts) / (PER_WAVE * per_sample), LEAST_WAVES, most))
+    height = scipy.fft.dct(parts, norm="ortho")[1 : waves + 2]
+    error = np.sqrt(np.mean(height[:-1] ** 2) / len(parts))
+    others = np.sqrt(np.mean(height[1:] ** 2))
+    slope = -height[0] / others if others > 0 else 0.0
+    chance = scipy.special.stdtr(waves, -abs(slope))
+    return float(error), waves, float(np.copysign(scipy.special.ndtri(chance), slope))
 
 
 def equilibration(series: np.ndarray) -> int:
@@ -375,11 +391,20 @@ def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
     (1.05, 0.071, 100.0)
     """
     runs = len(means)
-    mean, error, samples, drift = np.array(means).T
-    size, own = samples.sum(), np.sqrt(np.sum(error**2)) / runs
+    mean, _, samples, drift, own_freedom = np.array(means).T
+    size, square = samples.sum(), squares(means)
+    scatter = np.sum(square**2 / own_freedom)  # of the square of the error (Welch, Satterthwaite)
+    freedom = np.sum(square) ** 2 / scatter if scatter > 0 else np.inf
+    own = student(freedom + 1) * np.sqrt(np.sum(square)) / runs
     if scatter_p(means) < UNLIKELY or np.isnan(own):
-        size, own = runs, estimate(mean).error
-    return SeriesMean(mean.mean(), float(own), float(size), float(drift.sum() / np.sqrt(runs)))
+        size, own, freedom = runs, estimate(mean).error, max(1, runs - 1)
+    whole = mean.mean(), float(own), float(size), float(drift.sum() / np.sqrt(runs))
+    return SeriesMean(*whole, float(freedom))
+
+
+def squares(means: Sequence[SeriesMean]) -> np.ndarray:
+    """Return the squares (R,) of the standard errors of means, which are without Student's t."""
+    return np.array([(one.error / student(one.freedom + 1)) ** 2 for one in means])
 
 
 UNLIKELY = 0.005  # probability below which a deviation counts as significant
@@ -388,11 +413,11 @@ FEW = 10  # independent samples
 
 def scatter_p(means: Sequence[SeriesMean]) -> float:
     """Return the probability that runs scatter more than this if their errors are right."""
-    mean, error, *_ = np.array(means).T
+    mean, error, _, _, freedom = np.array(means).T
     if len(means) < 2 or not np.all(error > 0):
         return 1.0
-    chi2 = len(mean) * np.var(mean) / np.mean(error**2)
-    return float(scipy.special.chdtrc(len(mean) - 1, chi2))
+    ratio = np.var(mean, ddof=1) / np.mean(squares(means))
+    return float(scipy.special.fdtrc(len(mean) - 1, min(MANY, freedom.sum()), ratio))
 
 
 def has_drift(mean: SeriesMean) -> bool:
