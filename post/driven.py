@@ -37,7 +37,7 @@ from ricochet.analysis.statistics import Estimate, combine_runs, correlated_mean
 from ricochet.analysis.structure import largest_cluster
 from ricochet.analysis.thermodynamics import packing
 from ricochet.figures.drawing import plt
-from ricochet.reading.nature import Refused
+from ricochet.reading.nature import ROUNDING, Refused
 from ricochet.reading.reader import SIDES
 from ricochet.script import command_line, launch, measured, over_runs, report
 
@@ -57,6 +57,13 @@ def temperature(run: Run) -> Curves:
         raise Refused(f"{run.path}: holds one disk; a temperature is about the motion of all")
     time, value = run.observable("all/temperature")
     return {"": (time, value * run.n_disks / (run.n_disks - 1))}
+
+
+def keeps_energy(run: Run) -> bool:
+    """Return whether the kinetic energy is constant in the second half of the time."""
+    time, energy = run.observable("all/kinetic_energy")
+    late = energy[time >= (time[0] + time[-1]) / 2]
+    return bool(np.ptp(late) < ROUNDING * np.max(late, initial=0))
 
 
 def noise_law(run: Run) -> float | None:
@@ -122,7 +129,7 @@ def width_law(run: Run) -> Room | None:
     energy = run.observable("all/kinetic_energy").value[0] * run.n_disks - flow
     start, force = widths(run, side)[:1], float(run.sides[side]["force"])
     grid = np.linspace(0, start + energy / force, 20002)[1:-1, 0]
-    places = -run.n_disks * np.log(adiabat(run, side, np.append(start, grid))[1:])
+    places = -(run.n_disks - along / 2) * np.log(adiabat(run, side, np.append(start, grid))[1:])
     left = energy + force * (start - grid)
     mean, variance = theory.pushed_width(grid, places, 2 * run.n_disks + 1 - along, left)
     least = grid[np.isnan(places).sum()]
@@ -320,7 +327,11 @@ def main() -> None:
         late = [compared(value[time >= (time[0] + time[-1]) / 2]) for time, value in curves]
         about = ", ".join(filter(None, (args.show, name, species)))
         row = {"input": name or None, "species": species or None, "runs": len(curves)}
-        row |= over_runs("late", [correlated_mean(half) for half in late], notes, about)
+        members = [correlated_mean(half) for half in late]
+        if args.show == "temperature":  # what fluctuates in one run does not tell how seeds differ
+            own = zip(members, groups[name], strict=True)
+            members = [m._replace(error=np.nan) if keeps_energy(run) else m for m, run in own]
+        row |= over_runs("late", members, notes, about)
         notes += [f"{about}: grows or falls all the time, 'late' is not what lasts"] * any(
             map(has_trend, late)
         )

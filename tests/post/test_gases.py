@@ -464,7 +464,7 @@ def test_driven_runs_are_told_apart_by_all_but_their_seed(simulated):
     assert demon_law(simulated(quiet + "&stop time = 1 /")) == pytest.approx(expected)
 
 
-def test_a_slow_stroke_is_drawn_beside_its_adiabat(simulated):
+def test_a_slow_stroke_is_drawn_beside_its_adiabat(simulated, tmp_path):
     text = """&side name = 'top' motion = 'constant_velocity' velocity = 0.02
     start_time = 1 end_time = 16 /
     &species count = 100 packing_fraction = 0.3 temperature = 1 / &stop time = 17 /
@@ -473,6 +473,10 @@ def test_a_slow_stroke_is_drawn_beside_its_adiabat(simulated):
     (_, kt), law = driven.temperature(run)[""], temperature_law(run)
     assert law[0] == law[1] == kt[0] and law[-1] == law[-2] > 1.6 * kt[0]
     assert kt == pytest.approx(law, rel=0.05)
+    (row,) = drawn(tmp_path, "driven", run.path)
+    assert row["late_error"] == "nan" == row["ratio_error"], (
+        "its energy is constant after the stroke"
+    )
     for change in ("contact.restitution=0.9", "box.gravity=0,-1", "side.top.motion=still"):
         words = ["velocity", "start_time", "end_time"] if "still" in change else []
         assert temperature_law(simulated(text, change, *(f"side.top.{w}=" for w in words))) is None

@@ -183,6 +183,15 @@ def test_scripts_answer_a_bad_file_with_one_line_and_exit_2(tmp_path, script, ca
         assert words in said
 
 
+@pytest.mark.parametrize("mode", ["r", "r+"])
+def test_a_file_that_the_same_process_has_open_is_not_called_damaged(tmp_path, mode):
+    """h5py refuses another mode, or another locking, for a file that is open."""
+    path = tiny(tmp_path / "good.h5")
+    with h5py.File(path, mode), pytest.raises(RunError, match="this process has opened it"):
+        read_run(path)
+    assert read_run(path).n_disks
+
+
 @pytest.fixture
 def unfinished(ricochet, tmp_path) -> Path:
     """The output of a run that its wall clock stopped."""

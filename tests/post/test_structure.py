@@ -1,6 +1,7 @@
 """How disks are arranged and how they move: made runs against closed formulas."""
 
 import pickle
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -74,6 +75,21 @@ def test_the_structure_factor_of_points_at_random_is_1_of_a_lattice_n(tmp_path, 
     edges = first + np.array([-0.3, -0.01, 0.01])
     between, peak = structure.structure_factor(lattice, [0], edges)
     assert between == pytest.approx(0, abs=1e-9) and peak == pytest.approx(len(x))
+
+
+@pytest.mark.parametrize("sides", [(1.0, 1.0), (1.5, 0.7)])
+def test_a_structure_factor_is_the_mean_over_all_wave_vectors(tmp_path, rng, sides):
+    """Each of the whole plane counts once, so that x and y are alike."""
+    x = rng.uniform(size=(2, 40, 2)) * sides
+    run = written(tmp_path / "run.h5", x, x, edges=sides, periodic=PERIODIC, radius=0.5)
+    edges = np.array([3.0, 6.5, 9.5, 20.0])
+    n = np.stack(np.meshgrid(*[np.arange(-9, 10)] * 2), axis=-1).reshape(-1, 2)
+    k = 2 * np.pi * n / sides
+    waves = np.abs(np.exp(1j * np.einsum("fna,ka->fnk", x, k)).sum(axis=1)) ** 2
+    value, length = waves.mean(axis=0) / 40, np.linalg.norm(k, axis=1)
+    known = [(length >= low) & (length < high) for low, high in pairwise(edges)]
+    expected = [value[some].mean() for some in known]
+    np.testing.assert_allclose(structure.structure_factor(run, [0, 1], edges), expected)
 
 
 def test_partial_structures_are_those_of_each_pair_of_species_and_add_up(tmp_path, rng):

@@ -18,10 +18,11 @@ Displacements and velocities are relative to the centre of mass along axes where
 conserved, or performs a random walk that noise drives (drive.keep_momentum = .false.).
 
 In each twelfth of a power of ten the lag is used that most pairs of samples have, so that samples
-at equal steps, in decades, in bursts, or a mixture of these are all exploited.  In each sixteenth
-of a lag the first sample that has a partner is an origin; more origins would hardly reduce the
-error.  This is the multiple-tau correlator of Ramirez et al., J. Chem. Phys. 133, 154103 (2010),
-without its means over neighbouring samples, so that each lag is exact.
+at equal steps, in decades, in bursts, or a mixture of these are all exploited.  Every sample that
+has a partner is an origin.  Where that would take too long, only the first in each sixteenth of a
+lag is: displacements are as accurate then, velocities at lags of many free times are not.  This is
+the multiple-tau correlator of Ramirez et al., J. Chem. Phys. 133, 154103 (2010), without its means
+over neighbouring samples, so that each lag is exact.
 
 Errors are over the runs.  For a single run they are over sixteenths of its time, for lags up to an
 eighth of it; longer lags have no error (NaN).
@@ -51,11 +52,12 @@ __all__ = [
 ]
 
 PER_DECADE = 12
-ORIGINS = 16  # origins in a lag
+ORIGINS = 16  # origins in a lag, where not every sample is one
 BLOCKS = 16  # blocks of time, for errors
 REACH = 0.3  # mean diameters
 CLOSE = 1e-9  # relative difference of lags that are equal
 MOST_PAIRS = 2 * 10**6  # largest number of pairs whose lags are compared
+MOST_DISKS = 10**8  # largest number of disks in pairs of samples, if every sample is an origin
 CHUNK = 10**6  # largest number of disks in frames that are read together
 FLOWING = {"sheared", "sliding_surfaces", "changed"}
 FIXED = ("msd", "fourth", "vacf", "diffusion", "overlap")
@@ -140,8 +142,9 @@ def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
 class Correlator:
     """Sums over pairs of samples of a run or a simulation, which are added one after the other.
 
-    Its memory is bounded: it keeps only the samples that have partners still to come, about 16 for
-    each lag.  `pickle` saves its whole state, so that a measurement can be continued exactly.
+    Its memory is bounded: it keeps only the samples that have partners still to come, and of long
+    runs about 16 for each lag.  `pickle` saves its whole state, so that a measurement can be
+    continued exactly.
     """
 
     def __init__(
@@ -168,6 +171,7 @@ class Correlator:
         self.shares = (species == 0) | (species == source.species[:, None])
         self.shares = self.shares / self.shares.sum(axis=0)  # (N, 1 + S)
         size = len(self.lags), BLOCKS
+        self.every = len(self.times) * len(self.lags) * len(self.mass) <= MOST_DISKS
         self.pairs = np.zeros(size)
         self.sums = np.zeros((*size, len(self.names), len(FIXED) + len(self.waves)))
         self.done = 0  # samples
@@ -194,7 +198,7 @@ class Correlator:
         partner = np.searchsorted(self.times, time + self.lags - close)
         there = np.append(self.times, np.inf)[partner] <= time + self.lags + close
         since = (time - self.times[0]) * ORIGINS / np.where(self.lags > 0, self.lags, np.inf)
-        part = np.where(self.lags > 0, np.floor(since + 1e-6), now)
+        part = np.where((self.lags > 0) & ~self.every, np.floor(since + 1e-6), now)
         fresh = np.flatnonzero(there & (part > self.last))
         self.last[fresh] = part[fresh]
         for lag in fresh.tolist():

@@ -105,7 +105,8 @@ def structure_factor(
 ) -> np.ndarray:
     """Return the structure factor S(k) = <|sum of exp(i k x)|^2> / N of some frames.
 
-    Of many disks only a part of the wave vectors along x and y is evaluated.
+    Each pair of wave vectors k and -k counts once.  Of many disks only a part of the wave vectors
+    along x and y is evaluated.
 
     Parameters
     ----------
@@ -152,7 +153,7 @@ def structure_factor(
         ]
         sums += (waves[0] * waves[-1].conj()).real
     sums /= np.sqrt(both[0].sum() * both[-1].sum()) * len(numbers)
-    sums[k == 0] = np.nan
+    sums[(along_x[:, None] == 0) & (along_y <= 0)] = np.nan  # k and -k are one
     known = np.isfinite(sums)
     total, _ = np.histogram(k[known], edges, weights=sums[known])
     number, _ = np.histogram(k[known], edges)

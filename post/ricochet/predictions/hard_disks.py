@@ -172,10 +172,11 @@ def adiabat(
 ) -> np.ndarray:
     """T over that at the first of the widths (W,) between two walls, one of which moves slowly.
 
-    `walled`: the other two sides are walls, too.  d ln T = -F dw / (N kT), where the side feels
-    F = P h less the tension of two walls along its way.  A wall has the tension kT n r / (1 - eta),
-    and lacks n r (1 - eta) / (1 + eta) disks per length, by scaled particle theory:
-    Helfand, Frisch and Lebowitz, J. Chem. Phys. 34, 1037 (1961).  P as `simulated`.
+    `walled`: the other two sides are walls, too; else the momentum along them is conserved, and
+    the kinetic energy is (N - 1/2) kT instead of N kT.  Its change is -F dw, where the side feels
+    F = P h less the tension of two walls along its way.  A wall has the tension kT n r / (1 - eta)
+    and lacks n r (1 - eta) / (1 + eta) disks per length, by scaled particle theory: Helfand,
+    Frisch and Lebowitz, J. Chem. Phys. 34, 1037 (1961).  P as `simulated`.
     """
     area = count * math.pi * radius**2
     eta = np.geomspace(1e-12, FLUID[-1, 0], 50001)  # far from the walls
@@ -183,6 +184,7 @@ def adiabat(
     width = area / eta / (height - walled * layer) + layer
     force = eta / area * (simulated(eta) * height - walled * 2 * radius / (1 - eta))  # over N kT
     rise = -np.append(0, np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(width)))
+    rise *= count / (count - (not walled) / 2)
     at = np.interp(widths, width[::-1], rise[::-1], left=np.nan)
     return np.exp(at - at[0])
 

@@ -45,7 +45,10 @@ def hdf5_file(path: Path) -> h5py.File:
         return h5py.File(path, "r", locking=False)
     except PermissionError:
         raise RunError(f"{path}: no permission to read") from None
-    except OSError:
+    except OSError as problem:
+        if "locking flag" in str(problem) or "already open" in str(problem):
+            why = "this process has opened it with another mode or lock; close it there first"
+            raise RunError(f"{path}: {why}") from None
         if not path.exists():  # it has just been removed, or renamed by the program
             raise RunError(f"{path}: no such file") from None
         state = "is empty" if path.stat().st_size == 0 else "is not an HDF5 file, or is cut short"
