@@ -79,14 +79,13 @@ contains
     integer :: k
 
     wanted = bare(lower_case(trim(name)))
-    text = ""
-    do k = 1, size(table)
-      full(k) = trim(table(k)%group)//"."//table(k)%name
-      if (all([character(len=len(full)) :: table(k)%name, table(k)%group, full(k)] /= wanted)) cycle
-      if (text /= "") text = text//eol
-      text = text//explanation(k)
-    end do
-    if (text /= "") return
+    full = [character(len=len(full)) :: (trim(table(k)%group)//"."//table(k)%name, k=1, size(table))]
+    text = explanations(pack([(k, k=1, size(table))], table%group == wanted))// &
+      explanations(pack([(k, k=1, size(table))], table%name == wanted .or. full == wanted))
+    if (text /= "") then
+      text = text(:len(text) - len(eol))
+      return
+    end if
     if (present_names(wanted) /= "") then
       call fail(error, exit_usage, "--explain "//shown(name)//": is called "//present_names(wanted)//" now")
       return
@@ -95,6 +94,18 @@ contains
     if (text == "") call fail(error, exit_usage, "--explain "//shown(name)//": no variable, choice or help contains this; " &
       //suggestion(wanted, [character(len=len(full)) :: table%name, full, group_names], group_names))
   end subroutine explain
+
+  !> The explanations of some variables.
+  pure function explanations(rows) result(text)
+    integer, intent(in) :: rows(:)                         !! of the table
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = ""
+    do k = 1, size(rows)
+      text = text//explanation(rows(k))//eol
+    end do
+  end function explanations
 
   !> The name of a variable without the number of an element and the name of a species or boundary:
   !> `species.velocity` of `species.gas.velocity(2)`.

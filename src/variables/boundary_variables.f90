@@ -65,9 +65,9 @@ module boundary_variables
       otherwise="obstacle1, obstacle2, ... in the order of the file"), &
     variable_t("obstacle", "centre", "real", 2, "example", "0.5, 0.5", &
       "Centre of the circular obstacle: its x and its y coordinate.", unit="length", &
-      otherwise="none: needed, unless file is given"), &
+      otherwise="none; needed, unless file is given"), &
     variable_t("obstacle", "radius", "real", 1, "example", "0.2", &
-      "Radius of the circular obstacle.", positive, "length", otherwise="none: needed, unless file is given"), &
+      "Radius of the circular obstacle.", positive, "length", otherwise="none; needed, unless file is given"), &
     variable_t("obstacle", "side", "text", 1, "default", "'outside'", &
       "Side of the circle on which the disks are.", choices="outside inside"), &
     variable_t("obstacle", "file", "text", 1, "optional", "'scatterers.txt'", &
@@ -75,7 +75,7 @@ module boundary_variables
       //"one line for each circle; an HDF5 file (.h5) has the datasets centre and radius; up to 1000000 circles. All " &
       //"circles of the file are one obstacle with one collision rule and one set of observables. The path is relative to " &
       //"the folder in which the program is started.", excludes="centre radius", &
-      otherwise="none: the group describes one circle")]
+      otherwise="none; the group describes one circle")]
 
   type(variable_t), parameter :: wall_rows(*) = [ &
     variable_t("wall", "name", "text", 1, "optional", "'ramp'", &
@@ -84,19 +84,19 @@ module boundary_variables
       otherwise="wall1, wall2, ... in the order of the file"), &
     variable_t("wall", "from", "real", 2, "example", "0.2, 0.3", &
       "First end point of the straight wall: its x and its y coordinate, inside the box. Disks bounce off both faces of the " &
-      //"wall and off its end points.", unit="length", otherwise="none: needed, unless points or file is given"), &
+      //"wall and off its end points.", unit="length", otherwise="none; needed, unless points or file is given"), &
     variable_t("wall", "to", "real", 2, "example", "0.8, 0.1", &
       "Second end point of the straight wall: its x and its y coordinate, inside the box.", unit="length", &
-      otherwise="none: needed, unless points or file is given"), &
+      otherwise="none; needed, unless points or file is given"), &
     variable_t("wall", "points", "real", 0, "optional", "0, 0, 0.5, 0.2, 1, 0", &
       "Points x1, y1, x2, y2, ... of a polyline (at least two) in place of from and to. It is closed if the last point " &
-      //"equals the first.", unit="length", excludes="from to", otherwise="none: the wall is one straight segment"), &
+      //"equals the first.", unit="length", excludes="from to", otherwise="none; the wall is one straight segment"), &
     variable_t("wall", "file", "text", 1, "optional", "'walls.txt'", &
       "File that describes many straight walls in place of from and to. A text has a line of column names (x1 y1 x2 y2) and " &
       //"one line for each wall; an HDF5 file (.h5) has the datasets from and to; up to 1000000 walls. All walls of the " &
       //"file are one obstacle with one collision rule and one set of observables. The path is relative to the folder in " &
       //"which the program is started.", excludes="from to points", &
-      otherwise="none: the group describes one wall or polyline")]
+      otherwise="none; the group describes one wall or polyline")]
 
   !> The collision rule of a boundary, in the group of each.
   type(variable_t), parameter :: law_rows(*) = [ &
@@ -119,7 +119,7 @@ module boundary_variables
       "Temperature kT of a thermal boundary: after a collision a disk has a random velocity, as if it came out of a gas of " &
       //"this temperature. A thermal boundary can slide (surface_velocity), but has no restitution and no motion.", &
       positive, "energy", excludes="restitution rule tangential_restitution friction motion", may_change=in_motion, &
-      otherwise="none: the boundary is not thermal"), &
+      otherwise="none; the boundary is not thermal"), &
     variable_t("", "surface_velocity", "real", 1, "fallback", "0", &
       "Tangential velocity of the surface, as of a conveyor belt; the boundary itself stays where it is. Positive is +x for " &
       //"the bottom and top side, +y for the left and right side, from the first to the second point of a wall, and " &

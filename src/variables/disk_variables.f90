@@ -26,7 +26,7 @@ module disk_variables
       //"radii.", positive, "length", otherwise="follows from packing_fraction, relative_to or file; needed without these"), &
     variable_t("species", "packing_fraction", "real", 1, "optional", "0.3", &
       "Packing fraction: total area of the disks of the species, divided by the area of its region. The radius follows from " &
-      //"it.", fraction, excludes="radius relative_to", otherwise="none: the radius is given in another way"), &
+      //"it.", fraction, excludes="radius relative_to", otherwise="none; the radius is given in another way"), &
     variable_t("species", "radius_distribution", "text", 1, "optional", "'gaussian'", &
       "Distribution of the radii about their mean in a polydisperse species. It is cut so that the largest radius is at " &
       //"most ten times the smallest. Used with polydispersity.", choices="uniform gaussian lognormal", &
@@ -41,7 +41,7 @@ module disk_variables
     variable_t("species", "relative_to", "text", 1, "optional", "'bed'", &
       "Name of another species, of whose mass and radius this species has multiples: with relative_to = 'bed', mass = 25 is " &
       //"25 times the mass of a disk of bed. The other species must not have its radii from file; of a polydisperse one the " &
-      //"mean radius counts.", otherwise="none: mass and radius are absolute values"), &
+      //"mean radius counts.", otherwise="none; mass and radius are absolute values"), &
     variable_t("species", "region", "real", 4, "optional", "0, 1, 0, 0.5", &
       "Rectangle in which the disks start: xlo, xhi, ylo, yhi. Each disk lies wholly inside it at the start; later it may " &
       //"leave.", unit="length", otherwise="the whole box"), &
@@ -75,7 +75,7 @@ module disk_variables
     variable_t("species", "exact_temperature", "real", 1, "optional", "1", &
       "Temperature kT to which the initial velocities are scaled exactly, relative to the mean velocity of the species; kT " &
       //"= sum of m v**2 over 2N. Any choice of velocities can be scaled, but not disks at rest.", not_negative, "energy", &
-      otherwise="none: velocities are not scaled"), &
+      otherwise="none; velocities are not scaled"), &
     variable_t("species", "velocity", "real", 0, "required", "1, 0", &
       "Velocities of the disks at the start: vx1, vy1, vx2, vy2, ..., one pair for each disk, or a single pair for all of " &
       //"them.", unit="length/time", goes_with="velocities explicit"), &
@@ -85,7 +85,7 @@ module disk_variables
     variable_t("species", "rotational_temperature", "real", 1, "optional", "1", &
       "Temperature kT of the rotation at the start: angular velocities are Gaussian with variance kT/I, where I is the " &
       //"moment of inertia.", not_negative, "energy", excludes="angular_velocity", &
-      otherwise="none: all disks have the same angular_velocity")]
+      otherwise="none; all disks have the same angular_velocity")]
 
   type(variable_t), parameter :: contact_rows(*) = [ &
     variable_t("contact", "restitution", "real", 1, "default", "1", &

@@ -18,7 +18,7 @@ module run_variables
     variable_t("run", "dt", "real", 1, "optional", "0.001", &
       "Length of a time step. It must be given with run.dynamics = 'steps', and has no effect with 'events'. Choose it so " &
       //"that no disk moves by more than half of the smallest radius in one step.", positive, "time", &
-      otherwise="none: needed with run.dynamics = 'steps'"), &
+      otherwise="none; needed with run.dynamics = 'steps'"), &
     variable_t("run", "search", "text", 1, "default", "'cells'", &
       "Search for collision partners. All choices give bit-identical trajectories and differ only in cost; the last two " &
       //"exist for comparison.", choices="cells pairs rescan", may_change=on_resume), &
@@ -81,7 +81,7 @@ module run_variables
     variable_t("output", "decades_from", "real", 1, "optional", "0.001", &
       "Time of the first frame of frames_per_decade and of the first sample of observables_per_decade. It is used with one " &
       //"of these.", positive, "time", may_change=on_resume, &
-      otherwise="none: needed with frames_per_decade and observables_per_decade"), &
+      otherwise="none; needed with frames_per_decade and observables_per_decade"), &
     variable_t("output", "observables_every_time", "real", 1, "optional", "0.01", &
       "Time between samples of the observables: energies, pressure, counts, ... The initial and the final state are always " &
       //"sampled.", positive, "time", may_change=on_resume, otherwise="samples of the initial and the final state only"), &
