@@ -1,7 +1,7 @@
 !> Saving simulations to files and loading them from the files of runs. See `ricochet.h`.
 module library_files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_ptr
-  use cadence, only: progress_t
+  use sampling_schedule, only: progress_t
   use checkpoint, only: read_checkpoint, recall_input
   use errors, only: error_t
   use hdf5_objects, only: hdf5_file_t

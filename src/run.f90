@@ -1,7 +1,7 @@
 !> Performs one run, from the input file to the finished output.
 module run
   use, intrinsic :: iso_fortran_env, only: error_unit
-  use cadence, only: progress_t
+  use sampling_schedule, only: progress_t
   use checkpoint, only: read_checkpoint, recall_overrides
   use command_line, only: command_t
   use errors, only: error_t, exit_broken, exit_files, exit_finished, exit_stopped, fail

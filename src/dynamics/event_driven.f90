@@ -20,7 +20,7 @@ module event_driven
   use side_motion, only: piston
   use simulation_state, only: simulation_t
   use signals, only: stop_requested
-  use tracks, only: tracks_t
+  use histories, only: histories_t
   use wall_collisions, only: collide_wall
   implicit none
   private
@@ -36,7 +36,7 @@ module event_driven
     logical :: windowed = .true.                   !! the queue uses its calendar, not only the heap
     logical :: thorough = .false.                  !! collisions need the general procedure
     logical :: is_part = .false.  !! this engine advances one domain, and only collisions that belong to it are counted
-    class(tracks_t), allocatable :: tracks         !! tracks of the disks of the domain
+    class(histories_t), allocatable :: histories   !! histories of the disks of the domain
     integer(int64) :: last_count = 0               !! number of events at which `run_events` returns
   contains
     procedure :: start
@@ -183,7 +183,7 @@ contains
       do stage = 1, stages
         call self%queue%list_coming(sim%tag, stage, n, disks)
         call self%search%read_ahead(sim%disk, sim%tag, stage, disks(:n))
-        if (self%is_part .and. stage == 2) call self%tracks%read_ahead(sim%disk, disks(:n))
+        if (self%is_part .and. stage == 2) call self%histories%read_ahead(sim%disk, disks(:n))
       end do
       self%last_count = min(self%last_count, sim%tally%events + events_ahead)
     end subroutine read_ahead
@@ -225,7 +225,7 @@ contains
     logical :: counts
 
     counts = .true.
-    if (self%is_part) counts = self%tracks%counts(sim%tag, i, code)
+    if (self%is_part) counts = self%histories%counts(sim%tag, i, code)
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
         ! Equal clocks are rare: the disks are still in contact, or both have collided at exactly this time.
@@ -236,7 +236,7 @@ contains
         end if
         call self%queue%forget(code)
         call self%search%predict_both(sim, i, code)
-        if (self%is_part) call self%tracks%note_collision(sim%disk, sim%tag, i, code)
+        if (self%is_part) call self%histories%record_collision(sim%disk, sim%tag, i, code)
         call self%queue%schedule(sim%disk, sim%tag, code)
         call self%queue%schedule(sim%disk, sim%tag, i)
         return
@@ -251,7 +251,7 @@ contains
     else
       if (is_wall(code)) call pass_side(sim, i, code, t)
       call self%search%cross(sim, i, code)
-      if (self%is_part) call self%tracks%note(sim%tag(i)%cell, i)
+      if (self%is_part) call self%histories%record_cell(sim%tag(i)%cell, i)
       call self%queue%schedule(sim%disk, sim%tag, i)
       return
     end if

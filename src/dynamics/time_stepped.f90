@@ -13,7 +13,7 @@ module time_stepped
   use event_log, only: event_log_t, is_full
   use evolution, only: evolution_t, limits_t
   use free_flight, only: flight, slowest
-  use near_pairs, only: near_pairs_t
+  use verlet_list, only: verlet_list_t
   use partners, only: axis_of, n_sides, nothing, sense_of
   use signals, only: stop_requested
   use simulation_state, only: simulation_t
@@ -29,7 +29,7 @@ module time_stepped
   type, extends(evolution_t) :: time_stepped_t
     real(real64) :: dt = 0.0_real64                 !! [time]
     logical :: every_pair = .false.                 !! test all pairs in every step, instead of near ones
-    type(near_pairs_t), private :: near
+    type(verlet_list_t), private :: near
     ! Coordinates are stored separately, for vectorisation.
     real(real64), allocatable, private :: x(:, :)    !! (disks,2) positions in this step [length]
     real(real64), allocatable, private :: radius(:)  !! (disks) [length]
@@ -53,7 +53,7 @@ contains
     allocate (self%x(sim%n_disks(), 2))
     self%radius = sim%disk%radius
     allocate (self%outside(sim%n_disks()))
-    self%near = near_pairs_t()
+    self%near = verlet_list_t()
     call sim%start_sums()
     self%idle = .false.
   end subroutine start

@@ -10,7 +10,7 @@ module checkpoint
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int128, int32, int64, real64
   use build_info, only: build_flags
-  use cadence, only: progress_t
+  use sampling_schedule, only: progress_t
   use errors, only: error_t, exit_files, exit_usage, fail
   use exact_sums, only: exact_sum_t
   use h5md_layout, only: changes_at_work, checkpoint_group, parameters_group
@@ -328,7 +328,7 @@ contains
     if (.not. sim%with%own_sizes) sim%disk%radius = input%settings%species(sim%tag%species)%radius
     call sim%settle_masses()
     call sim%choose_units()
-    call progress%cadence%look_ahead(sim)
+    call progress%schedule%look_ahead(sim)
   end subroutine read_checkpoint
 
   !> Reads the valid checkpoint; if it is damaged, the other one.
@@ -434,12 +434,12 @@ contains
       call record%exchange(file, sim%box%side%velocity)
     end if
     call exchange_disks()
-    do k = 1, size(progress%cadence)
-      associate (cadence => progress%cadence(k))  ! intervals belong to the input; the times of the next samples follow from these
+    do k = 1, size(progress%schedule)
+      associate (schedule => progress%schedule(k))  ! intervals belong to the input; the times of the next samples follow from these
                                                   ! numbers
-        call record%exchange(file, cadence%count)
-        call record%exchange(file, cadence%last_events)
-        call record%exchange(file, cadence%last_time)
+        call record%exchange(file, schedule%count)
+        call record%exchange(file, schedule%last_events)
+        call record%exchange(file, schedule%last_time)
       end associate
     end do
     call record%exchange(file, progress%events)

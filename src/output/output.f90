@@ -5,7 +5,7 @@
 !> Otherwise a new file replaces it, by an atomic renaming, when the space is used up and at the end.
 module output
   use kinds, only: int64, real64
-  use cadence, only: frames, progress_t, values
+  use sampling_schedule, only: frames, progress_t, values
   use checkpoint, only: checkpoint_bytes, copy_checkpoints, has_both_checkpoints, has_broken_off, make_checkpoints, &
     mark_as_broken, put_checkpoint, put_last_checkpoint
   use errors, only: error_t, exit_files, fail
@@ -170,7 +170,7 @@ contains
     end if
     call check_replaced(self%path, self%replaced, error)
     if (allocated(error)) return
-    counts = [progress%cadence%count, progress%events]
+    counts = [progress%schedule%count, progress%events]
     do k = 1, size(self%track)
       call self%track(k)%resume(self%file, counts(k))
     end do
@@ -204,7 +204,7 @@ contains
       self%track(frames)%series = frame_series(self%columns, sim%n_disks(), settings%single_precision)
       self%track(values)%counter = sample_counter
       self%track(values)%series = observable_series(observed(sim))
-      self%track(:values)%planned = self%progress%cadence%planned(rule%limits)
+      self%track(:values)%planned = self%progress%schedule%planned(rule%limits)
       if (.not. settings%event_log) return
       self%track(events)%counter = event_counter
       self%track(events)%series = event_series()
@@ -243,8 +243,8 @@ contains
     class(output_t), intent(in) :: self
     type(limits_t), intent(inout) :: limits
 
-    call self%progress%cadence(frames)%tighten(limits)
-    call self%progress%cadence(values)%tighten(limits)
+    call self%progress%schedule(frames)%tighten(limits)
+    call self%progress%schedule(values)%tighten(limits)
   end subroutine tighten
 
   !> Takes the samples that are due. Called whenever the simulation has stopped at a limit.
@@ -254,7 +254,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     logical :: due(2)
 
-    due = self%progress%cadence%is_due(sim)
+    due = self%progress%schedule%is_due(sim)
     if (any(due)) call check_counts(sim, error)
     if (allocated(error)) return
     if (due(frames)) call self%take_sample(frames, sim)
@@ -269,10 +269,10 @@ contains
     integer, intent(in) :: track                  !! `frames` or `values`
     type(simulation_t), intent(inout) :: sim
 
-    associate (cadence => self%progress%cadence(track))
-      if (track == frames) call self%add(track, frame_sample(sim, cadence%count, self%columns), sim)
-      if (track == values) call self%add(track, observable_sample(sim, cadence%count), sim)
-      call cadence%take(sim)
+    associate (schedule => self%progress%schedule(track))
+      if (track == frames) call self%add(track, frame_sample(sim, schedule%count, self%columns), sim)
+      if (track == values) call self%add(track, observable_sample(sim, schedule%count), sim)
+      call schedule%take(sim)
     end associate
   end subroutine take_sample
 
@@ -403,7 +403,7 @@ contains
 
     before = self%progress
     do track = frames, values
-      if (self%progress%cadence(track)%is_new(sim)) call self%take_sample(track, sim)
+      if (self%progress%schedule(track)%is_new(sim)) call self%take_sample(track, sim)
     end do
     call self%flush_buffers()
     if (broken .or. any(self%track%appended() /= self%track%capacity)) &

@@ -5,7 +5,7 @@ module domain_borders
   use kinds, only: int16, int32, int64
   use domains, only: copy_of, domain_t, forever, list_copies, news_t
   use partners, only: nothing
-  use tracks, only: track_t
+  use histories, only: history_t
   implicit none
   private
   public :: compare_copies, refresh
@@ -22,11 +22,11 @@ contains
     found = 0
     associate (self => domain(k))
       self%n_news = 0
-      self%good = self%done .and. .not. self%engine%tracks%too_far
+      self%good = self%done .and. .not. self%engine%histories%left_patch
       do m = 1, size(self%neighbour)
         if (self%good) call compare(self, domain(self%neighbour(m)), found)
       end do
-      if (found < self%engine%tracks%n_copies()) self%good = .false.    ! the owner of a copy was not found
+      if (found < self%engine%histories%n_copies()) self%good = .false.  ! the owner of a copy was not found
     end associate
   end subroutine compare_copies
 
@@ -39,25 +39,25 @@ contains
     logical :: met, near, same
 
     shift = other%patch%first - self%patch%first
-    associate (mine => self%engine%tracks, theirs => other%engine%tracks)
-      do r = 1, theirs%n_tracks
-        if (.not. theirs%track(r)%own) cycle
-        t = theirs%track(r)%slot
+    associate (mine => self%engine%histories, theirs => other%engine%histories)
+      do r = 1, theirs%n_histories
+        if (.not. theirs%history(r)%own) cycle
+        t = theirs%history(r)%slot
         s = copy_of(self, other%sim%tag(t)%id)
         cell = modulo(other%sim%tag(t)%cell + shift - 1, self%patch%whole) + 1
         if (s > 0) then
           found = found + 1
-          associate (track => mine%track(mine%track_of(s)))
-            same = track%digest == theirs%track(r)%digest .and. same_state() &
+          associate (history => mine%history(mine%history_of(s)))
+            same = history%digest == theirs%history(r)%digest .and. same_state() &
               .and. self%patch%holds(self%sim%tag(s)%cell)  ! a copy that has left the patch is wrong from then on, even if it is
                                                             ! back
             if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
-            near = came_near(theirs%track(r), met)
-            if (.not. met) met = mine%could_have_met(int(track%low, int32), int(track%high, int32))
+            near = came_near(theirs%history(r), met)
+            if (.not. met) met = mine%could_have_met(int(history%low, int32), int(history%high, int32))
           end associate
         else
           same = .false.
-          near = came_near(theirs%track(r), met)
+          near = came_near(theirs%history(r), met)
           if (.not. (near .and. (met .or. all(cell <= self%patch%n)))) cycle
         end if
         if (met .and. .not. same) self%good = .false.
@@ -69,8 +69,8 @@ contains
 
     !> Whether a disk of the neighbour was inside the patch during the window, in any periodic image; `met`: whether it was where it
     !> could have met an own disk.
-    function came_near(track, met) result(near)
-      type(track_t), intent(in) :: track
+    function came_near(history, met) result(near)
+      type(history_t), intent(in) :: history
       logical, intent(out) :: met
       logical :: near
       integer(int32) :: low(2), high(2), reach(2), ix, iy
@@ -80,11 +80,11 @@ contains
       reach = merge(1, 0, self%sim%box%periodic .and. self%patch%n < self%patch%whole)
       do iy = -reach(2), reach(2)
         do ix = -reach(1), reach(1)
-          low = track%low + shift + [ix, iy]*self%patch%whole
-          high = track%high + shift + [ix, iy]*self%patch%whole
+          low = history%low + shift + [ix, iy]*self%patch%whole
+          high = history%high + shift + [ix, iy]*self%patch%whole
           if (any(low > self%patch%n .or. high < 1)) cycle
           near = .true.
-          met = met .or. self%engine%tracks%could_have_met(low, high)
+          met = met .or. self%engine%histories%could_have_met(low, high)
         end do
       end do
     end function came_near
@@ -126,11 +126,11 @@ contains
 
     allocate (waiting(self%n_news))
     n_waiting = 0
-    associate (tracks => self%engine%tracks)
-      call tracks%begin_window()
-      do k = tracks%n_tracks, 1, -1
-        slot = tracks%track(k)%slot
-        call tracks%begin_track(self%sim%tag(slot)%cell, slot)
+    associate (histories => self%engine%histories)
+      call histories%begin_window()
+      do k = histories%n_histories, 1, -1
+        slot = histories%history(k)%slot
+        call histories%begin_history(self%sim%tag(slot)%cell, slot)
       end do
     end associate
     do k = 1, self%n_news
@@ -170,7 +170,7 @@ contains
       self%sim%disk(s)%event_time = forever
       self%home(s) = news%home
       call self%engine%search%insert(self%sim, s, int(news%cell, int16))
-      call self%engine%tracks%begin_track(self%sim%tag(s)%cell, s)
+      call self%engine%histories%begin_history(self%sim%tag(s)%cell, s)
       n_waiting = n_waiting + 1
       waiting(n_waiting) = s
     end subroutine take_over
@@ -180,7 +180,7 @@ contains
       integer(int32), intent(in) :: s
 
       if (self%patch%holds(self%sim%tag(s)%cell)) call self%engine%search%take_out(self%sim%tag(s), s)
-      call self%engine%tracks%drop_track(s)
+      call self%engine%histories%drop_history(s)
       self%sim%disk(s)%event_time = forever
       self%sim%disk(s)%partner = nothing
       self%sim%disk(s)%stamp = self%sim%disk(s)%stamp + 1

@@ -90,7 +90,7 @@ contains
       if (.not. allocated(self%sim%species)) then
         self%sim%given_t = sim%given_t
         self%sim%epoch_end = forever
-        allocate (self%engine%search, self%engine%tracks)
+        allocate (self%engine%search, self%engine%histories)
         self%engine%is_part = .true.
       end if
       slots = n + n/spare + spare_at_least
@@ -111,27 +111,27 @@ contains
 
       self%engine%search%is_part = .true.
       self%engine%search%patch = self%patch
-      associate (patch => self%patch, tracks => self%engine%tracks)
-        tracks%patch = self%patch
-        tracks%own_low = modulo(self%low - patch%first, patch%whole) + 1
-        tracks%own_high = tracks%own_low + self%high - self%low
-        cut_low = tracks%own_low > 1
-        cut_high = tracks%own_high < patch%n
-        tracks%deep_low = tracks%own_low + merge(self%halo, 0, cut_low)
-        tracks%deep_high = tracks%own_high - merge(self%halo, 0, cut_high)
-        tracks%safe_low = merge(2, 1, cut_low .and. (self%sim%box%periodic .or. patch%first > 1))
-        tracks%safe_high = patch%n - merge(1, 0, cut_high .and. (self%sim%box%periodic &
+      associate (patch => self%patch, histories => self%engine%histories)
+        histories%patch = self%patch
+        histories%own_low = modulo(self%low - patch%first, patch%whole) + 1
+        histories%own_high = histories%own_low + self%high - self%low
+        cut_low = histories%own_low > 1
+        cut_high = histories%own_high < patch%n
+        histories%deep_low = histories%own_low + merge(self%halo, 0, cut_low)
+        histories%deep_high = histories%own_high - merge(self%halo, 0, cut_high)
+        histories%safe_low = merge(2, 1, cut_low .and. (self%sim%box%periodic .or. patch%first > 1))
+        histories%safe_high = patch%n - merge(1, 0, cut_high .and. (self%sim%box%periodic &
           .or. patch%first + patch%n - 1 < patch%whole))
-        if (allocated(tracks%reached)) deallocate (tracks%reached)
-        allocate (tracks%reached(0:patch%n(1) + 1, 0:patch%n(2) + 1))
-        if (allocated(tracks%track_of)) deallocate (tracks%track_of)
-        allocate (tracks%track_of(self%sim%n_disks()), source=0)
-        if (.not. allocated(tracks%track)) allocate (tracks%track(1024))
+        if (allocated(histories%reached)) deallocate (histories%reached)
+        allocate (histories%reached(0:patch%n(1) + 1, 0:patch%n(2) + 1))
+        if (allocated(histories%history_of)) deallocate (histories%history_of)
+        allocate (histories%history_of(self%sim%n_disks()), source=0)
+        if (.not. allocated(histories%history)) allocate (histories%history(1024))
         call self%engine%start(self%sim)
-        call tracks%begin_window()
-        tracks%n_tracks = 0
+        call histories%begin_window()
+        histories%n_histories = 0
         do k = 1, n
-          call tracks%begin_track(self%sim%tag(k)%cell, k)
+          call histories%begin_history(self%sim%tag(k)%cell, k)
         end do
       end associate
       call list_copies(self)
@@ -143,7 +143,7 @@ contains
     type(domain_t), intent(inout) :: self
     integer(int32) :: k, place, copies
 
-    copies = self%engine%tracks%n_copies()
+    copies = self%engine%histories%n_copies()
     if (.not. allocated(self%key) .or. 3*copies > 2*self%last_key) then
       self%last_key = 255
       do while (self%last_key < 2*copies)
@@ -153,12 +153,12 @@ contains
       allocate (self%key(0:self%last_key), self%slot(0:self%last_key))
     end if
     self%key = 0
-    do k = 1, self%engine%tracks%n_tracks
-      associate (track => self%engine%tracks%track(k))
-        if (track%own) cycle
-        place = place_of(self, self%sim%tag(track%slot)%id)
-        self%key(place) = self%sim%tag(track%slot)%id
-        self%slot(place) = track%slot
+    do k = 1, self%engine%histories%n_histories
+      associate (history => self%engine%histories%history(k))
+        if (history%own) cycle
+        place = place_of(self, self%sim%tag(history%slot)%id)
+        self%key(place) = self%sim%tag(history%slot)%id
+        self%slot(place) = history%slot
       end associate
     end do
   end subroutine list_copies
@@ -232,7 +232,7 @@ contains
     integer(int32) :: k
 
     do k = 1, self%sim%n_disks()
-      if (self%sim%tag(k)%id == 0 .or. .not. self%engine%tracks%is_own(k)) cycle
+      if (self%sim%tag(k)%id == 0 .or. .not. self%engine%histories%is_own(k)) cycle
       call sim%place_disk(self%home(k), self%sim%whole_disk(k))
     end do
   end subroutine write_back

@@ -1,7 +1,7 @@
 !> Lists of pairs that are close to each other at the positions of a time step: two disks, or a disk and an obstacle. Other pairs
 !> cannot touch before a disk has moved by half the `skin`, so that a list is valid for many steps (Verlet, Phys. Rev. 159, 98
 !> (1967)). Loops that run in every step have no branches and are vectorised, as requested by directives.
-module near_pairs
+module verlet_list
   use kinds, only: int32, pi, real64
   use box_geometry, only: box_t, obstacle_gap
   use partners, only: obstacle_code, obstacle_number
@@ -11,7 +11,7 @@ module near_pairs
   use sorting, only: sort_by_count
   implicit none
   private
-  public :: near_pairs_t
+  public :: verlet_list_t
 
   integer, parameter :: steps_per_list = 16                !! number of steps for which a list should be valid
   real(real64), parameter :: pairs_per_disk = 4.0_real64   !! largest number of pairs per disk in a list, at the mean density
@@ -20,7 +20,7 @@ module near_pairs
 
   !> Pairs that may touch: first those with obstacles, in the order of obstacles and then of disks; then pairs of disks, in the
   !> order of i and then of the partner.
-  type :: near_pairs_t
+  type :: verlet_list_t
     integer(int32) :: n = 0
     integer(int32), allocatable :: i(:)        !! (at least n) a disk
     integer(int32), allocatable :: partner(:)  !! (at least n) a disk > i, or the code of an obstacle
@@ -33,13 +33,13 @@ module near_pairs
     procedure :: update
     procedure :: mark_overlaps
     procedure :: shift
-  end type near_pairs_t
+  end type verlet_list_t
 
 contains
 
   !> Registers that disk i has been moved by a period.
   subroutine shift(self, i, dx)
-    class(near_pairs_t), intent(inout) :: self
+    class(verlet_list_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: dx(2)          !! [length]
 
@@ -49,7 +49,7 @@ contains
   !> Makes a new list, unless all disks have moved by less than half the skin since the last one. With `all_pairs` a list is made
   !> every time and without bins; a stop request ends this early, and the list is then incomplete.
   subroutine update(self, sim, x, step, all_pairs)
-    class(near_pairs_t), intent(inout) :: self
+    class(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     real(real64), contiguous, intent(in) :: x(:, :)   !! (disks,2) positions [length]
     real(real64), intent(in) :: step           !! [time]
@@ -105,7 +105,7 @@ contains
 
   !> Marks pairs that overlap with 1, the others with 0.
   pure subroutine mark_overlaps(self, box, x, radius)
-    class(near_pairs_t), intent(inout) :: self
+    class(verlet_list_t), intent(inout) :: self
     type(box_t), intent(in) :: box
     real(real64), contiguous, intent(in) :: x(:, :)     !! (disks,2) positions [length]
     real(real64), contiguous, intent(in) :: radius(:)   !! (disks) [length]
@@ -127,7 +127,7 @@ contains
   !> Adds pairs of disks. Each disk searches for smaller disks, or equal ones with higher indices. A small disk therefore searches
   !> only few bins, however large the largest disk is. Bins are treated as periodic, which has no effect at walls.
   subroutine list_disks(self, sim, x, bins)
-    type(near_pairs_t), intent(inout) :: self
+    type(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: x(:, :)
     integer(int32), intent(in) :: bins(2)      !! number of columns and rows
@@ -193,7 +193,7 @@ contains
 
   !> Adds pairs of disks by testing all of them. A stop request ends this early.
   subroutine test_all_pairs(self, x, radius, period)
-    type(near_pairs_t), intent(inout) :: self
+    type(verlet_list_t), intent(inout) :: self
     real(real64), contiguous, intent(in) :: x(:, :), radius(:)   !! [length]
     real(real64), intent(in) :: period(2)                        !! [length]
     integer(int32) :: near_i(64), i, j, k, n
@@ -228,7 +228,7 @@ contains
 
   !> Appends a pair.
   pure subroutine append(self, i, partner)
-    type(near_pairs_t), intent(inout) :: self
+    type(verlet_list_t), intent(inout) :: self
     integer(int32), intent(in) :: i, partner
 
     if (self%n == size(self%i)) then
@@ -256,4 +256,4 @@ contains
     partner(place) = partner
   end subroutine sort_pairs
 
-end module near_pairs
+end module verlet_list

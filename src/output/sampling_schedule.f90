@@ -1,6 +1,6 @@
 !> Sampling schedules: samples are due at multiples of a time, of a number of collisions or of a number of events, at given
 !> times, and at the start and the end of a run. Also the progress of the output.
-module cadence
+module sampling_schedule
   use kinds, only: int64, never, real64
   use evolution, only: limits_t
   use settings, only: sampling_t, settings_t
@@ -8,14 +8,14 @@ module cadence
   use stop_rules, only: whole_collisions
   implicit none
   private
-  public :: cadence_t, by_time, by_collisions, by_events, progress_t, frames, values
+  public :: schedule_t, by_time, by_collisions, by_events, progress_t, frames, values
 
   !> Quantities by which intervals are measured.
   integer, parameter :: by_time = 1, by_collisions = 2, by_events = 3
 
   integer, parameter :: units_lost = 4  !! times that differ by at most this number of units in the last place count as equal
 
-  type :: cadence_t
+  type :: schedule_t
     real(real64) :: every(3) = never  !! intervals of time, of collisions and of events; the latter two need not be integers
     type(sampling_t) :: chosen                    !! the sampling rules of the input, for the given times
     integer(int64) :: count = 0                   !! number of samples taken; the first is due at once
@@ -30,11 +30,11 @@ module cadence
     procedure :: tighten
     procedure :: planned
     procedure, private :: next_time, number_within
-  end type cadence_t
+  end type schedule_t
 
   !> The progress of the output. Together with the state of the simulation it is all that is needed to resume a run.
   type :: progress_t
-    type(cadence_t) :: cadence(2)                 !! schedules of frames and of observables
+    type(schedule_t) :: schedule(2)               !! schedules of frames and of observables
     integer(int64) :: events = 0                  !! number of collisions written to the event log
   end type progress_t
   integer, parameter :: frames = 1, values = 2
@@ -52,8 +52,8 @@ contains
     integer :: k
 
     do k = frames, values
-      progress%cadence(k)%every = intervals(settings%output%sampling(k)%every)
-      progress%cadence(k)%chosen = settings%output%sampling(k)
+      progress%schedule(k)%every = intervals(settings%output%sampling(k)%every)
+      progress%schedule(k)%chosen = settings%output%sampling(k)
     end do
   contains
 
@@ -68,7 +68,7 @@ contains
 
   !> Whether a sample is due now.
   elemental function is_due(self, sim) result(yes)
-    class(cadence_t), intent(in) :: self
+    class(schedule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
@@ -78,7 +78,7 @@ contains
 
   !> Whether the present state has not been sampled yet.
   pure function is_new(self, sim) result(yes)
-    class(cadence_t), intent(in) :: self
+    class(schedule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
@@ -87,7 +87,7 @@ contains
 
   !> Registers a sample of the present state.
   pure subroutine take(self, sim)
-    class(cadence_t), intent(inout) :: self
+    class(schedule_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
 
     self%count = self%count + 1
@@ -100,7 +100,7 @@ contains
   !> independently of when the last sample was taken. Exception: a sample that is due now, at a time at which events may still
   !> occur.
   elemental subroutine look_ahead(self, sim)
-    class(cadence_t), intent(inout) :: self
+    class(schedule_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     logical :: over                               ! all samples of the present time have been taken or missed
 
@@ -111,7 +111,7 @@ contains
 
   !> Lowers the limits so that the simulation stops at the next sample.
   pure subroutine tighten(self, limits)
-    class(cadence_t), intent(in) :: self
+    class(schedule_t), intent(in) :: self
     type(limits_t), intent(inout) :: limits
 
     limits%time = min(limits%time, self%next(by_time))
@@ -124,7 +124,7 @@ contains
   !> logarithmic step, or a given time. Multiples are computed as products, because sums would accumulate rounding errors. If such
   !> times differ only by rounding, one sample is due, at the last of them.
   pure function next_time(self, time, past) result(next)
-    class(cadence_t), intent(in) :: self
+    class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: time, past        !! [time]
     real(real64) :: next, due(3)
     integer(int64) :: n
@@ -201,7 +201,7 @@ contains
   !> Number of samples of a run, if it is known in advance, otherwise 0. It is known if there is at most one interval, and if the
   !> only stop rule is of the same kind as the interval (of time if times are given).
   elemental function planned(self, limits) result(n)
-    class(cadence_t), intent(in) :: self
+    class(schedule_t), intent(in) :: self
     type(limits_t), intent(in) :: limits          !! of the run
     integer(int64) :: n
     logical :: given(3), limited(3), chooses
@@ -221,7 +221,7 @@ contains
 
   !> Number of times from 0 to t at which samples are due, including both. 0: too many to plan for.
   pure function number_within(self, t) result(n)
-    class(cadence_t), intent(in) :: self
+    class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: t                 !! [time]
     integer(int64) :: n
     integer(int64), parameter :: too_many = 10000000
@@ -261,4 +261,4 @@ contains
     if (every > 1 .and. limit > 0) n = 2 + int((limit - 1)/every*(1 + 4*epsilon(every)), int64)
   end function numbers_within
 
-end module cadence
+end module sampling_schedule

@@ -1,7 +1,7 @@
 !> Records of the motion of disks in one domain in the present time window: the cells that they were in and a digest of their
 !> collisions. They are used to test afterwards whether copies moved like the disks that they represent in other domains. Also
 !> decides which collisions a domain counts.
-module tracks
+module histories
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int16, int32, int64, real64
   use cell_faces, only: patch_t
@@ -9,95 +9,95 @@ module tracks
   use disks, only: disk_t, tag_t
   implicit none
   private
-  public :: track_t, tracks_t
+  public :: history_t, histories_t
 
-  !> The motion of a disk in the present window. An own disk of which no other domain can have a copy has no track.
-  type :: track_t
+  !> The motion of a disk in the present window. An own disk of which no other domain can have a copy has no history.
+  type :: history_t
     integer(int64) :: digest = 0                   !! digest of the times of its collisions with disks
     integer(int32) :: slot = 0
     logical :: own = .false.                       !! owned by this domain; otherwise a copy
     integer(int16) :: low(2) = 0_int16             !! lowest column and row that it was in
     integer(int16) :: high(2) = 0_int16            !! highest column and row
-  end type track_t
+  end type history_t
 
-  type :: tracks_t
+  type :: histories_t
     type(patch_t) :: patch                         !! cells of the domain and its halo
-    integer(int32) :: n_tracks = 0
-    type(track_t), allocatable :: track(:)         !! (at least n_tracks) the tracks
-    integer(int32), allocatable :: track_of(:)     !! (slots) index of the track; 0: none
+    integer(int32) :: n_histories = 0
+    type(history_t), allocatable :: history(:)     !! (at least n_histories) the histories
+    integer(int32), allocatable :: history_of(:)   !! (slots) index of the history; 0: none
     integer(int32) :: own_low(2) = 0, own_high(2) = 0      !! columns and rows of the domain
     integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! columns and rows that are in no patch of another domain
     integer(int32) :: safe_low(2) = 0, safe_high(2) = 0    !! beyond these the patch ends and has no copies
     integer(int8), allocatable :: reached(:, :)    !! (0:,0:) 1: an own disk that has left the domain came near this cell
-    logical :: too_far = .false.                   !! an own disk reached the edge of the patch
+    logical :: left_patch = .false.                !! an own disk reached the edge of the patch
   contains
-    procedure :: note_collision
-    procedure :: note
+    procedure :: record_collision
+    procedure :: record_cell
     procedure :: read_ahead
     procedure :: begin_window
-    procedure :: begin_track
-    procedure :: drop_track
+    procedure :: begin_history
+    procedure :: drop_history
     procedure :: counts
     procedure :: could_have_met
     procedure :: owns
     procedure :: is_own
     procedure :: n_copies
-    procedure, private :: add_track
-  end type tracks_t
+    procedure, private :: add_history
+  end type histories_t
 
 contains
 
   !> Begins a new window, in which no own disk has left the domain yet.
   subroutine begin_window(self)
-    class(tracks_t), intent(inout) :: self
+    class(histories_t), intent(inout) :: self
 
     self%reached = 0_int8
-    self%too_far = .false.
+    self%left_patch = .false.
   end subroutine begin_window
 
-  !> Begins a new track of disk i at its present cell, if it needs one there. The cell also determines whether the domain owns it.
-  subroutine begin_track(self, cell, i)
-    class(tracks_t), intent(inout) :: self
+  !> Begins a new history of disk i at its present cell, if it needs one there. The cell also determines whether the domain owns it.
+  subroutine begin_history(self, cell, i)
+    class(histories_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
     integer(int32), intent(in) :: i
 
     if (within(cell, self%deep_low, self%deep_high)) then
-      call self%drop_track(i)
+      call self%drop_history(i)
     else
-      if (self%track_of(i) == 0) call self%add_track(i)
-      self%track(self%track_of(i)) = track_t(0_int64, i, self%owns(cell), cell, cell)
+      if (self%history_of(i) == 0) call self%add_history(i)
+      self%history(self%history_of(i)) = history_t(0_int64, i, self%owns(cell), cell, cell)
     end if
-  end subroutine begin_track
+  end subroutine begin_history
 
-  !> Assigns a track to disk i, which has yet to be begun.
-  subroutine add_track(self, i)
-    class(tracks_t), intent(inout) :: self
+  !> Assigns a history to disk i, which has yet to be begun.
+  subroutine add_history(self, i)
+    class(histories_t), intent(inout) :: self
     integer(int32), intent(in) :: i
 
-    if (self%n_tracks == size(self%track)) self%track = [self%track, self%track]
-    self%n_tracks = self%n_tracks + 1
-    self%track_of(i) = self%n_tracks
-  end subroutine add_track
+    if (self%n_histories == size(self%history)) self%history = [self%history, self%history]
+    self%n_histories = self%n_histories + 1
+    self%history_of(i) = self%n_histories
+  end subroutine add_history
 
-  !> Deletes the track of disk i, if it has one; the last track takes its index.
-  subroutine drop_track(self, i)
-    class(tracks_t), intent(inout) :: self
+  !> Deletes the history of disk i, if it has one; the last history takes its index.
+  subroutine drop_history(self, i)
+    class(histories_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     integer(int32) :: k
 
-    k = self%track_of(i)
+    k = self%history_of(i)
     if (k == 0) return
-    self%track_of(i) = 0
-    if (k < self%n_tracks) then
-      self%track(k) = self%track(self%n_tracks)
-      self%track_of(self%track(k)%slot) = k
+    self%history_of(i) = 0
+    if (k < self%n_histories) then
+      self%history(k) = self%history(self%n_histories)
+      self%history_of(self%history(k)%slot) = k
     end if
-    self%n_tracks = self%n_tracks - 1
-  end subroutine drop_track
+    self%n_histories = self%n_histories - 1
+  end subroutine drop_history
 
   !> Whether this domain counts a collision of disk i: the domain that owns the disk, or the disk with the lower id of a pair.
   pure function counts(self, tag, i, code) result(yes)
-    class(tracks_t), intent(in) :: self
+    class(histories_t), intent(in) :: self
     type(tag_t), intent(in) :: tag(:)
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: code             !! code of the partner
@@ -111,17 +111,17 @@ contains
   end function counts
 
   !> Records a collision of disks i and j, and their cells.
-  subroutine note_collision(self, disk, tag, i, j)
-    class(tracks_t), intent(inout) :: self
+  subroutine record_collision(self, disk, tag, i, j)
+    class(histories_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
     type(tag_t), intent(in) :: tag(:)
     integer(int32), intent(in) :: i, j
 
-    if (self%track_of(i) > 0) call add_moment(self%track(self%track_of(i))%digest, disk(i)%clock)
-    if (self%track_of(j) > 0) call add_moment(self%track(self%track_of(j))%digest, disk(j)%clock)
-    call self%note(tag(i)%cell, i)                 ! the collision may have changed their cells
-    call self%note(tag(j)%cell, j)
-  end subroutine note_collision
+    if (self%history_of(i) > 0) call add_moment(self%history(self%history_of(i))%digest, disk(i)%clock)
+    if (self%history_of(j) > 0) call add_moment(self%history(self%history_of(j))%digest, disk(j)%clock)
+    call self%record_cell(tag(i)%cell, i)          ! the collision may have changed their cells
+    call self%record_cell(tag(j)%cell, j)
+  end subroutine record_collision
 
   !> Adds a collision to a digest.
   elemental subroutine add_moment(digest, time)
@@ -131,45 +131,45 @@ contains
     digest = ieor(ishftc(digest, 11), transfer(time, digest))
   end subroutine add_moment
 
-  !> Prefetches the track indices of some disks and of their partners.
+  !> Prefetches the history indices of some disks and of their partners.
   subroutine read_ahead(self, disk, disks)
-    class(tracks_t), intent(in) :: self
+    class(histories_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
     integer(int32), intent(in) :: disks(:)
     integer(int32) :: k
 
     do k = 1, size(disks)
-      call prefetch(self%track_of(disks(k)))
-      call prefetch(self%track_of(max(disk(disks(k))%partner, 1)))
+      call prefetch(self%history_of(disks(k)))
+      call prefetch(self%history_of(max(disk(disks(k))%partner, 1)))
     end do
   end subroutine read_ahead
 
   !> Records the cell of disk i.
-  subroutine note(self, cell, i)
-    class(tracks_t), intent(inout) :: self
+  subroutine record_cell(self, cell, i)
+    class(histories_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
     integer(int32), intent(in) :: i
 
-    if (self%track_of(i) == 0) then
+    if (self%history_of(i) == 0) then
       if (within(cell, self%deep_low, self%deep_high)) return
-      call self%add_track(i)                       ! from here on it can be in other domains' patches
-      self%track(self%track_of(i)) = track_t(0_int64, i, .true., cell, cell)
+      call self%add_history(i)                     ! from here on it can be in other domains' patches
+      self%history(self%history_of(i)) = history_t(0_int64, i, .true., cell, cell)
     end if
-    associate (track => self%track(self%track_of(i)))
-      track%low = min(track%low, cell)
-      track%high = max(track%high, cell)
-      if (track%own .and. .not. self%owns(cell)) call reach(self, cell)
+    associate (history => self%history(self%history_of(i)))
+      history%low = min(history%low, cell)
+      history%high = max(history%high, cell)
+      if (history%own .and. .not. self%owns(cell)) call reach(self, cell)
     end associate
-  end subroutine note
+  end subroutine record_cell
 
   !> Records that an own disk has left the domain: it may touch any disk in the nine cells around.
   subroutine reach(self, cell)
-    class(tracks_t), intent(inout) :: self
+    class(histories_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
     integer(int32) :: there(2), dx, dy
 
     if (.not. within(cell, self%safe_low, self%safe_high)) then
-      self%too_far = .true.
+      self%left_patch = .true.
       return
     end if
     do dy = -1, 1
@@ -192,7 +192,7 @@ contains
 
   !> Whether a cell belongs to the domain.
   pure function owns(self, cell) result(yes)
-    class(tracks_t), intent(in) :: self
+    class(histories_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
     logical :: yes
 
@@ -201,25 +201,25 @@ contains
 
   !> Whether the domain owns disk i.
   pure function is_own(self, i) result(yes)
-    class(tracks_t), intent(in) :: self
+    class(histories_t), intent(in) :: self
     integer(int32), intent(in) :: i
     logical :: yes
 
-    yes = self%track_of(i) == 0
-    if (.not. yes) yes = self%track(self%track_of(i))%own
+    yes = self%history_of(i) == 0
+    if (.not. yes) yes = self%history(self%history_of(i))%own
   end function is_own
 
   !> Number of copies.
   pure function n_copies(self) result(n)
-    class(tracks_t), intent(in) :: self
+    class(histories_t), intent(in) :: self
     integer(int32) :: n
 
-    n = count(.not. self%track(:self%n_tracks)%own, kind=int32)
+    n = count(.not. self%history(:self%n_histories)%own, kind=int32)
   end function n_copies
 
   !> Whether a disk that was in these columns and rows during the window could have met an own disk.
   pure function could_have_met(self, low, high) result(yes)
-    class(tracks_t), intent(in) :: self
+    class(histories_t), intent(in) :: self
     integer(int32), intent(in) :: low(2), high(2)
     logical :: yes
     integer(int32) :: from(2), to(2)
@@ -231,4 +231,4 @@ contains
     yes = any(self%reached(from(1):to(1), from(2):to(2)) > 0)
   end function could_have_met
 
-end module tracks
+end module histories
