@@ -41,7 +41,7 @@ module run
     type(progress_line_t) :: line
     real(real64) :: started = 0.0_real64                   !! time when the program started, by the clock `seconds` [s]
     real(real64) :: rate = 0.0_real64                      !! collisions per processor time of this part [1/s]
-    integer(int64) :: alone = 0  !! number of events of this part executed by the serial engine of a parallel run
+    integer(int64) :: serial_events = 0  !! number of events of this part executed by the serial engine of a parallel run
   end type run_t
 
 contains
@@ -170,7 +170,7 @@ contains
     call main_loop(run, error)
     call cpu_time(cpu(2))
     run%rate = (run%sim%tally%collisions - collisions)/max(cpu(2) - cpu(1), 1.0e-9_real64)
-    run%alone = run%evolution%alone
+    run%serial_events = run%evolution%serial_events
     deallocate (run%evolution)                             ! releases memory for the end of the output
   end subroutine follow
 
@@ -179,7 +179,7 @@ contains
     type(run_t), intent(in) :: run
     real(real64) :: cost(3)
 
-    cost = [seconds() - run%started, run%rate, real(run%alone, real64)]
+    cost = [seconds() - run%started, run%rate, real(run%serial_events, real64)]
   end function cost_of
 
   !> Main loop: advances the simulation from one sample, checkpoint or check to the next, until its end.
@@ -254,7 +254,7 @@ contains
         eol//"wall_time = "//written(seconds() - run%started)// &
         eol//"collisions_per_second = "//written(run%rate)
       if (run%input%settings%run%threads_asked > 1) text = text//eol//"threads = "//written(run%input%settings%run%threads)
-      if (run%input%settings%run%threads > 1) text = text//eol//"events_on_one_core = "//written(run%alone)
+      if (run%input%settings%run%threads > 1) text = text//eol//"events_on_one_core = "//written(run%serial_events)
       if (sim%drive%is_on()) text = text//eol//"kicks = "//written(sim%kicks)// &
         eol//"drive_energy = "//written(sim%tally%total(drive_energy))
     end associate

@@ -114,7 +114,7 @@ contains
       events%windowed = settings%run%queue == "calendar"
       if (cuts_space) then
         allocate (parallel)
-        parallel%plain = events
+        parallel%serial = events
         parallel%parts%threads = settings%run%threads
         call move_alloc(parallel, evolution)
       else

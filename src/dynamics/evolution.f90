@@ -28,7 +28,7 @@ module evolution
     logical :: idle = .false.     !! no event will ever occur again
     logical :: arrived = .false.  !! the last advance reached its time limit, and all events up to it have been executed
     integer(int64) :: iterations_left = 0  !! number of iterations left of those that the last advance was allowed
-    integer(int64) :: alone = 0            !! number of events executed by the serial engine of a parallel run
+    integer(int64) :: serial_events = 0    !! number of events executed by the serial engine of a parallel run
     integer(int32) :: last_event(2) = 0    !! disk and partner of the last event, or of the first one beyond the time limit
   contains
     procedure :: warning

@@ -3,12 +3,12 @@
 !> the window is invalid. docs/theory.md states this criterion and proves that it is sufficient.
 module domain_borders
   use kinds, only: int16, int32, int64
-  use domains, only: copy_of, domain_t, forever, list_copies, news_t
+  use domains, only: correction_t, domain_t, forever, list_copies, slot_of_copy
   use partners, only: nothing
   use histories, only: history_t
   implicit none
   private
-  public :: compare_copies, refresh
+  public :: compare_copies, correct_copies
 
 contains
 
@@ -21,12 +21,12 @@ contains
 
     found = 0
     associate (self => domain(k))
-      self%n_news = 0
-      self%good = self%done .and. .not. self%engine%histories%left_patch
+      self%n_corrections = 0
+      self%valid = self%done .and. .not. self%engine%histories%left_patch
       do m = 1, size(self%neighbour)
-        if (self%good) call compare(self, domain(self%neighbour(m)), found)
+        if (self%valid) call compare(self, domain(self%neighbour(m)), found)
       end do
-      if (found < self%engine%histories%n_copies()) self%good = .false.  ! the owner of a copy was not found
+      if (found < self%engine%histories%n_copies()) self%valid = .false.  ! the owner of a copy was not found
     end associate
   end subroutine compare_copies
 
@@ -43,7 +43,7 @@ contains
       do r = 1, theirs%n_histories
         if (.not. theirs%history(r)%own) cycle
         t = theirs%history(r)%slot
-        s = copy_of(self, other%sim%tag(t)%id)
+        s = slot_of_copy(self, other%sim%tag(t)%id)
         cell = modulo(other%sim%tag(t)%cell + shift - 1, self%patch%whole) + 1
         if (s > 0) then
           found = found + 1
@@ -60,9 +60,9 @@ contains
           near = came_near(theirs%history(r), met)
           if (.not. (near .and. (met .or. all(cell <= self%patch%n)))) cycle
         end if
-        if (met .and. .not. same) self%good = .false.
-        if (.not. self%good) return
-        call note_news()
+        if (met .and. .not. same) self%valid = .false.
+        if (.not. self%valid) return
+        call add_correction()
       end do
     end associate
   contains
@@ -105,26 +105,26 @@ contains
     end function same_state
 
     !> Adds the true state of the disk in the neighbour's slot t to the list of corrections.
-    subroutine note_news()
-      if (.not. allocated(self%news)) allocate (self%news(256))
-      if (self%n_news == size(self%news)) self%news = [self%news, self%news]
-      self%n_news = self%n_news + 1
-      associate (news => self%news(self%n_news))
-        news%whole_disk_t = other%sim%whole_disk(t)
-        news%home = other%home(t)
-        news%cell = cell
-        news%slot = s
+    subroutine add_correction()
+      if (.not. allocated(self%corrections)) allocate (self%corrections(256))
+      if (self%n_corrections == size(self%corrections)) self%corrections = [self%corrections, self%corrections]
+      self%n_corrections = self%n_corrections + 1
+      associate (correction => self%corrections(self%n_corrections))
+        correction%whole_disk_t = other%sim%whole_disk(t)
+        correction%global_index = other%global_index(t)
+        correction%cell = cell
+        correction%slot = s
       end associate
-    end subroutine note_news
+    end subroutine add_correction
   end subroutine compare
 
   !> Applies the corrections: updates copies, adds those of disks that have entered the patch, removes those that have left.
-  subroutine refresh(self)
+  subroutine correct_copies(self)
     type(domain_t), intent(inout) :: self
     integer(int32), allocatable :: waiting(:)      ! (n_waiting) slots whose events have to be predicted
     integer(int32) :: k, n_waiting, slot
 
-    allocate (waiting(self%n_news))
+    allocate (waiting(self%n_corrections))
     n_waiting = 0
     associate (histories => self%engine%histories)
       call histories%begin_window()
@@ -133,47 +133,47 @@ contains
         call histories%begin_history(self%sim%tag(slot)%cell, slot)
       end do
     end associate
-    do k = 1, self%n_news
-      call take_over(self%news(k))
+    do k = 1, self%n_corrections
+      call apply_correction(self%corrections(k))
     end do
     do k = 1, n_waiting
       call self%engine%search%predict(self%sim, waiting(k))
       call self%engine%queue%schedule(self%sim%disk, self%sim%tag, waiting(k))
     end do
     call list_copies(self)
-    self%n_news = 0
+    self%n_corrections = 0
   contains
 
     !> Applies one correction.
-    subroutine take_over(news)
-      type(news_t), intent(in) :: news
+    subroutine apply_correction(correction)
+      type(correction_t), intent(in) :: correction
       integer(int32) :: s, stamp, window
 
-      s = news%slot
-      if (any(news%cell > self%patch%n)) then
+      s = correction%slot
+      if (any(correction%cell > self%patch%n)) then
         if (s > 0) call leave(s)
         return
       end if
       if (s == 0) then
         s = self%vacant
-        self%good = s > 0 .and. self%good            ! no vacant slot: the domain has to be loaded again
+        self%valid = s > 0 .and. self%valid          ! no vacant slot: the domain has to be loaded again
         if (s == 0) return
-        self%vacant = self%home(s)
+        self%vacant = self%global_index(s)
       else if (self%patch%holds(self%sim%tag(s)%cell)) then
         call self%engine%search%take_out(self%sim%tag(s), s)
       end if
       window = self%sim%tag(s)%window
       stamp = self%sim%disk(s)%stamp + 1
-      call self%sim%place_disk(s, news%whole_disk_t)
+      call self%sim%place_disk(s, correction%whole_disk_t)
       self%sim%tag(s)%window = window
       self%sim%disk(s)%stamp = stamp
       self%sim%disk(s)%event_time = forever
-      self%home(s) = news%home
-      call self%engine%search%insert(self%sim, s, int(news%cell, int16))
+      self%global_index(s) = correction%global_index
+      call self%engine%search%insert(self%sim, s, int(correction%cell, int16))
       call self%engine%histories%begin_history(self%sim%tag(s)%cell, s)
       n_waiting = n_waiting + 1
       waiting(n_waiting) = s
-    end subroutine take_over
+    end subroutine apply_correction
 
     !> Removes the copy in slot s, whose disk has left the patch.
     subroutine leave(s)
@@ -185,9 +185,9 @@ contains
       self%sim%disk(s)%partner = nothing
       self%sim%disk(s)%stamp = self%sim%disk(s)%stamp + 1
       self%sim%tag(s)%id = 0
-      self%home(s) = self%vacant
+      self%global_index(s) = self%vacant
       self%vacant = s
     end subroutine leave
-  end subroutine refresh
+  end subroutine correct_copies
 
 end module domain_borders

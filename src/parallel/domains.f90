@@ -15,7 +15,7 @@ module domains
   use system, only: seconds
   implicit none
   private
-  public :: copy_of, domain_t, forever, list_copies, load, merge_logs, move_on, news_t, next_time, write_back
+  public :: advance_domain, correction_t, domain_t, forever, list_copies, load, merge_logs, next_time, slot_of_copy, write_back
 
   real(real64), parameter :: forever = 2.0e150_real64      !! later than any event
   real(real64), parameter :: longest_window = 5.0_real64  !! longest wall time for a window of one domain, after which the window is
@@ -25,11 +25,11 @@ module domains
                                                                  !! disks, plus spare_at_least
 
   !> Correction: the true state of a disk whose copy in this domain is wrong or missing, or has to be removed.
-  type, extends(whole_disk_t) :: news_t
-    integer(int32) :: home = 0                     !! index of the disk in the whole simulation
+  type, extends(whole_disk_t) :: correction_t
+    integer(int32) :: global_index = 0             !! index of the disk in the whole simulation
     integer(int32) :: cell(2) = 0                  !! cell relative to this domain's patch; may lie outside of it
     integer(int32) :: slot = 0                     !! slot of the copy; 0: there is none
-  end type news_t
+  end type correction_t
 
   type :: domain_t
     integer(int32) :: low(2) = 0, high(2) = 0      !! columns and rows of the whole grid that the domain owns
@@ -38,15 +38,15 @@ module domains
     type(patch_t) :: patch
     type(simulation_t) :: sim  !! own disks and copies in slots; times count from the same epoch as in the whole simulation
     type(event_driven_t) :: engine
-    integer(int32), allocatable :: home(:)  !! (slots) index of the disk in the whole simulation; in a vacant slot: the next vacant
-                                            !! slot
+    !> (slots) Index of the disk in the whole simulation; in a vacant slot: the next vacant slot.
+    integer(int32), allocatable :: global_index(:)
     integer(int32) :: vacant = 0                   !! first vacant slot; 0: none
     type(event_log_t), allocatable :: log          !! log of the collisions recorded here
     integer(int64) :: iterations = 0               !! iterations of the engine in this window
     logical :: done = .false.                      !! the engine has reached the end of the window
-    logical :: good = .false.                      !! no own disk can have met a wrong copy
-    integer(int32) :: n_news = 0
-    type(news_t), allocatable :: news(:)           !! (at least n_news) corrections to be applied
+    logical :: valid = .false.                     !! no own disk can have met a wrong copy
+    integer(int32) :: n_corrections = 0
+    type(correction_t), allocatable :: corrections(:)  !! (at least n_corrections) corrections to be applied
     integer(int32), allocatable, private :: key(:), slot(:)  !! (0:last_key) ids and slots of the copies: a hash table
     integer(int32), private :: last_key = 0        !! a power of two minus 1
   end type domain_t
@@ -65,16 +65,16 @@ contains
     do i = 1, n
       call self%sim%place_disk(i, sim%whole_disk(disks(i)))
     end do
-    self%home(:n) = disks
+    self%global_index(:n) = disks
     slots = self%sim%n_disks()
     do i = n + 1, slots
       self%sim%disk(i) = disk_t(event_time=forever, partner=nothing)
       self%sim%tag(i) = tag_t()
-      self%home(i) = merge(i + 1, 0, i < slots)
+      self%global_index(i) = merge(i + 1, 0, i < slots)
     end do
     self%vacant = n + 1
-    self%n_news = 0
-    self%good = .true.
+    self%n_corrections = 0
+    self%valid = .true.
     self%sim%now = sim%now
     self%sim%box%epoch = sim%box%epoch
     if (allocated(self%log)) self%log%n = 0
@@ -94,13 +94,13 @@ contains
         self%engine%is_part = .true.
       end if
       slots = n + n/spare + spare_at_least
-      if (allocated(self%home)) then
-        if (size(self%home) > n + spare_at_least/2 .and. size(self%home) < 2*slots) return
-        deallocate (self%sim%disk, self%sim%tag, self%home)
+      if (allocated(self%global_index)) then
+        if (size(self%global_index) > n + spare_at_least/2 .and. size(self%global_index) < 2*slots) return
+        deallocate (self%sim%disk, self%sim%tag, self%global_index)
         if (allocated(self%sim%own_mass)) deallocate (self%sim%own_mass)
         if (allocated(self%sim%extra)) deallocate (self%sim%extra)
       end if
-      allocate (self%home(slots))
+      allocate (self%global_index(slots))
       call self%sim%make_room(slots, like=sim)
     end subroutine make_room
 
@@ -176,7 +176,7 @@ contains
   end function place_of
 
   !> The slot of the copy with the given id; 0 if there is none.
-  pure function copy_of(self, id) result(slot)
+  pure function slot_of_copy(self, id) result(slot)
     type(domain_t), intent(in) :: self
     integer(int32), intent(in) :: id
     integer(int32) :: slot, place
@@ -184,36 +184,36 @@ contains
     place = place_of(self, id)
     slot = 0
     if (self%key(place) == id) slot = self%slot(place)
-  end function copy_of
+  end function slot_of_copy
 
   !> Advances the domain with its copies to the end of a window. Gives up after the given number of iterations of the engine, or
   !> after `longest_window`.
-  subroutine move_on(self, t_end, iterations)
+  subroutine advance_domain(self, t_end, iterations)
     type(domain_t), intent(inout) :: self
     real(real64), intent(in) :: t_end              !! end of the window, since the epoch [time]
     integer(int64), intent(in) :: iterations
     type(limits_t) :: limits
     type(error_t), allocatable :: error
     real(real64) :: began                          ! [s]
-    integer(int64) :: left
+    integer(int64) :: iterations_left
 
     self%done = .false.
-    if (.not. self%good) return                    ! there was no slot for all copies
+    if (.not. self%valid) return                   ! there was no slot for all copies
     began = seconds()
     limits%time = t_end
-    left = iterations
-    do while (left > 0)
-      limits%iterations = min(left, iterations_between_checks)
+    iterations_left = iterations
+    do while (iterations_left > 0)
+      limits%iterations = min(iterations_left, iterations_between_checks)
       call self%engine%advance(self%sim, limits, error, self%log)
-      left = left - (limits%iterations - self%engine%iterations_left)
+      iterations_left = iterations_left - (limits%iterations - self%engine%iterations_left)
       if (allocated(error)) exit
       self%done = self%engine%arrived
       if (self%done) exit
       if (stop_requested()) exit
       if (seconds() - began > longest_window) exit
     end do
-    self%iterations = self%iterations + iterations - left
-  end subroutine move_on
+    self%iterations = self%iterations + iterations - iterations_left
+  end subroutine advance_domain
 
   !> Time of the next event in the domain.
   function next_time(self) result(t)
@@ -233,7 +233,7 @@ contains
 
     do k = 1, self%sim%n_disks()
       if (self%sim%tag(k)%id == 0 .or. .not. self%engine%histories%is_own(k)) cycle
-      call sim%place_disk(self%home(k), self%sim%whole_disk(k))
+      call sim%place_disk(self%global_index(k), self%sim%whole_disk(k))
     end do
   end subroutine write_back
 

@@ -22,15 +22,15 @@ module parallel_events
   !> Numbers of events per disk that must remain before a stop or pause at a count, for domains to continue and to begin.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
   ! Shortest and longest periods of the serial engine [events per disk]:
-  integer(int64), parameter :: moment(2) = 5                        !! to pass a situation that domains cannot handle
-  integer(int64), parameter :: failing(2) = [5, 5*2**20]            !! while windows are invalid
-  integer(int64), parameter :: busy(2) = [50, 1600]                 !! while the cores are busy with other programs
+  integer(int64), parameter :: brief(2) = 5                         !! to pass a situation that domains cannot handle
+  integer(int64), parameter :: after_failures(2) = [5, 5*2**20]     !! while windows are invalid
+  integer(int64), parameter :: while_busy(2) = [50, 1600]           !! while the cores are busy with other programs
 
   !> The engine that has predicted the events.
-  integer, parameter :: nobody = 0, plain_engine = 1, all_domains = 2
+  integer, parameter :: no_engine = 0, serial_engine = 1, all_domains = 2
 
   type, extends(evolution_t) :: parallel_events_t
-    type(event_driven_t) :: plain                  !! initial state of the serial engine, which is copied to use it
+    type(event_driven_t) :: serial                 !! initial state of the serial engine, which is copied to use it
     type(partition_t) :: parts
     integer(int32) :: least_disks = 1250  !! smallest number of disks in a domain; doubled in a periodic box, which is cut at twice
                                           !! as many places
@@ -40,9 +40,9 @@ module parallel_events
     integer(int64) :: windows_done = 0, windows_failed = 0
     ! The serial engine exists only while there are no domains, to save memory.
     type(event_driven_t), allocatable, private :: engine   !! the serial engine in use
-    integer, private :: holder = nobody            !! engine that holds the predicted events
-    integer(int64), private :: spell = 0           !! last period of the serial engine [events per disk]
-    integer(int64), private :: plain_until = -1    !! number of events up to which the serial engine is used
+    integer, private :: predicted_by = no_engine   !! engine that holds the predicted events
+    integer(int64), private :: serial_period = 0   !! last period of the serial engine [events per disk]
+    integer(int64), private :: serial_until = -1   !! number of events up to which the serial engine is used
   contains
     procedure :: start
     procedure :: renew
@@ -57,7 +57,7 @@ contains
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
 
-    self%holder = nobody
+    self%predicted_by = no_engine
     self%idle = .false.
     if (.not. self%parts%cores > 0) self%parts%cores = self%parts%threads
     self%parts%widening = max(self%parts%widening - 1, 0)
@@ -76,10 +76,10 @@ contains
     integer(int32), intent(in) :: changed(:)
 
     self%idle = .false.
-    if (self%holder == plain_engine) then
+    if (self%predicted_by == serial_engine) then
       call self%engine%renew(sim, changed)
     else
-      self%holder = nobody
+      self%predicted_by = no_engine
     end if
   end subroutine renew
 
@@ -100,47 +100,47 @@ contains
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
     type(event_log_t), intent(inout), optional :: log
-    logical :: plainly                             ! the serial engine is used
+    logical :: serially                            ! the serial engine is used
 
     self%arrived = .false.
     if (limits%reached(sim%tally) .or. is_full(log)) return
-    plainly = .not. worthwhile()
-    if (.not. plainly) call visit()
-    if (plainly) call advance_plainly()
+    serially = .not. domains_pay()
+    if (.not. serially) call run_domains()
+    if (serially) call advance_serially()
     if (self%parts%wanted > self%parts%threads .and. allocated(self%parts%domain) .and. &
       (sim%now >= sim%epoch_end .or. sim%tally%events >= most_events(sim))) then
       deallocate (self%parts%domain)               ! to leave memory for sorting the disks
-      self%holder = nobody
+      self%predicted_by = no_engine
     end if
   contains
 
     !> Whether several domains can be faster than the serial engine.
-    pure function worthwhile() result(yes)
+    pure function domains_pay() result(yes)
       logical :: yes
       real(real64) :: least
 
-      least = merge(least_left, least_left_to_begin, self%holder == all_domains)*sim%n_disks()
-      yes = self%parts%wanted > 1 .and. sim%tally%events >= self%plain_until .and. limits%events - sim%tally%events > least &
+      least = merge(least_left, least_left_to_begin, self%predicted_by == all_domains)*sim%n_disks()
+      yes = self%parts%wanted > 1 .and. sim%tally%events >= self%serial_until .and. limits%events - sim%tally%events > least &
         .and. limits%collisions - sim%tally%collisions > least .and. limits%time > sim%now
-    end function worthwhile
+    end function domains_pay
 
     !> Advances the domains by several windows. If one of these is invalid, the simulation keeps its state from before, and the
     !> next visit tries shorter windows.
-    subroutine visit()
+    subroutine run_domains()
       real(real64) :: t
       integer :: windows, listed
       logical :: good, too_far
 
       listed = 0
-      if (self%holder /= all_domains) then
+      if (self%predicted_by /= all_domains) then
         if (allocated(self%engine)) deallocate (self%engine)
-        self%holder = nobody
+        self%predicted_by = no_engine
         call self%parts%fill(sim, present(log), good)
-        if (.not. good) call retire(moment)
+        if (.not. good) call use_serial_engine(brief)
         if (.not. good) return
-        self%holder = all_domains
+        self%predicted_by = all_domains
       end if
-      call self%parts%run_windows(sim, limits, windows_of_visit(), t, windows, good)
+      call self%parts%run_windows(sim, limits, most_windows_now(), t, windows, good)
       self%windows_done = self%windows_done + windows
       if (present(log)) then
         listed = log%n
@@ -148,32 +148,32 @@ contains
       end if
       ! The serial engine finds the exact event at which a count reaches its limit or a collapse occurs.
       too_far = good
-      if (good) too_far = limits%outgrown(self%parts%tally_now(sim)) .or. t - sim%last_advance < sim%negligible_time
+      if (good) too_far = limits%outgrown(self%parts%total_tally(sim)) .or. t - sim%last_advance < sim%negligible_time
       if (good .and. .not. too_far) then
         call self%parts%write_back_all(sim, t)
         self%arrived = t >= limits%time
       else
-        self%holder = nobody
+        self%predicted_by = no_engine
         if (present(log)) log%n = listed
       end if
       if (.not. good) call shorten_windows()
       if (good) call lengthen_windows(windows)
-      if (too_far) call retire(moment)
-      if (self%holder == nobody) return
+      if (too_far) call use_serial_engine(brief)
+      if (self%predicted_by == no_engine) return
       if (self%parts%threads > 1 .and. self%parts%cores <= self%least_cores) then
-        call retire(busy)
+        call use_serial_engine(while_busy)
         self%parts%cores = self%parts%threads
       end if
       ! The serial engine determines whether no event will occur any more.
-      if (all(self%parts%domain%engine%idle)) call retire(moment)
-    end subroutine visit
+      if (all(self%parts%domain%engine%idle)) call use_serial_engine(brief)
+    end subroutine run_domains
 
     !> Number of windows in a visit, all of which an invalid one discards. It decreases with the number of recent failures.
-    pure function windows_of_visit() result(n)
+    pure function most_windows_now() result(n)
       integer :: n
 
       n = max(1, int(most_windows*self%parts%shortening**4))
-    end function windows_of_visit
+    end function most_windows_now
 
     !> Makes windows longer after a visit in which all were valid. Within a visit their length is constant. Otherwise windows that
     !> are later discarded could compensate each halving, and the run would make no progress.
@@ -193,43 +193,43 @@ contains
         if (shortening > shortest) return
         shortening = shortest
       end associate
-      call retire(failing)
+      call use_serial_engine(after_failures)
     end subroutine shorten_windows
 
     !> Selects the serial engine for a period: twice the last one, unless domains have been successful for longer than that
     !> since. A run for which domains are unsuitable therefore costs hardly more than with the serial engine alone.
-    subroutine retire(spells)
-      integer(int64), intent(in) :: spells(2)      !! shortest and longest period [events per disk]
+    subroutine use_serial_engine(periods)
+      integer(int64), intent(in) :: periods(2)      !! shortest and longest period [events per disk]
 
-      if (sim%tally%events - self%plain_until > self%spell*sim%n_disks()) self%spell = 0
-      self%spell = min(max(2*self%spell, spells(1)), spells(2))
-      self%plain_until = sim%tally%events + self%spell*sim%n_disks()
-      plainly = .true.
-    end subroutine retire
+      if (sim%tally%events - self%serial_until > self%serial_period*sim%n_disks()) self%serial_period = 0
+      self%serial_period = min(max(2*self%serial_period, periods(1)), periods(2))
+      self%serial_until = sim%tally%events + self%serial_period*sim%n_disks()
+      serially = .true.
+    end subroutine use_serial_engine
 
     !> Advances the serial engine, at most to the end of its period.
-    subroutine advance_plainly()
+    subroutine advance_serially()
       type(limits_t) :: goal
       integer(int64) :: events
       real(real64) :: time
 
       if (allocated(self%parts%domain)) deallocate (self%parts%domain)
-      if (.not. allocated(self%engine)) allocate (self%engine, source=self%plain)
-      if (self%holder /= plain_engine) call self%engine%start(sim)
-      self%holder = plain_engine
+      if (.not. allocated(self%engine)) allocate (self%engine, source=self%serial)
+      if (self%predicted_by /= serial_engine) call self%engine%start(sim)
+      self%predicted_by = serial_engine
       goal = limits
-      if (sim%tally%events < self%plain_until) goal%events = min(limits%events, self%plain_until)
+      if (sim%tally%events < self%serial_until) goal%events = min(limits%events, self%serial_until)
       events = sim%tally%events
       time = sim%time()
       call self%engine%advance(sim, goal, error, log)
-      self%alone = self%alone + sim%tally%events - events
+      self%serial_events = self%serial_events + sim%tally%events - events
       self%idle = self%engine%idle
       self%arrived = self%engine%arrived
       self%last_event = self%engine%last_event
       self%iterations_left = self%engine%iterations_left
       if (sim%tally%events - events >= sim%n_disks()) &
-        call self%parts%learn(sim%tally%events - events, goal%iterations - self%iterations_left, sim%time() - time)
-    end subroutine advance_plainly
+        call self%parts%update_rates(sim%tally%events - events, goal%iterations - self%iterations_left, sim%time() - time)
+    end subroutine advance_serially
   end subroutine advance
 
 end module parallel_events

@@ -5,9 +5,9 @@ module partition
   use kinds, only: int16, int32, int64, real64
   use cell_faces, only: patch_t
   use cell_layout, only: whole_box
-  use domain_borders, only: compare_copies, refresh
+  use domain_borders, only: compare_copies, correct_copies
   use domain_cuts, only: domain_cuts_t
-  use domains, only: domain_t, load, move_on, next_time, write_back
+  use domains, only: advance_domain, domain_t, load, next_time, write_back
   use evolution, only: limits_t
   use signals, only: stop_requested
   use simulation_state, only: simulation_t
@@ -18,22 +18,22 @@ module partition
   private
   public :: partition_t
 
-  real(real64), parameter :: longest_visit = 1.0_real64        !! time after which the caller can check signals and clocks [s]
-  real(real64), parameter :: of_late = 0.1_real64              !! averaging time for the number of active cores [s]
+  real(real64), parameter :: longest_call = 1.0_real64         !! time after which the caller can check signals and clocks [s]
+  real(real64), parameter :: averaging_time = 0.1_real64       !! averaging time for the number of active cores [s]
   real(real64), parameter :: few_events = 20.0_real64  !! number of events before a limit below which domains advance event by event
 
   !> The next step of all threads. One thread decides on it while the others wait.
   type :: plan_t
-    logical :: goes_on = .true.
+    logical :: continues = .true.
     integer :: windows = 0                         !! number of windows begun
     real(real64) :: until = 0.0_real64             !! wall-clock time after which no further window begins [s]
     real(real64) :: t_begin = 0.0_real64, t_end = 0.0_real64   !! beginning and end of the window, since the epoch [time]
     integer(int64) :: events = 0                   !! number of events in the domains at its beginning
-    logical :: begins = .false.                    !! domains apply the corrections of the previous window first
+    logical :: corrects = .false.                  !! domains apply the corrections of the previous window first
     real(real64) :: t = 0.0_real64                 !! time up to which domains advance, since the epoch [time]
     integer(int64) :: iterations = 0               !! largest number of iterations of an engine in this step
     logical :: compares = .false.                  !! domains are compared, because the window has ended
-    logical :: good = .true.                       !! the window is valid
+    logical :: valid = .true.                      !! the window is valid
   end type plan_t
 
   type :: partition_t
@@ -46,7 +46,7 @@ module partition
     type(patch_t) :: whole                         !! the cells of the box, which are constant during a run
     type(domain_cuts_t) :: cuts
     type(domain_t), allocatable :: domain(:)
-    real(real64) :: pace = 0.0_real64              !! event rate; 0: not known yet [1/time]
+    real(real64) :: event_rate = 0.0_real64        !! event rate; 0: not known yet [1/time]
     real(real64) :: iterations_per_event = 10.0_real64  !! iterations of an engine per event
     real(real64) :: shortening = 1.0_real64        !! factor by which windows are shortened after failures
     integer(int32) :: widening = 0                 !! widening of the halo after failures [cells]
@@ -54,8 +54,8 @@ module partition
   contains
     procedure :: fill
     procedure :: run_windows
-    procedure :: learn
-    procedure :: tally_now
+    procedure :: update_rates
+    procedure :: total_tally
     procedure :: write_back_all
   end type partition_t
 
@@ -85,7 +85,7 @@ contains
       if (size(self%domain) /= self%cuts%n) deallocate (self%domain)
     end if
     if (.not. allocated(self%domain)) allocate (self%domain(self%cuts%n))
-    if (.not. self%pace > 0) self%pace = 10*sim%n_disks()/(sim%epoch_end - sim%epoch_begin)
+    if (.not. self%event_rate > 0) self%event_rate = 10*sim%n_disks()/(sim%epoch_end - sim%epoch_begin)
     !$omp parallel do schedule(static, 1) num_threads(self%threads)
     do k = 1, self%cuts%n
       associate (domain => self%domain(k))
@@ -102,18 +102,18 @@ contains
   end subroutine fill
 
   !> Updates the event rate and the iterations per event, which determine the length of windows, from a measurement.
-  pure subroutine learn(self, events, iterations, time)
+  pure subroutine update_rates(self, events, iterations, time)
     class(partition_t), intent(inout) :: self
     integer(int64), intent(in) :: events, iterations
     real(real64), intent(in) :: time               !! [time]
 
     if (.not. (events > 0 .and. time > 0)) return
-    self%pace = events/time
+    self%event_rate = events/time
     self%iterations_per_event = max(iterations/real(events, real64), 1.0_real64)
-  end subroutine learn
+  end subroutine update_rates
 
   !> The sums and counters of all collisions, including those in the domains since they were loaded.
-  pure function tally_now(self, sim) result(so_far)
+  pure function total_tally(self, sim) result(so_far)
     class(partition_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     type(tally_t) :: so_far
@@ -123,7 +123,7 @@ contains
     do k = 1, self%cuts%n
       call so_far%include(self%domain(k)%sim%tally)
     end do
-  end function tally_now
+  end function total_tally
 
   !> Runs successive windows in all domains while they are valid, until a limit is reached or the caller has waited long enough. A
   !> window ends early at the limit of a count. `good` is .true. if all windows are valid.
@@ -145,25 +145,25 @@ contains
 
     began = seconds()
     call cpu_time(cpu(1))
-    plan%until = began + longest_visit
+    plan%until = began + longest_call
     plan%t = sim%now
     call begin_window()
     call open_barrier(barrier)
     !$omp parallel num_threads(self%threads) private(k)
     call join(barrier)
     !$omp barrier
-    do while (plan%goes_on)
+    do while (plan%continues)
       !$omp do schedule(static, 1)
       do k = 1, self%cuts%n
-        if (plan%begins) call refresh(self%domain(k))
-        call move_on(self%domain(k), plan%t, plan%iterations)
+        if (plan%corrects) call correct_copies(self%domain(k))
+        call advance_domain(self%domain(k), plan%t, plan%iterations)
       end do
       !$omp end do nowait
       if (is_last_at(barrier)) then
-        plan%begins = .false.
+        plan%corrects = .false.
         plan%compares = stop_requested()
-        if (.not. plan%compares) plan%compares = .not. (all(self%domain%done) .and. plan%t < plan%t_end .and. left() > 0)
-        if (.not. plan%compares) call aim()
+        if (.not. plan%compares) plan%compares = .not. (all(self%domain%done) .and. plan%t < plan%t_end .and. events_left() > 0)
+        if (.not. plan%compares) call choose_target()
         call release(barrier)
       end if
       !$omp flush
@@ -183,43 +183,43 @@ contains
     call close_barrier(barrier)
     call cpu_time(cpu(2))
     elapsed = seconds() - began
-    self%cores = self%cores + (cpu(2) - cpu(1) - elapsed*self%cores)/max(elapsed, of_late)
+    self%cores = self%cores + (cpu(2) - cpu(1) - elapsed*self%cores)/max(elapsed, averaging_time)
     t = plan%t
     windows = plan%windows
-    good = plan%good
+    good = plan%valid
   contains
 
     !> Sets up the next window.
     subroutine begin_window()
       real(real64) :: length
 
-      length = self%window*self%shortening*sim%n_disks()/(2*self%pace)
+      length = self%window*self%shortening*sim%n_disks()/(2*self%event_rate)
       if (self%wanted > self%threads) length = 2*length      ! each window loads each domain into the cache once
       plan%windows = plan%windows + 1
       plan%t_begin = plan%t
       plan%t_end = plan%t + length
       if (plan%t_end + 0.5_real64*length > limits%time) plan%t_end = limits%time
       plan%events = sum(self%domain%sim%tally%events)
-      plan%begins = .true.
+      plan%corrects = .true.
       self%domain%iterations = 0
-      call aim()
+      call choose_target()
     end subroutine begin_window
 
     !> Chooses the time up to which all domains advance next. This is the end of the window, unless a count would exceed its limit.
     !> In that case it is most of the way to the limit and finally the next event of any domain. The number of iterations of each
     !> engine is bounded, however wrong the estimated event rate is.
-    subroutine aim()
+    subroutine choose_target()
       real(real64) :: expected, sure, next
       integer(int32) :: k
 
-      expected = 1.2_real64*(plan%t_end - plan%t)*self%pace + 100      ! overestimated
+      expected = 1.2_real64*(plan%t_end - plan%t)*self%event_rate + 100  ! overestimated
       plan%iterations = int(min(self%overload*self%iterations_per_event*expected, 1.0e15_real64), int64)
-      sure = left()
+      sure = events_left()
       next = plan%t_end
       if (sure <= expected) then
         sure = 0.9_real64*sure - 5*sqrt(sure)
         if (sure >= few_events) then
-          next = plan%t + sure/self%pace
+          next = plan%t + sure/self%event_rate
         else
           do k = 1, self%cuts%n
             next = min(next, next_time(self%domain(k)))
@@ -227,29 +227,29 @@ contains
         end if
       end if
       plan%t = min(next, plan%t_end)
-    end subroutine aim
+    end subroutine choose_target
 
     !> Decides after the comparison whether the window is valid, and whether another one begins.
     subroutine end_window()
-      ! With left() < 0 simultaneous events have exceeded the limit.
-      plan%good = all(self%domain%done) .and. all(self%domain%good) .and. left() >= 0
-      if (plan%good) then
-        call self%learn(sum(self%domain%sim%tally%events) - plan%events, sum(self%domain%iterations), plan%t - plan%t_begin)
+      ! With events_left() < 0 simultaneous events have exceeded the limit.
+      plan%valid = all(self%domain%done) .and. all(self%domain%valid) .and. events_left() >= 0
+      if (plan%valid) then
+        call self%update_rates(sum(self%domain%sim%tally%events) - plan%events, sum(self%domain%iterations), plan%t - plan%t_begin)
       else
         self%widening = min(self%widening + 2, self%halo)
       end if
-      plan%goes_on = seconds() < plan%until
-      if (plan%goes_on) plan%goes_on = plan%good .and. plan%windows < most .and. plan%t < limits%time .and. left() > 0
-      if (plan%goes_on) call begin_window()
+      plan%continues = seconds() < plan%until
+      if (plan%continues) plan%continues = plan%valid .and. plan%windows < most .and. plan%t < limits%time .and. events_left() > 0
+      if (plan%continues) call begin_window()
     end subroutine end_window
 
     !> Number of events before a count reaches its limit.
-    pure function left() result(events)
+    pure function events_left() result(events)
       real(real64) :: events
 
       events = min(real(limits%events - sim%tally%events - sum(self%domain%sim%tally%events), real64), &
         real(limits%collisions - sim%tally%collisions - sum(self%domain%sim%tally%collisions), real64))
-    end function left
+    end function events_left
   end subroutine run_windows
 
   !> Copies the present states of the domains to the whole simulation; the domains can continue from there.
