@@ -25,7 +25,7 @@ module library
   use system, only: seconds
   use team, only: make_team
   use texts, only: eol, growing_text_t, lines_of, place_of, text_t, written, written_exactly
-  use timeline, only: adapted, advance_once, passed_collapse
+  use timeline, only: adapted_iterations, advance_once, collapse_note
   use variable_help, only: input_of
   use variables, only: change_of, in_motion, obstacle_groups, row_of
   implicit none
@@ -134,7 +134,7 @@ contains
       limits%iterations = session%iterations
       call advance_once(session%evolution, session%sim, limits, error)
       if (allocated(error)) exit
-      session%iterations = adapted(session%iterations, seconds() - looked, session%evolution%iterations_left > 0)
+      session%iterations = adapted_iterations(session%iterations, seconds() - looked, session%evolution%iterations_left > 0)
     end do
     code = answer(error, message, room)
   end function advance
@@ -441,7 +441,7 @@ contains
       case ("changes")
         call growing%add(changes_of(session))
       case default
-        call growing%add(passed_collapse(session%sim))
+        call growing%add(collapse_note(session%sim))
         if (session%rule%too_cold(session%sim)) call growing%add(trim(merge("; ", "  ", growing%text() /= ""))//coldness)
       end select
     end associate

@@ -22,7 +22,7 @@ module run
   use system, only: folder_of, is_folder, print_text, seconds
   use tally, only: dissipated, drive_energy
   use texts, only: counted, eol, legible, size_text, written
-  use timeline, only: adapted, advance_once, passed_collapse
+  use timeline, only: adapted_iterations, advance_once, collapse_note
   implicit none
   private
   public :: perform_run
@@ -133,7 +133,7 @@ contains
       if (.not. allocated(error)) call read_checkpoint(command%output, run%input, sim, progress, finished, error)
       if (allocated(error)) return
       rule = stop_rule_t(run%input%settings%stop, sim)
-      if (finished .and. (rule%met(sim) .or. rule%rests(sim))) then
+      if (finished .and. (rule%is_met(sim) .or. rule%rests(sim))) then
         call fail(error, exit_files, command%output//": is a finished run, of "//written(sim%time())//" time units and " &
           //written(sim%tally%collisions)//" collisions; to continue it, repeat the command with --resume and a later stop rule")
       else if (finished .and. rule%too_cold(sim)) then
@@ -202,14 +202,14 @@ contains
     call run%output%tighten(limits)
     ! If no event can occur any more, the run ends with a sample. A run that was stopped just after this sample detects it
     ! here.
-    if (run%sim%settled .and. limits%sampled >= run%sim%time()) call advance_once(run%evolution, run%sim, limits, error)
+    if (run%sim%events_done .and. limits%sampled >= run%sim%time()) call advance_once(run%evolution, run%sim, limits, error)
     do while (.not. (run%stop_rule%is_over(run%sim, run%evolution) .or. allocated(error)))
       limits = run%stop_rule%limits
       limits%iterations = iterations
       call run%output%tighten(limits)
       now = seconds()
       call advance_once(run%evolution, run%sim, limits, error, run%log)
-      iterations = adapted(iterations, seconds() - now, run%evolution%iterations_left > 0)
+      iterations = adapted_iterations(iterations, seconds() - now, run%evolution%iterations_left > 0)
       if (allocated(run%log)) call run%output%take_events(run%sim, run%log)
       if (allocated(error)) exit
       call run%output%take_due_samples(run%sim, error)
@@ -266,8 +266,8 @@ contains
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
 
-    text = passed_collapse(run%sim)
-    if (run%stop_rule%met(run%sim) .or. run%stop_rule%rests(run%sim)) return
+    text = collapse_note(run%sim)
+    if (run%stop_rule%is_met(run%sim) .or. run%stop_rule%rests(run%sim)) return
     if (text /= "") text = text//"; "
     if (run%stop_rule%too_cold(run%sim)) then
       text = text//coldness//", below which rounding errors dominate"

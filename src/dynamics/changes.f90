@@ -3,7 +3,7 @@
 module changes
   use box_sides, only: bounds
   use disks, only: advance_disk
-  use epochs, only: begin_anew
+  use epochs, only: restart_epoch
   use kinds, only: int32, int64, real64
   use partners, only: n_sides
   use observables, only: total_energy
@@ -51,7 +51,7 @@ contains
     call advance_all(sim)
     sim%system_t = other%system_t
     call count_kicks()
-    call begin_anew(sim)
+    call restart_epoch(sim)
     call book(sim, before)
   contains
 
@@ -83,8 +83,8 @@ contains
       sim%disk(i)%v = v(:, sim%tag(i)%id)
       call sim%record_velocity_change(i, old, sim%now)
     end do
-    sim%given_energy = sim%kinetic_energy()
-    call begin_anew(sim)
+    sim%reference_energy = sim%kinetic_energy()
+    call restart_epoch(sim)
     call book(sim, before)
   end subroutine change_velocities
 

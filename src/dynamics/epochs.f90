@@ -10,7 +10,7 @@ module epochs
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: are_crushed, begin_anew, begin_first_epoch, is_at_rest, last_time, most_events, move_epoch, stands_still
+  public :: are_crushed, restart_epoch, begin_first_epoch, is_at_rest, last_time, most_events, move_epoch, stands_still
 
   !> Collisions of disks, per disk, in an epoch. The origin of time then moves, so that times keep their precision.
   integer(int64), parameter :: epoch_length = 24
@@ -97,14 +97,14 @@ contains
   !> Ends the epoch because the disks, or the forces and laws, have been changed. The following motion may be faster by any
   !> factor. The origin of time therefore moves exactly to the present time, and the length of the epoch is determined again when
   !> the evolution starts. Time-stepped dynamics counts from the start of the run and has no epochs.
-  subroutine begin_anew(sim)
+  subroutine restart_epoch(sim)
     type(simulation_t), intent(inout) :: sim
 
     if (.not. sim%epoch_end > 0) return
     call renumber(sim)
     call move_origin(sim, sim%now)
     sim%epoch_end = 0
-  end subroutine begin_anew
+  end subroutine restart_epoch
 
   !> Moves the origin of all times of this epoch. All predicted events become stale.
   subroutine move_origin(sim, shift)
@@ -114,7 +114,7 @@ contains
 
     do i = 1, sim%n_disks()
       sim%disk(i)%clock = sim%disk(i)%clock - shift
-      sim%disk(i)%stamp = 0
+      sim%disk(i)%collision_counter = 0
     end do
     if (sim%law%contact_time > 0) sim%extra%last_contact = sim%extra%last_contact - shift
     sim%now = sim%now - shift

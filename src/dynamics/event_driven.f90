@@ -34,7 +34,7 @@ module event_driven
     class(cell_grid_t), allocatable :: search      !! polymorphic, so that its rare procedures are not inlined into the hot path
     type(event_queue_t) :: queue
     logical :: windowed = .true.                   !! the queue uses its calendar, not only the heap
-    logical :: thorough = .false.                  !! collisions need the general procedure
+    logical :: general = .false.                   !! collisions need the general procedure
     logical :: is_part = .false.  !! this engine advances one domain, and only collisions that belong to it are counted
     class(histories_t), allocatable :: histories   !! histories of the disks of the domain
     integer(int64) :: last_count = 0               !! number of events at which `run_events` returns
@@ -104,7 +104,7 @@ contains
       if (sim%disk(i)%event_time <= last) then
         call self%queue%schedule(sim%disk, sim%tag, i)
       else
-        call self%queue%withhold(sim%tag(i))
+        call self%queue%remove_entry(sim%tag(i))
       end if
     end do
   end subroutine renew_all
@@ -123,7 +123,7 @@ contains
 
     iterations = limits%iterations
     self%iterations_left = iterations
-    self%thorough = present(log) .or. sim%with%are_rare() .or. sim%law%by_speed%speed > 0
+    self%general = present(log) .or. sim%with%need_general_collision() .or. sim%law%by_speed%speed > 0
     self%arrived = .false.
     do while (iterations > 0)
       if (limits%reached(sim%tally) .or. is_full(log)) return
@@ -165,7 +165,7 @@ contains
       logical :: yes
 
       yes = event%partner > 0
-      if (yes) yes = sim%disk(event%partner)%stamp /= sim%tag(event%disk)%partner_stamp
+      if (yes) yes = sim%disk(event%partner)%collision_counter /= sim%tag(event%disk)%partner_counter
     end function is_stale
 
     !> The number of events up to which no check is due.
@@ -227,14 +227,14 @@ contains
     counts = .true.
     if (self%is_part) counts = self%histories%counts(sim%tag, i, code)
     if (code > 0) then
-      if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
+      if (sim%disk(code)%collision_counter == sim%tag(i)%partner_counter) then
         ! Equal clocks are rare: the disks are still in contact, or both have collided at exactly this time.
-        if (self%thorough .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0) then
+        if (self%general .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0) then
           call collide(sim, i, code, t, counts, log)
         else
           call collide_pair(sim, i, code, t, counts, sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species))
         end if
-        call self%queue%forget(code)
+        call self%queue%drop_if_next(code)
         call self%search%predict_both(sim, i, code)
         if (self%is_part) call self%histories%record_collision(sim%disk, sim%tag, i, code)
         call self%queue%schedule(sim%disk, sim%tag, code)
@@ -242,7 +242,7 @@ contains
         return
       end if
     else if (is_wall(code) .and. .not. is_periodic_side(sim, code)) then
-      if (self%thorough) then
+      if (self%general) then
         call collide(sim, i, code, t, counts, log)
       else
         call collide_wall(sim, i, code, t, counts)

@@ -35,10 +35,10 @@ module event_queue
   contains
     procedure :: fill
     procedure :: schedule
-    procedure :: withhold
+    procedure :: remove_entry
     procedure :: first
     procedure :: drop_first
-    procedure :: forget
+    procedure :: drop_if_next
     procedure :: list_coming
     ! Rare procedures are bound to the type, so that they are not inlined into frequent ones.
     procedure, private :: insert_near
@@ -139,12 +139,12 @@ contains
   end subroutine schedule
 
   !> Removes the entry of a disk from the queue; it becomes invalid by itself.
-  pure subroutine withhold(self, tag)
+  pure subroutine remove_entry(self, tag)
     class(event_queue_t), intent(in) :: self
     type(tag_t), intent(inout) :: tag
 
     tag%window = window_none
-  end subroutine withhold
+  end subroutine remove_entry
 
   !> Adds an event to the current window: to the sorted list, or to the heap once the list has overflowed.
   subroutine insert_near(self, disk, tag, i)
@@ -171,7 +171,7 @@ contains
     integer(int32) :: k
 
     do k = 1, self%n_near
-      if (expected(disk, self%near(k))) call self%heap%update(self%near(k), tag)
+      if (is_valid(disk, self%near(k))) call self%heap%update(self%near(k), tag)
     end do
     self%n_near = 0
   end subroutine hand_over
@@ -219,7 +219,7 @@ contains
     do
       do while (self%n_near > 0)
         i = self%near(self%n_near)%disk
-        if (expected(disk, self%near(self%n_near))) return
+        if (is_valid(disk, self%near(self%n_near))) return
         self%n_near = self%n_near - 1
       end do
       if (self%heap%n > 0) then
@@ -241,7 +241,7 @@ contains
     do while (self%heap%n > 0)
       event = self%heap%first()
       i = event%disk
-      if (expected(disk, event)) then
+      if (is_valid(disk, event)) then
         if (.not. event%time*self%per_time < self%next_window) exit
         return
       end if
@@ -265,12 +265,12 @@ contains
 
   !> Removes the entry of disk i if it is the next one. This only saves time: when both disks of a collision have stored it, the
   !> second entry follows the first one.
-  subroutine forget(self, i)
+  subroutine drop_if_next(self, i)
     class(event_queue_t), intent(inout) :: self
     integer(int32), intent(in) :: i
 
     self%n_near = self%n_near - merge(1, 0, self%near(self%n_near)%disk == i)
-  end subroutine forget
+  end subroutine drop_if_next
 
   !> Lists disks that probably have events soon: see `calendar`.
   subroutine list_coming(self, tag, stage, n, disks)
@@ -285,7 +285,7 @@ contains
   end subroutine list_coming
 
   !> Whether an entry is valid: it equals the event that its disk stores.
-  pure function expected(disk, event) result(yes)
+  pure function is_valid(disk, event) result(yes)
     type(disk_t), intent(in) :: disk(*)
     type(event_t), intent(in) :: event
     logical :: yes
@@ -293,7 +293,7 @@ contains
     associate (t => disk(event%disk)%event_time)
       yes = .not. (t < event%time .or. t > event%time) .and. disk(event%disk)%partner == event%partner
     end associate
-  end function expected
+  end function is_valid
 
   !> Advances by one window and sorts its events into the list, which is empty before.
   subroutine open_next_window(self, disk, tag)

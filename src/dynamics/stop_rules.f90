@@ -34,7 +34,7 @@ module stop_rules
     real(real64) :: wall_clock = never       !! [s]
     logical :: cools = .false.               !! inelastic disks in a periodic box, which cool for ever
   contains
-    procedure :: met
+    procedure :: is_met
     procedure :: rests
     procedure :: too_cold
     procedure :: is_over
@@ -74,14 +74,14 @@ contains
   end function whole_collisions
 
   !> Whether a rule other than that of wall-clock time is met.
-  pure function met(self, sim) result(yes)
+  pure function is_met(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
     yes = sim%has_reached(self%limits%time) .or. self%limits%reached(sim%tally)
     if (.not. yes .and. self%limits%at_rest) yes = stands_still(sim) .and. is_at_rest(sim)
-  end function met
+  end function is_met
 
   !> Whether all disks are at rest and the run is to end then. This applies where no force causes bounces, so that no events occur
   !> and the test at the end of an epoch is never made.
@@ -102,7 +102,7 @@ contains
 
     yes = .false.
     if (self%cools .and. sim%tally%events > 0 .and. sim%tally%events == sim%epoch_events) &
-      yes = relative_energy(sim) < coldest*sim%given_energy
+      yes = relative_energy(sim) < coldest*sim%reference_energy
   end function too_cold
 
   !> Whether a run is finished: a rule is met, rounding errors dominate, or no event will occur any more and no time is given
@@ -113,7 +113,7 @@ contains
     class(evolution_t), intent(in) :: evolution
     logical :: yes
 
-    yes = self%met(sim) .or. self%too_cold(sim)
+    yes = self%is_met(sim) .or. self%too_cold(sim)
     if (.not. yes .and. evolution%idle) &
       yes = self%rests(sim) .or. .not. min(self%limits%time, next_kick(evolution, sim)) < never
   end function is_over

@@ -16,7 +16,7 @@ module timeline
   use texts, only: about, counted, written
   implicit none
   private
-  public :: adapted, advance, advance_once, next_kick, passed_collapse
+  public :: adapted_iterations, advance, advance_once, next_kick, collapse_note
 
   real(real64), parameter :: pause_interval = 0.05_real64  !! time between two checks of signals and clocks [s]
 
@@ -77,7 +77,7 @@ contains
       call kick(sim, kicked)
       call evolution%renew(sim, kicked)
     end do
-    sim%settled = arrived .or. (sim%settled .and. sim%tally%events == events .and. .not. sim%time() > before)
+    sim%events_done = arrived .or. (sim%events_done .and. sim%tally%events == events .and. .not. sim%time() > before)
   contains
 
     !> Advances the time to what is due next, if no event occurs any more. Without an end the time is that of the last collision.
@@ -108,7 +108,7 @@ contains
 
   !> Number of iterations that take about `pause_interval`. It grows only if all iterations were used. Otherwise it would grow
   !> without limit in a run with many samples, and after the last sample signals would not be checked for hours.
-  pure function adapted(iterations, elapsed, cut_short) result(n)
+  pure function adapted_iterations(iterations, elapsed, cut_short) result(n)
     integer(int64), intent(in) :: iterations
     real(real64), intent(in) :: elapsed               !! time for these iterations, or for some of them [s]
     logical, intent(in) :: cut_short                  !! a limit was reached before all iterations were used
@@ -117,7 +117,7 @@ contains
     n = iterations
     if (elapsed < 0.5_real64*pause_interval .and. .not. cut_short) n = min(2*iterations, 2_int64**40)
     if (elapsed > 2*pause_interval) n = max(iterations/2, 1_int64)
-  end function adapted
+  end function adapted_iterations
 
   !> Time of the next kick, which follows all collisions at that time and precedes everything else.
   pure function next_kick(evolution, sim) result(t)
@@ -185,7 +185,7 @@ contains
   end function slides
 
   !> The report of collapses that occurred in a run; empty if there were none.
-  pure function passed_collapse(sim) result(text)
+  pure function collapse_note(sim) result(text)
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text
 
@@ -193,7 +193,7 @@ contains
     if (sim%tally%collapse < never) text = "an inelastic collapse occurred: " &
       //counted(sim%tally%simultaneous, "collision")//" took no time, the first at time "//written(sim%tally%collapse) &
       //"; the motion after it depends on rounding errors; "//longer_contacts(sim)
-  end function passed_collapse
+  end function collapse_note
 
   !> The advice to set a contact duration: much longer than a collapse, and much shorter than the mean time between collisions, as
   !> far as it is known.

@@ -326,7 +326,7 @@ contains
     call file%close()
     if (allocated(error)) return
     if (.not. sim%with%own_sizes) sim%disk%radius = input%settings%species(sim%tag%species)%radius
-    call sim%settle_masses()
+    call sim%simplify_masses()
     call sim%choose_units()
     call progress%schedule%look_ahead(sim)
   end subroutine read_checkpoint
@@ -413,9 +413,9 @@ contains
 
     call record%exchange(file, sim%box%epoch)
     call record%exchange(file, sim%now)
-    settled = merge(1, 0, sim%settled)
+    settled = merge(1, 0, sim%events_done)
     call record%exchange(file, settled)
-    sim%settled = settled == 1
+    sim%events_done = settled == 1
     call record%exchange(file, sim%epoch_begin)
     call record%exchange(file, sim%epoch_end)
     call record%exchange(file, sim%epoch_events)
@@ -423,7 +423,7 @@ contains
     call record%exchange(file, sim%last_advance)
     call record%exchange(file, sim%events_then)
     call record%exchange(file, sim%start_energy)
-    call record%exchange(file, sim%given_energy)
+    call record%exchange(file, sim%reference_energy)
     call record%exchange(file, sim%typical_speed2)
     call record%exchange(file, sim%kicks)
     call record%exchange(file, sim%changes)
@@ -489,7 +489,7 @@ contains
         call exchange_short(tag%last_partner)
         if (sim%with%own_sizes) call record%exchange(file, disk%radius)      ! otherwise the radii follow from the input
       end associate
-      settled = merge(1, 0, sim%settled)
+      settled = merge(1, 0, sim%events_done)
       do k = 1, merge(1, 0, sim%with%rotation) + merge(2, 0, sim%with%orientation)
         call record%exchange(file, settled)  ! padding words: the length of the record shows whether disks have rotation and
                                              ! orientation

@@ -104,7 +104,7 @@ contains
     type(simulation_t), intent(in) :: sim
     logical :: over                               ! all samples of the present time have been taken or missed
 
-    over = sim%settled .or. self%last_time >= sim%time()
+    over = sim%events_done .or. self%last_time >= sim%time()
     self%next(by_time) = self%next_time(sim%time(), merge(sim%time(), self%last_time, over))
     self%next(by_collisions:) = next_number([sim%tally%collisions, sim%tally%events], self%every(by_collisions:))
   end subroutine look_ahead

@@ -147,7 +147,7 @@ contains
     !> Applies one correction.
     subroutine apply_correction(correction)
       type(correction_t), intent(in) :: correction
-      integer(int32) :: s, stamp, window
+      integer(int32) :: s, counter, window
 
       s = correction%slot
       if (any(correction%cell > self%patch%n)) then
@@ -163,10 +163,10 @@ contains
         call self%engine%search%take_out(self%sim%tag(s), s)
       end if
       window = self%sim%tag(s)%window
-      stamp = self%sim%disk(s)%stamp + 1
+      counter = self%sim%disk(s)%collision_counter + 1
       call self%sim%place_disk(s, correction%whole_disk_t)
       self%sim%tag(s)%window = window
-      self%sim%disk(s)%stamp = stamp
+      self%sim%disk(s)%collision_counter = counter
       self%sim%disk(s)%event_time = forever
       self%global_index(s) = correction%global_index
       call self%engine%search%insert(self%sim, s, int(correction%cell, int16))
@@ -183,7 +183,7 @@ contains
       call self%engine%histories%drop_history(s)
       self%sim%disk(s)%event_time = forever
       self%sim%disk(s)%partner = nothing
-      self%sim%disk(s)%stamp = self%sim%disk(s)%stamp + 1
+      self%sim%disk(s)%collision_counter = self%sim%disk(s)%collision_counter + 1
       self%sim%tag(s)%id = 0
       self%global_index(s) = self%vacant
       self%vacant = s

@@ -18,7 +18,7 @@ module disks
     real(real64) :: radius = 0.0_real64         !! [length]
     ! Derived data. The collision counter (changes of x and v in this epoch), by which stale events are recognised, and the next
     ! event, as predicted by the search.
-    integer(int32) :: stamp = 0
+    integer(int32) :: collision_counter = 0
     integer(int32) :: partner = 0               !! index of a disk (> 0), or another code of `partners`
     real(real64) :: event_time = 0.0_real64     !! since the epoch [time]
   end type disk_t
@@ -31,7 +31,7 @@ module disks
     ! Derived data of search and event queue.
     integer(int16) :: cell(2) = 0_int16         !! column and row in the cell grid
     integer(int32) :: window = 0                !! time window in which the queue has filed the event
-    integer(int32) :: partner_stamp = 0         !! collision counter of the partner at the time of the prediction
+    integer(int32) :: partner_counter = 0       !! collision counter of the partner at the time of the prediction
   end type tag_t
 
   integer, parameter :: longest_name = 40            !! longest name of a species
@@ -71,7 +71,7 @@ contains
     disk%x = flight(disk%x, disk%v, gravity, s)
     disk%v = flight_velocity(disk%v, gravity, s)
     disk%clock = t
-    disk%stamp = disk%stamp + 1
+    disk%collision_counter = disk%collision_counter + 1
   end subroutine advance_disk
 
   !> Names of the species.

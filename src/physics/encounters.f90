@@ -354,8 +354,8 @@ contains
         q%v = q%v + (step/mass_j)*dx
         step = 2*step
       end do
-      p%stamp = p%stamp + 1
-      q%stamp = q%stamp + 1
+      p%collision_counter = p%collision_counter + 1
+      q%collision_counter = q%collision_counter + 1
     end associate
   end subroutine remove_residual_approach
 
@@ -384,7 +384,7 @@ contains
     end if
     associate (d => sim%disk(i), edges => sim%box%edges())
       d%x(axis) = d%x(axis) - period*edges(axis)
-      d%stamp = d%stamp + 1
+      d%collision_counter = d%collision_counter + 1
       sim%extra(i)%image(axis) = sim%extra(i)%image(axis) + period
     end associate
   end subroutine pass_side
@@ -406,7 +406,7 @@ contains
       columns = floor((flight(d%x(1), d%v(1), 0.0_real64, t - d%clock) - sim%box%lower(1))/length, int64)
       d%x(1) = d%x(1) - columns*length
       periods(1) = periods(1) + columns
-      d%stamp = d%stamp + 1
+      d%collision_counter = d%collision_counter + 1
       call sim%tally%sum(work)%add(0.5_real64*sim%mass_of(i)*(d%v(1) - v)*(d%v(1) + v))
     end associate
   end subroutine pass_sheared_boundary

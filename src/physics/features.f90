@@ -12,17 +12,17 @@ module features
     logical :: stress = .false.         !! momentum changes in collisions are summed and logged
     logical :: helfand = .false.        !! the Helfand moments are accumulated as well
   contains
-    procedure :: are_rare
+    procedure :: need_general_collision
   end type features_t
 
 contains
 
   !> Whether collisions need the general procedure instead of the fast one.
-  pure function are_rare(self) result(yes)
+  pure function need_general_collision(self) result(yes)
     class(features_t), intent(in) :: self
     logical :: yes
 
     yes = self%rotation .or. self%stress
-  end function are_rare
+  end function need_general_collision
 
 end module features

@@ -42,7 +42,7 @@ module simulation_state
     real(real64), allocatable :: own_mass(:)      !! (n) individual masses, allocated if those of a species differ [mass]
     type(extra_t), allocatable :: extra(:)        !! (n) allocated if `has_extra`
     real(real64) :: now = 0.0_real64              !! present time, since the epoch [time]
-    logical :: settled = .false.                  !! all events up to and including `now` have been executed
+    logical :: events_done = .false.              !! all events up to and including `now` have been executed
     real(real64) :: epoch_begin = 0.0_real64      !! beginning of the epoch on its own clock [time]
     real(real64) :: epoch_end = 0.0_real64        !! end of the epoch, since the epoch; 0: not known yet [time]
     integer(int64) :: epoch_events = 0            !! number of events at the beginning of the epoch
@@ -54,7 +54,7 @@ module simulation_state
     integer(int64) :: changes = 0                 !! number of changes to forces, laws or velocities since the start of the run
     type(tally_t) :: tally                        !! counters and sums since the start of the run
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
-    real(real64) :: given_energy = 0.0_real64     !! kinetic energy when the velocities were last set, at the start or by a change
+    real(real64) :: reference_energy = 0.0_real64  !! kinetic energy when the velocities were last set, at the start or by a change
     real(real64) :: typical_speed2 = 0.0_real64   !! largest mean square speed at the start and after changes [(length/time)**2]
   contains
     procedure :: time
@@ -67,7 +67,7 @@ module simulation_state
     procedure :: place_disk
     procedure :: mass_of
     procedure :: masses
-    procedure :: settle_masses
+    procedure :: simplify_masses
     procedure :: images => images_now
     procedure :: position
     procedure :: velocity
@@ -101,7 +101,7 @@ contains
     real(real64), intent(in) :: t                 !! time since the start of the run [time]
     logical :: yes
 
-    yes = self%settled .and. self%time() >= t
+    yes = self%events_done .and. self%time() >= t
   end function has_reached
 
   !> Number of disks.
@@ -196,7 +196,7 @@ contains
 
   !> Sets the mass of each species to the largest mass of its disks. The array of individual masses is deallocated if the masses
   !> are equal within each species.
-  pure subroutine settle_masses(self)
+  pure subroutine simplify_masses(self)
     class(simulation_t), intent(inout) :: self
     logical :: equal
     integer :: s
@@ -210,7 +210,7 @@ contains
       end associate
     end do
     if (equal) deallocate (self%own_mass)
-  end subroutine settle_masses
+  end subroutine simplify_masses
 
   !> The periodic images of the box, for clocks of this epoch.
   pure function images_now(self) result(images)
@@ -337,7 +337,7 @@ contains
 
     if (self%tally%sum(1)%per_one > 0 .or. self%n_disks() == 0) return
     self%start_energy = self%kinetic_energy()
-    self%given_energy = self%start_energy
+    self%reference_energy = self%start_energy
     self%typical_speed2 = self%mean_square_speed()
     call self%choose_units()
   end subroutine start_sums

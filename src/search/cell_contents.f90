@@ -278,7 +278,7 @@ contains
       integer(int32), intent(in) :: i
 
       call prefetch(tag(i)%species)
-      call prefetch(disk(i)%stamp)
+      call prefetch(disk(i)%collision_counter)
     end subroutine fetch
 
     !> Prefetches the nine cells around c.

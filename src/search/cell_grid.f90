@@ -458,7 +458,7 @@ contains
     call earliest_contact(disk, tag, near, now, gravity, known)
     disk(near%disk)%event_time = near%time
     disk(near%disk)%partner = near%partner
-    tag(near%disk)%partner_stamp = disk(max(near%partner, 1))%stamp    ! without a branch; used only if partner > 0
+    tag(near%disk)%partner_counter = disk(max(near%partner, 1))%collision_counter  ! without a branch; used only if partner > 0
   end subroutine take_earliest
 
   !> Prefetches data for predictions of some disks, in stages.
@@ -488,7 +488,7 @@ contains
       call find_event_of_big()
     else if (.not. self%patch%holds(sim%tag(i)%cell)) then
       call self%take_out(sim%tag(i), i)
-      sim%disk(i)%stamp = sim%disk(i)%stamp + 1
+      sim%disk(i)%collision_counter = sim%disk(i)%collision_counter + 1
       near%time = 2*never
       near%partner = nothing
     else if (self%lists%used) then
@@ -498,7 +498,7 @@ contains
     end if
     sim%disk(i)%event_time = near%time
     sim%disk(i)%partner = near%partner
-    sim%tag(i)%partner_stamp = sim%disk(max(near%partner, 1))%stamp
+    sim%tag(i)%partner_counter = sim%disk(max(near%partner, 1))%collision_counter
   contains
 
     !> Finds the earliest event of a small disk.

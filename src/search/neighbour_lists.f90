@@ -447,7 +447,7 @@ contains
       integer(int32), intent(in) :: i
 
       call prefetch(tag(i)%species)
-      call prefetch(disk(i)%stamp)
+      call prefetch(disk(i)%collision_counter)
       call prefetch(self%first(i))
     end subroutine fetch_record
 

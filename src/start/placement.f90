@@ -88,7 +88,7 @@ contains
         sim%own_mass(first:last) = me%mass*(sim%disk(first:last)%radius/me%mean_radius)**2
       end associate
     end do
-    call sim%settle_masses()
+    call sim%simplify_masses()
 
   contains
 
