@@ -44,19 +44,26 @@ contains
     end do
   end function new_name
 
-  !> The variables that have taken the place of an old one, which is known with or without its group; else empty.
-  pure function present_names(name) result(names)
+  !> The variables or the choices that have taken the place of an old one; empty if there is none. A variable is known with or
+  !> without its group.
+  pure function present_names(name, of_choices) result(names)
     character(len=*), intent(in) :: name
+    logical, intent(in) :: of_choices
     character(len=:), allocatable :: names
+    type(old_name_t) :: old
     integer :: k
 
     names = ""
     do k = 1, size(list)
-      if (list(k)%choice /= "") cycle
-      if (all([character(len=name_length + 9) :: list(k)%name, trim(list(k)%group)//"."//list(k)%name] /= name)) cycle
-      if (names /= "") names = names//" or "
-      names = names//trim(list(k)%group)//"."//trim(list(k)%now)
+      old = list(k)
+      if (of_choices .and. old%choice /= "" .and. old%choice == name) then
+        names = names//" or "//trim(old%group)//"."//trim(old%name)//" = '"//trim(old%now)//"'"
+      else if (.not. of_choices .and. old%choice == "" .and. &
+        any([character(len=name_length + 9) :: old%name, trim(old%group)//"."//old%name] == name)) then
+        names = names//" or "//trim(old%group)//"."//trim(old%now)
+      end if
     end do
+    names = names(min(5, len(names) + 1):)
   end function present_names
 
 end module old_names

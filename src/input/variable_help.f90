@@ -74,7 +74,7 @@ contains
     character(len=*), intent(in) :: name
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: wanted
+    character(len=:), allocatable :: wanted, now
     character(len=name_length + 9) :: full(size(table))
     integer :: k
 
@@ -86,13 +86,16 @@ contains
       text = text(:len(text) - len(eol))
       return
     end if
-    if (present_names(wanted) /= "") then
-      call fail(error, exit_usage, "--explain "//shown(name)//": is called "//present_names(wanted)//" now")
-      return
+    now = present_names(wanted, of_choices=.false.)
+    if (now == "") text = matches(wanted)
+    if (text /= "") return
+    if (now == "") now = present_names(wanted, of_choices=.true.)
+    if (now /= "") then
+      call fail(error, exit_usage, "--explain "//shown(name)//": is called "//now//" now")
+    else
+      call fail(error, exit_usage, "--explain "//shown(name)//": no variable, choice or help contains this; " &
+        //suggestion(wanted, [character(len=len(full)) :: table%name, full, group_names], group_names))
     end if
-    text = matches(wanted)
-    if (text == "") call fail(error, exit_usage, "--explain "//shown(name)//": no variable, choice or help contains this; " &
-      //suggestion(wanted, [character(len=len(full)) :: table%name, full, group_names], group_names))
   end subroutine explain
 
   !> The explanations of some variables.
