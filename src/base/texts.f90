@@ -320,7 +320,7 @@ contains
     do while (first <= len(text))
       last = first - 1 + index(text(first:)//eol, eol)
       line%text = text(first:last - 1)
-      lines = [lines, line]                           ! not [lines, text_t(...)]: see `command_line: take_option`
+      lines = [lines, line]                           ! with text_t(...) gfortran 12 loses memory: see `command_line: take_option`
       first = last + 1
     end do
   end subroutine lines_of

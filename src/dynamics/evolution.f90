@@ -78,7 +78,7 @@ contains
     yes = tally%total(dissipated) >= self%dissipated
   end function outgrown
 
-  !> Whether there is such a limit.
+  !> Whether there is a limit on such a quantity.
   pure function watches(self) result(yes)
     class(limits_t), intent(in) :: self
     logical :: yes

@@ -75,7 +75,7 @@ contains
   end function count_around
 
   !> Largest index of images in reach, along each axis. Two disks in the box can touch only through these images until one of
-  !> them passes a side or `valid_until` is due.
+  !> them passes a side, or until the time `valid_until`.
   pure function reach(self)
     class(images_t), intent(in) :: self
     integer :: reach(2)

@@ -68,7 +68,7 @@ contains
     yes = self%kind == constant_velocity .or. self%kind == piston
   end function moves_permanently
 
-  !> Largest displacement inwards; for a piston the initial one.
+  !> Largest displacement inwards from the mean position; for a piston the initial displacement.
   elemental function innermost_position(self) result(x)
     class(side_motion_t), intent(in) :: self
     real(real64) :: x                                !! [length]

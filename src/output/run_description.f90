@@ -270,7 +270,7 @@ contains
     allocate (values(0))
     do k = 1, size(groups(1)%values)
       associate (row => table(groups(1)%values(k)%row))
-        if (row%status /= "example") cycle            ! only variables that define the geometry
+        if (row%status /= "example") cycle            ! all other variables are in `describe_table`
         values = [(groups(g)%reals_of(trim(row%name)), g=1, size(groups))]
         n = [(size(groups(g)%reals_of(trim(row%name)))/row%size, g=1, size(groups))]
         if (row%size == 1) call file%put(path//trim(row%name), [size(values)], values)

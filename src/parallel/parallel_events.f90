@@ -1,7 +1,7 @@
 !> Parallel event-driven dynamics: on several cores, or on one core with domains that fit into its cache. The results are
 !> bit-identical to those of the serial engine. The box is divided into domains, each with its own engine; after each time
 !> window the domains are compared (see `partition` and `domains`). If a window turns out to be invalid, all domains are rolled
-!> back to the state before the visit. Rare and difficult situations are left to the serial engine: small or inactive systems,
+!> back to the state before these windows. Rare and difficult situations are left to the serial engine: small or inactive systems,
 !> a stop within simultaneous collisions, and inelastic collapse.
 module parallel_events
   use kinds, only: int32, int64, real64
@@ -17,9 +17,9 @@ module parallel_events
   private
   public :: parallel_events_t
 
-  integer, parameter :: most_windows = 24                      !! largest number of windows in a visit
+  integer, parameter :: most_windows = 24                      !! largest number of windows in one call of `run_domains`
   real(real64), parameter :: shortest = 0.1_real64             !! shortest window that is tried, relative to the normal one
-  !> Numbers of events per disk that must remain before a stop or pause at a count, for domains to continue and to begin.
+  !> Smallest numbers of events per disk before the limit of a count with which domains are continued, and are started.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
   ! Shortest and longest periods of the serial engine [events per disk]:
   integer(int64), parameter :: brief(2) = 5                         !! to pass a situation that domains cannot handle
@@ -125,7 +125,7 @@ contains
     end function domains_pay
 
     !> Advances the domains by several windows. If one of these is invalid, the simulation keeps its state from before, and the
-    !> next visit tries shorter windows.
+    !> next call tries shorter windows.
     subroutine run_domains()
       real(real64) :: t
       integer :: windows, listed
@@ -168,17 +168,17 @@ contains
       if (all(self%parts%domain%engine%idle)) call use_serial_engine(brief)
     end subroutine run_domains
 
-    !> Number of windows in a visit, all of which an invalid one discards. It decreases with the number of recent failures.
+    !> Number of windows in a call, all of which an invalid one discards. It decreases with the number of recent failures.
     pure function most_windows_now() result(n)
       integer :: n
 
       n = max(1, int(most_windows*self%parts%shortening**4))
     end function most_windows_now
 
-    !> Makes windows longer after a visit in which all were valid. Within a visit their length is constant. Otherwise windows that
+    !> Makes windows longer after a call in which all were valid. Within a call their length is constant. Otherwise windows that
     !> are later discarded could compensate each halving, and the run would make no progress.
     subroutine lengthen_windows(windows)
-      integer, intent(in) :: windows               !! number of windows in the visit
+      integer, intent(in) :: windows               !! number of windows in the call
 
       associate (shortening => self%parts%shortening)
         shortening = min(1.0_real64, 1.1_real64**windows*shortening)

@@ -41,7 +41,7 @@ module tally
     integer(int64) :: simultaneous = 0             !! simultaneous lossy collisions, see `encounters: count_simultaneous_collision`
     real(real64) :: collapse = never               !! time of the first collapse, since the start of the run [time]
     type(exact_sum_t) :: sum(size(sums))
-    integer(int64), allocatable :: surface_collisions(:)  !! (surfaces) number of collisions with each
+    integer(int64), allocatable :: surface_collisions(:)  !! (surfaces) number of collisions with each surface
     type(exact_sum_t), allocatable :: surface_sums(:, :)   !! (3,surfaces) impulse along x and y; energy gained by disks
   contains
     procedure :: make_room

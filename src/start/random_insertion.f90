@@ -16,7 +16,7 @@ module random_insertion
   public :: insert_at_random, largest_first
 
   integer(int32), parameter :: disks_per_look = 1024    !! number of disks between two updates of the progress line
-  integer(int32), parameter :: drawn_ahead = 8          !! attempts whose numbers are known before they are made
+  integer(int32), parameter :: drawn_ahead = 8          !! number of attempts whose random numbers are drawn in advance
   integer(int32), parameter :: most_attempts = 300000   !! largest number of attempts for one disk, if radii differ
 
   !> The voxels in which a centre may still be possible.
@@ -47,9 +47,9 @@ contains
     integer(int32), intent(out) :: placed           !! number of disks inserted
     type(voxels_t) :: voxels
     integer(int32) :: i, j, k, n(2), blocker, failures, count, order(size(size_of))
-    integer(int32) :: attempts                      ! those that have been made, modulo `drawn_ahead`
-    type(attempt_t) :: coming(0:drawn_ahead - 1)    ! drawn early, so that what they will read can be loaded in time
-    type(random_stream_t) :: last                   ! after the last attempt that was made
+    integer(int32) :: attempts                      ! number of attempts made, modulo `drawn_ahead`
+    type(attempt_t) :: coming(0:drawn_ahead - 1)    ! drawn in advance, so that their data can be prefetched
+    type(random_stream_t) :: last                   ! state after the last attempt made
     real(real64) :: p(2), radius, lower(2), upper(2)
     logical :: equal
 
@@ -112,7 +112,7 @@ contains
 
   contains
 
-    !> Where an attempt puts the centre.
+    !> The point at which an attempt places the centre.
     pure function place(attempt) result(p)
       type(attempt_t), intent(in) :: attempt
       real(real64) :: p(2)
@@ -120,8 +120,8 @@ contains
       p = min(max(voxels%origin + (voxels%column_row(:, chosen(voxels, attempt)) + attempt%place)*voxels%side, lower), upper)
     end function place
 
-    !> Loads what the next attempts will read: the voxel of the last one, and the cells and disks around those before. Many
-    !> disks do not fit into the cache, and everything about an attempt is in another place than for the one before.
+    !> Prefetches data for the next attempts: the voxel of the last one, and the cells and disks around the earlier ones. Many
+    !> disks do not fit into the cache, and consecutive attempts read different parts of memory.
     subroutine load_ahead()
       associate (far => coming(modulo(attempts - 1, drawn_ahead)), near => coming(modulo(attempts + 3, drawn_ahead)), &
           next => coming(modulo(attempts + 1, drawn_ahead)))
