@@ -45,7 +45,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(simulation_t) :: sim                           ! elastic disks
     type(event_driven_t), allocatable :: evolution
-    real(real64) :: lack, lack_before
+    real(real64) :: missing_size, missing_before
     integer(int32) :: i
     integer :: jump
 
@@ -55,28 +55,28 @@ contains
     sim%species = species
     allocate (sim%law%restitution(size(species), size(species)), source=1.0_real64)
     call sim%list_disks()
-    if (size(x, 2) == 0) call scatter()
-    if (size(x, 2) > 0) call begin_at_places()
+    if (size(x, 2) == 0) call insert_small_disks()
+    if (size(x, 2) > 0) call start_at_positions()
     if (allocated(error)) return
     allocate (evolution)
     allocate (evolution%search)
-    lack_before = 1
+    missing_before = 1
     jump = 0
     do
       call move(run_length)
       if (allocated(error)) return
-      lack = 1 - minval(sim%disk%radius/full(sim%tag%id))
-      if (lack <= 0) exit
-      call line%show_share("growing disks to their full size", 1 - lack)
+      missing_size = 1 - minval(sim%disk%radius/full(sim%tag%id))
+      if (missing_size <= 0) exit
+      call line%show_share("growing disks to their full size", 1 - missing_size)
       jump = jump + 1
       if (modulo(jump, jumps_per_check) == 0) then
-        if (lack > 0.9_real64*lack_before) then
+        if (missing_size > 0.9_real64*missing_before) then
           call fail_to_grow()
           return
         end if
-        lack_before = lack
+        missing_before = missing_size
       end if
-      call grow(min(1.0_real64, lead*(1 - lack)))
+      call grow(min(1.0_real64, lead*(1 - missing_size)))
     end do
     call move(mixing_length)
     if (size(x, 2) == 0) x = reshape(x, [2, size(sim%disk)], pad=[0.0_real64])
@@ -100,7 +100,7 @@ contains
     end subroutine fail_to_grow
 
     !> Starts at given positions with random velocities. All disks have the largest common relative size that fits.
-    subroutine begin_at_places()
+    subroutine start_at_positions()
       real(real64) :: scale
       integer :: k
 
@@ -115,10 +115,10 @@ contains
       scale = minval(sim%disk%radius/full)
       sim%disk%radius = scale*full
       if (scale <= smallest_scale) call fail_to_grow()
-    end subroutine begin_at_places
+    end subroutine start_at_positions
 
     !> Starts with small disks at random positions, with random velocities.
-    subroutine scatter()
+    subroutine insert_small_disks()
       type(packing_t) :: packing
       real(real64) :: scale, wanted
       logical :: complete
@@ -146,7 +146,7 @@ contains
         call stream%draw_direction(sim%disk(k)%v)
         sim%disk(k)%radius = scale*full(k)
       end do
-    end subroutine scatter
+    end subroutine insert_small_disks
 
     !> Inserts all disks at random positions, the largest first.
     subroutine fill(packing, radius, complete)

@@ -11,7 +11,7 @@ module initial_state
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
   use texts, only: written
-  use starting_velocities, only: set_in_motion
+  use starting_velocities, only: draw_initial_velocities
   implicit none
   private
   public :: check_speeds, create_simulation, describe_system
@@ -36,7 +36,7 @@ contains
       call sim%list_disks()
       if (sim%drive%kind == active) call draw_orientations(sim)
       call place_disks(settings%species, groups, settings%run%seed, line, sim, problems)
-      if (problems%count == 0) call set_in_motion(settings, groups, sim, problems)
+      if (problems%count == 0) call draw_initial_velocities(settings, groups, sim, problems)
       if (problems%count == 0) call check_speeds(sim, problems)
       if (problems%count == 0) call sim%start_sums()
     end associate

@@ -13,7 +13,7 @@ module input_fit
   use partners, only: n_sides, side_name
   use position_file, only: angle_row, radius_row, spin_row
   use radii, only: drawn_radii
-  use regular_places, only: spans
+  use regular_positions, only: spans
   use settings, only: settings_t, species_settings_t
   use side_motion, only: piston, constant_velocity
   use starting_disks, only: read_disks, resolution
@@ -21,7 +21,7 @@ module input_fit
   use variables, only: most_disks, obstacle_groups
   implicit none
   private
-  public :: check_fit, complain_of_file, complete_settings
+  public :: check_fit, report_file_problem, complete_settings
 
   real(real64), parameter, public :: rounding = 1.0e-12_real64        !! relative tolerance for disks that touch
   real(real64), parameter :: random_limit = 0.547_real64      !! saturation of random sequential addition
@@ -41,7 +41,7 @@ contains
     if (any(settings%box%lower >= settings%box%upper)) return
     s = range_of(groups, ["species"])
     do k = 1, size(settings%species)
-      call survey_file(settings%species, k, settings%box, groups(s(1) + k - 1), problems)
+      call read_missing_values(settings%species, k, settings%box, groups(s(1) + k - 1), problems)
     end do
     call settings%choose_features()
     if (settings%n_disks() > most_disks) return               ! reported elsewhere
@@ -49,7 +49,7 @@ contains
     call check_memory(settings, problems)
     if (problems%count > before) return
     do k = 1, size(settings%species)
-      call survey_spread(settings%species(k), k, settings%run%seed, groups(s(1) + k - 1))
+      call measure_radii(settings%species(k), k, settings%run%seed, groups(s(1) + k - 1))
     end do
     complete = .true.
   end subroutine complete_settings
@@ -70,7 +70,7 @@ contains
       beyond = box%side_excursion()                           ! range beyond the box that moving sides reach
       do k = 1, box%n_obstacles()                             ! each shape checks its own position
         misfit = box%obstacle(k)%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
-        if (misfit /= "") call complain_of_obstacle(box, k, groups(o(1) + box%obstacle(k)%surface - n_sides - 1), misfit, &
+        if (misfit /= "") call report_obstacle_problem(box, k, groups(o(1) + box%obstacle(k)%surface - n_sides - 1), misfit, &
           problems)
         if (problems%count >= most_problems) exit
       end do
@@ -82,7 +82,7 @@ contains
   end subroutine check_fit
 
   !> Reports an invalid position of an obstacle, with the line of its file or the point of its polyline.
-  subroutine complain_of_obstacle(box, m, group, misfit, problems)
+  subroutine report_obstacle_problem(box, m, group, misfit, problems)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: m                           !! index of the obstacle
     type(group_t), intent(in) :: group
@@ -100,7 +100,7 @@ contains
     else
       call group%complain(misfit(:colon - 1), misfit(colon + 2:), problems)
     end if
-  end subroutine complain_of_obstacle
+  end subroutine report_obstacle_problem
 
   !> Reports sides that would crush the disks: at the end of the motion of a side, the disks would have more area than the box. A
   !> piston may make room for them; boxes with a piston are not checked.
@@ -135,7 +135,7 @@ contains
   !> Takes from a starting file the number of disks of a species, their sizes, and whether they rotate, where the input leaves
   !> these to the file. If neither number nor sizes are needed, an unreadable file is reported only when the disks are placed,
   !> because a resumed run does not need the file.
-  subroutine survey_file(species, k, box, group, problems)
+  subroutine read_missing_values(species, k, box, group, problems)
     type(species_settings_t), intent(inout) :: species(:)
     integer, intent(in) :: k                                  !! index of the species
     type(box_t), intent(in) :: box
@@ -150,7 +150,7 @@ contains
       call read_disks(species, k, box)
       if (allocated(s%in_file%error)) then
         s%spin_in_file = .false.
-        if (decides) call complain_of_file(s, group, problems)
+        if (decides) call report_file_problem(s, group, problems)
         return
       end if
       if (size(s%in_file%rows) == 0) call group%complain("file", s%file//" contains no disks of species """//s%name//'"', problems)
@@ -166,10 +166,10 @@ contains
           [pi*sum(radius**2)/product(s%region([2, 4]) - s%region([1, 3]))])
       end associate
     end associate
-  end subroutine survey_file
+  end subroutine read_missing_values
 
   !> Determines the largest of the radii that will be drawn, and the packing fraction.
-  subroutine survey_spread(s, k, seed, group)
+  subroutine measure_radii(s, k, seed, group)
     type(species_settings_t), intent(inout) :: s
     integer, intent(in) :: k                                  !! index of the species
     integer(int64), intent(in) :: seed                        !! seed of the run
@@ -181,17 +181,17 @@ contains
     s%radius = maxval(radius)
     if (all(s%region([1, 3]) < s%region([2, 4])) .and. .not. group%given("packing_fraction")) &
       call group%put_reals("packing_fraction", [pi*sum(radius**2)/product(s%region([2, 4]) - s%region([1, 3]))])
-  end subroutine survey_spread
+  end subroutine measure_radii
 
   !> Reports why the disks of a file cannot be used.
-  subroutine complain_of_file(s, group, problems)
+  subroutine report_file_problem(s, group, problems)
     type(species_settings_t), intent(in) :: s
     type(group_t), intent(in) :: group
     type(problem_list_t), intent(inout) :: problems
 
     call group%complain("file", s%in_file%error%message, problems)
     if (s%in_file%error%code == exit_files) problems%unreadable = problems%unreadable + 1
-  end subroutine complain_of_file
+  end subroutine report_file_problem
 
   !> Checks that a disk of a species fits into its region, into a period, and into every enclosing obstacle.
   subroutine check_species(group, s, box, alone, problems)

@@ -12,7 +12,7 @@ module placement
   use dense_growth, only: grow_disks, smallest_scale
   use disks, only: disks_before
   use errors, only: error_t
-  use input_fit, only: complain_of_file, rounding
+  use input_fit, only: report_file_problem, rounding
   use input_groups, only: group_t
   use input_problems, only: problem_list_t
   use packing, only: packing_t
@@ -21,7 +21,7 @@ module placement
   use radii, only: drawn_radii
   use random_insertion, only: insert_at_random, largest_first
   use random_stream, only: random_stream_t
-  use regular_places, only: centre_range, grid_positions, lattice_positions, spans
+  use regular_positions, only: centre_range, grid_positions, lattice_positions, spans
   use settings, only: species_settings_t
   use simulation_state, only: simulation_t
   use starting_disks, only: origin
@@ -31,7 +31,7 @@ module placement
   private
   public :: place_disks
 
-  integer, parameter :: purpose = 1                         !! identifies the random streams of this module
+  integer, parameter :: stream_number = 1                   !! identifies the random streams of this module
   integer(int32), parameter :: many_trials = 500000         !! number of disks placed in all attempts of 'random' together
   integer(int32), parameter :: few = 5                      !! tolerance, in disks, that applies where there are few disks
   real(real64), parameter :: nearly = 1.25_real64  !! factor by which the number of disks that fit may be larger in another attempt
@@ -60,8 +60,8 @@ contains
     do s = 1, size(species)
       if (random(s) .or. dense(s)) cycle
       k = problems%count
-      call find_places(s)
-      if (problems%count == k) call add_known(packing, s, x, radius)
+      call find_positions(s)
+      if (problems%count == k) call add_species(packing, s, x, radius)
     end do
     if (problems%count > 0) return
     do while (any(random))
@@ -94,7 +94,7 @@ contains
 
     !> Determines the positions of a species for which they are given directly, by a rule, or by a file. Masses, orientations and,
     !> if requested, velocities are copied from the file to the simulation.
-    subroutine find_places(s)
+    subroutine find_positions(s)
       integer, intent(in) :: s
       integer :: first, last, k
 
@@ -111,7 +111,7 @@ contains
           call lattice_positions(species(s), groups(s), packing%box, x, problems)
         case default                                        ! 'file', 'grown'
           if (allocated(file%error)) then
-            call complain_of_file(species(s), groups(s), problems)
+            call report_file_problem(species(s), groups(s), problems)
             return
           end if
           x = file%table(1:2, :)
@@ -127,10 +127,10 @@ contains
           deallocate (file%table)
         end select
       end associate
-    end subroutine find_places
+    end subroutine find_positions
 
     !> Adds a species with known positions. Reports disks that overlap others, and disks that are not completely in their region.
-    subroutine add_known(packing, s, x, radius)
+    subroutine add_species(packing, s, x, radius)
       type(packing_t), intent(inout) :: packing
       integer, intent(in) :: s
       real(real64), intent(in) :: x(:, :)                   !! (2,count) [length]
@@ -170,7 +170,7 @@ contains
           end associate
         end if
       end do
-    end subroutine add_known
+    end subroutine add_species
 
     !> Reports a problem of disk k of species s, which is at the point p.
     subroutine report(s, k, p, count, what)
@@ -200,7 +200,7 @@ contains
 
       radius = drawn_radii(species(s), s, seed)
       associate (me => species(s))
-        call stream%seed(seed, [s, purpose])
+        call stream%seed(seed, [s, stream_number])
         call centre_range(me%region, packing%box, me%radius, lower, upper)
         ! The number of disks that fit varies between attempts, the more the fewer disks there are.
         do trial = 1, merge(1, max(1, many_trials/me%count), me%polydispersity > 0)
@@ -235,15 +235,15 @@ contains
         associate (s => members(k))
           radius = drawn_radii(species(s), s, seed)
           if (grown) then
-            call find_places(s)
-            if (problems%count == 0) call add_known(small, s, x, smallest_scale*radius)
+            call find_positions(s)
+            if (problems%count == 0) call add_species(small, s, x, smallest_scale*radius)
             if (problems%count > 0) return
             places = reshape([places, x], [2, size(full) + size(radius)])
           end if
           full = [full, radius]
         end associate
       end do
-      call stream%seed(seed, [members(1), purpose])
+      call stream%seed(seed, [members(1), stream_number])
       call grow_disks(growth_box(packing, species(members(1))%region), species(members)%species_t, full, stream, line, &
         places, error)
       if (allocated(error)) call groups(members(1))%complain("placement", error%message, problems)
@@ -252,7 +252,7 @@ contains
         if (problems%count > 0) return
         associate (s => members(k), first => last + 1)
           last = last + species(s)%count
-          call add_known(packing, s, places(:, first:last), full(first:last))
+          call add_species(packing, s, places(:, first:last), full(first:last))
         end associate
       end do
     end subroutine place_densely

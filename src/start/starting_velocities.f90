@@ -10,15 +10,15 @@ module starting_velocities
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: set_in_motion
+  public :: draw_initial_velocities
 
-  integer, parameter :: purpose = 2, purpose_of_spins = 6   !! identify the random streams of this module
+  integer, parameter :: stream_number = 2, stream_of_spins = 6  !! identify the random streams of this module
 
 contains
 
   !> Sets the velocities of all disks. Where no boundary or force can change the total momentum, it is made zero. In a sheared box
   !> the rules and temperatures are relative to the velocity profile; given velocities are absolute.
-  subroutine set_in_motion(settings, groups, sim, problems)
+  subroutine draw_initial_velocities(settings, groups, sim, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)                  !! groups of the species
     type(simulation_t), intent(inout) :: sim
@@ -32,7 +32,7 @@ contains
     balanced = all(sim%box%periodic) .and. .not. sim%box%has_obstacles() .and. .not. sim%box%has_gravity()
     do s = 1, size(settings%species)
       call find_disks()
-      call stream%seed(settings%run%seed, [s, purpose])
+      call stream%seed(settings%run%seed, [s, stream_number])
       call draw_velocities()
     end do
     if (balanced) call remove_drift()
@@ -138,7 +138,7 @@ contains
     subroutine draw_spins()
       real(real64) :: normals(2)
 
-      call stream%seed(settings%run%seed, [s, purpose_of_spins])
+      call stream%seed(settings%run%seed, [s, stream_of_spins])
       do i = first, last
         associate (species => settings%species(s), omega => sim%extra(i)%spin)
           if (species%rotational_temperature >= 0) then
@@ -186,6 +186,6 @@ contains
         sim%disk(i)%v = sim%disk(i)%v + factor*sim%box%shear_profile(sim%disk(i)%x)
       end do
     end subroutine add_stream
-  end subroutine set_in_motion
+  end subroutine draw_initial_velocities
 
 end module starting_velocities

@@ -1,5 +1,5 @@
 !> Regular positions in a region: a rectangular grid, or a triangular lattice.
-module regular_places
+module regular_positions
   use kinds, only: real64
   use box_geometry, only: box_t
   use box_sides, only: bounds
@@ -136,4 +136,4 @@ contains
     end subroutine measure_lattice
   end subroutine lattice_positions
 
-end module regular_places
+end module regular_positions
