@@ -8,6 +8,7 @@ module run
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
   use initial_state, only: describe_system
+  use memory, only: memory_needed
   use kinds, only: int64, never, real64
   use observables, only: energies
   use output, only: output_t, planned_bytes
@@ -102,7 +103,8 @@ contains
       if (.not. command%quiet) call warn(run)
       if (command%check) then
         call print_text(legible(command%input)//": valid; "//counted(int(run%sim%n_disks(), int64), "disk")// &
-          "; the output needs at least "//size_text(planned_bytes(run%input, run%sim)), error)
+          "; the run needs about "//size_text(memory_needed(run%input%settings))//" of memory, the output at least " &
+          //size_text(planned_bytes(run%input, run%sim)), error)
         return
       end if
       folder_is_new = .not. is_folder(folder_of(command%output))

@@ -6,7 +6,7 @@ module radii
   use settings, only: species_settings_t
   implicit none
   private
-  public :: drawn_radii, widest_spread
+  public :: drawn_radii, largest_radius, widest_spread
 
   integer, parameter :: purpose = 7                         !! of this module's random streams
   real(real64), parameter :: part = 9.0_real64/11           !! of the mean, by which radii differ from it at most
@@ -45,6 +45,27 @@ contains
       k = k + 1
     end do
   end function drawn_radii
+
+  !> A radius that hardly any disk of a species exceeds, without drawing them.
+  pure function largest_radius(species) result(radius)
+    class(species_settings_t), intent(in) :: species
+    real(real64) :: radius                                  !! [length]
+    real(real64) :: deviation
+
+    associate (spread => species%polydispersity)
+      radius = species%radius
+      if (.not. spread > 0) return
+      deviation = sqrt(log(1 + spread**2))
+      select case (species%distribution)
+      case ("uniform")
+        radius = species%mean_radius*(1 + sqrt(3.0_real64)*spread)
+      case ("lognormal")
+        radius = species%mean_radius*exp(min(5*deviation, powers) - 0.5_real64*deviation**2)
+      case default
+        radius = species%mean_radius*(1 + min(5*spread, part))
+      end select
+    end associate
+  end function largest_radius
 
   !> The largest spread of a distribution.
   pure function widest_spread(distribution) result(spread)

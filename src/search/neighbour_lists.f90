@@ -32,9 +32,11 @@ module neighbour_lists
     type(line_t) :: column(0:1), row(0:1)          !! left and right, lower and upper line, with their events
   end type neighbourhood_t
 
+  real(real64), parameter, public :: candidates_that_pay = 30.0_real64
+
   type :: neighbour_lists_t
     logical :: used = .false.
-    real(real64) :: least_candidates = 30.0_real64 !! number of dilute disks in nine cells from which lists pay
+    real(real64) :: least_candidates = candidates_that_pay   !! number of dilute disks in nine cells from which lists pay
     integer(int32) :: capacity = 16                !! capacity of the list of a small disk; larger disks have more neighbours
     real(real64) :: mean_radius = 0.0_real64       !! [length]
     real(real64) :: margin = 0.0_real64            !! half the width of the neighbourhood of a disk with the mean radius [length]

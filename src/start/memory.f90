@@ -2,20 +2,30 @@
 !> fit is refused before it starts; one for which domains do not fit uses the serial engine. The check works on Linux; on other
 !> systems no limit is known.
 module memory
-  use kinds, only: int64
+  use kinds, only: int64, never, pi, real64
   use input_problems, only: problem_list_t
+  use neighbour_lists, only: candidates_that_pay
+  use radii, only: largest_radius
   use settings, only: settings_t
   use system, only: read_file
   use texts, only: eol, line_at, size_text, written
   implicit none
   private
-  public :: check_memory, free_memory, room_for_domains
+  public :: check_memory, free_memory, memory_needed, peak, room_for_domains
 
-  ! Memory per disk with the serial engine, per disk with domains, and independent of disks, measured with 100 000 to a million
-  ! disks. [bytes]
-  integer(int64), parameter :: per_disk = 410, per_shared_disk = 540, besides = 25000000
-  integer(int64), parameter :: per_list = 270    !! neighbour list of a disk, used where sizes differ
-  integer(int64), parameter :: per_obstacle = 560
+  !> Bytes per disk, obstacle or process, as `runs/memory.sh` measures them: the peak of the resident memory. They hold within
+  !> 5 %; those of time steps are an upper bound, as their lists depend on the step.
+  integer(int64), parameter :: per_process = 10000000, per_obstacle = 580
+  real(real64), parameter :: record = 110, cell = 32         !! state and queue of a disk; a cell of the search
+  real(real64), parameter :: extra = 40, own_size = 8        !! images, times of contact, rotation; mass
+  real(real64), parameter :: sampled = 8.8_real64            !! each number of a disk in a frame
+  real(real64), parameter :: listed = 264                    !! list of neighbours
+  real(real64), parameter :: kicked = 16, stepped = 100      !! by a drive; lists of time steps
+  real(real64), parameter :: divided(2) = [143, 205]         !! more with domains: between walls, in a periodic box
+  real(real64), parameter :: listed_twice = 80               !! more of them for lists
+  ! While disks are placed, everything included: at known or random places, from a file, by growth.
+  real(real64), parameter :: placed = 150, inserted = 166, read_in = 226, grown = 310
+  real(real64), parameter :: cells_per_disk = 1.67_real64    !! at most: see `cell_layout`
 
 contains
 
@@ -26,8 +36,7 @@ contains
     integer(int64) :: needed, free
     character(len=:), allocatable :: what
 
-    needed = settings%n_disks()*(per_disk + merge(per_list, 0_int64, sizes_differ(settings))) + besides &
-      + settings%box%n_obstacles()*per_obstacle
+    needed = peak(settings, domains=.false.)
     free = free_memory("")
     what = written(settings%n_disks())//" disks"
     if (settings%box%has_obstacles()) what = what//" and "//written(settings%box%n_obstacles())//" obstacles"
@@ -35,22 +44,122 @@ contains
       //size_text(needed)//" of memory, and "//size_text(free)//" are free; use fewer disks")
   end subroutine check_memory
 
-  !> Whether the memory suffices for dividing the box into domains.
+  !> Whether the memory suffices for dividing the box into domains, with a reserve, as the run would not notice that it does not.
   function room_for_domains(settings) result(yes)
     type(settings_t), intent(in) :: settings
     logical :: yes
 
-    yes = settings%n_disks()*(per_shared_disk + merge(per_list, 0_int64, sizes_differ(settings))) + besides <= free_memory("")
+    yes = 1.15_real64*real(peak(settings, domains=.true.), real64) <= real(free_memory(""), real64)
   end function room_for_domains
 
-  !> Whether the disks may have so many different sizes that neighbour lists are used.
-  pure function sizes_differ(settings) result(yes)
+  !> The same, with domains where the run will have them.
+  function memory_needed(settings) result(bytes)
+    type(settings_t), intent(in) :: settings
+    integer(int64) :: bytes
+    logical :: domains
+
+    domains = settings%wants_domains()
+    if (domains) domains = room_for_domains(settings)
+    bytes = peak(settings, domains)
+  end function memory_needed
+
+  !> Largest amount of memory that a run occupies at a time, with domains or without. [bytes]
+  pure function peak(settings, domains) result(bytes)
+    type(settings_t), intent(in) :: settings
+    logical, intent(in) :: domains                        !! the box is divided
+    integer(int64) :: bytes
+    real(real64) :: running, starting, more               ! per disk
+    logical :: lists
+
+    lists = are_listed(settings)
+    more = 0
+    if (any(settings%box%periodic) .or. settings%law%contact_time > 0 .or. settings%with%rotation &
+      .or. settings%with%orientation) more = extra
+    starting = more + starting_bytes(settings)
+    if (settings%with%own_sizes) more = more + own_size
+    running = record + cell*cells(settings) + more + sampled*numbers_in_frame(settings)
+    if (lists) running = running + listed
+    if (settings%drive%is_on()) running = running + kicked
+    if (settings%run%dynamics == "steps") running = running + stepped
+    if (domains) running = running + divided(merge(2, 1, all(settings%box%periodic)))
+    if (domains .and. lists) running = running + listed_twice
+    bytes = int(settings%n_disks()*max(running, starting), int64) + per_process + settings%box%n_obstacles()*per_obstacle
+  end function peak
+
+  !> Bytes per disk while the disks are placed, without what some of them have extra.
+  pure function starting_bytes(settings) result(bytes)
+    type(settings_t), intent(in) :: settings
+    real(real64) :: bytes
+    integer :: k
+
+    bytes = placed
+    do k = 1, size(settings%species)
+      select case (settings%species(k)%placement)
+      case ("random")
+        if (.not. settings%with%own_sizes) bytes = max(bytes, inserted)
+      case ("file")
+        bytes = max(bytes, read_in)
+      case ("dense", "grown")
+        bytes = max(bytes, grown + merge(extra, 0.0_real64, any(settings%box%periodic)))
+      end select
+    end do
+  end function starting_bytes
+
+  !> How many numbers of each disk a frame has; 0 where only the first and the last one are written.
+  pure function numbers_in_frame(settings) result(n)
+    type(settings_t), intent(in) :: settings
+    integer :: n, k
+
+    n = 0
+    associate (frames => settings%output%sampling(1), with => settings%with)
+      if (.not. (any(frames%every < never) .or. allocated(frames%at) .or. frames%per_decade > 0)) return
+      n = 5 + merge(2, 0, any(settings%box%periodic)) + merge(1, 0, with%rotation) + merge(1, 0, with%orientation)
+    end associate
+    if (.not. allocated(settings%output%frame_columns)) return
+    n = 2
+    do k = 1, size(settings%output%frame_columns)
+      n = n + merge(2, 1, any(settings%output%frame_columns(k) == [character(len=8) :: "velocity", "image"]))
+    end do
+  end function numbers_in_frame
+
+  !> How many cells the search has for each disk.
+  pure function cells(settings) result(n)
+    type(settings_t), intent(in) :: settings
+    real(real64) :: n
+
+    n = 0
+    if (settings%run%search /= "cells" .or. settings%run%dynamics /= "events") return
+    n = min(cells_per_disk, 0.25_real64*pi/max(crowding(settings), tiny(n)))
+  end function cells
+
+  !> Whether the disks have so many different sizes that neighbour lists are used: the condition of `neighbour_lists`.
+  pure function are_listed(settings) result(yes)
     type(settings_t), intent(in) :: settings
     logical :: yes
+    real(real64) :: packing, candidates
 
-    yes = any(settings%species%polydispersity > 0) .or. any(settings%species%radius_in_file) &
-      .or. maxval(settings%species%radius) > minval(settings%species%radius)
-  end function sizes_differ
+    yes = settings%run%search == "cells" .and. settings%run%dynamics == "events"
+    if (.not. yes) return
+    associate (s => settings%species)
+      packing = min(pi*sum(s%count*s%mean_radius**2*(1 + s%polydispersity**2))/product(settings%box%edges()), 0.9_real64)
+    end associate
+    candidates = 9/max(cells(settings), tiny(packing))
+    yes = candidates > candidates_that_pay - 27*packing
+  end function are_listed
+
+  !> The packing fraction if all disks were as large as the largest ones, apart from a few: the cells are made for these.
+  pure function crowding(settings) result(fraction)
+    type(settings_t), intent(in) :: settings
+    real(real64) :: fraction, radius
+    integer :: k
+
+    radius = 0
+    do k = 1, size(settings%species)
+      if (20*int(settings%species(k)%count, int64) >= settings%n_disks()) &
+        radius = max(radius, largest_radius(settings%species(k)))
+    end do
+    fraction = settings%n_disks()*pi*radius**2/product(settings%box%edges())
+  end function crowding
 
   !> Memory available on the machine, or the limit of the control group if that is less, because a batch job that exceeds it is
   !> killed without a message. Huge if neither is known. [bytes]

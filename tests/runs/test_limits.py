@@ -121,12 +121,42 @@ def test_the_memory_of_a_run_does_not_grow(memory_of):
     assert many < few + 1e6
 
 
+def assumed_memory(ricochet, *words) -> float:
+    """What --check says that a run of gas.nml needs [bytes]."""
+    said = ricochet("gas.nml", "--check", *options(words)).stdout
+    return 1e6 * float(said.split("needs about ")[1].split(" MB of memory")[0])
+
+
+LATTICE = """&species name = 'gas' count = {count} packing_fraction = 0.5
+placement = 'lattice' velocities = 'maxwell' /
+&stop collisions_per_disk = {length} /
+"""
+
+
+@pytest.mark.parametrize(
+    ("count", "length", "words"),
+    [
+        (490_000, 2, ()),
+        (490_000, 2, ("box.boundary=periodic,periodic", "output.frames_every_collisions=490000")),
+        (1_000_000, 6, ()),  # domains, which shorter runs do not have
+        pytest.param(10_000_000, 6, (), marks=pytest.mark.check),
+    ],
+)
+def test_a_run_takes_the_memory_that_is_assumed(memory_of, ricochet, count, length, words):
+    """Without domains, with what frames and periodic sides add, and with domains."""
+    measured = memory_of(LATTICE.format(count=count, length=length), *words)
+    assert measured == pytest.approx(assumed_memory(ricochet, *words), rel=0.05)
+
+
 def test_the_size_of_the_output_is_told_before_it_is_written(ricochet, tmp_path):
     """Two frames of 36 bytes per disk, and 24 bytes and two checkpoints of 72."""
     (tmp_path / "gas.nml").write_text(GAS.format(count=1_000_000, collisions=1))
     grid = ["--set", "species.gas.count=", "--set", "species.gas.grid=1000,1000"]
     run = ricochet("gas.nml", "--check", *grid)
-    assert run.stdout == "gas.nml: valid; 1000000 disks; the output needs at least 240 MB\n"
+    assert run.stdout == (
+        "gas.nml: valid; 1000000 disks; the run needs about 316 MB of memory, "
+        "the output at least 240 MB\n"
+    )
     assert run.stderr == ""
     many = ["--set", "output.frames_every_collisions=50000", "--set", "stop.collisions=500000"]
     run = ricochet("gas.nml", *grid, *many, "--set", "stop.wall_clock=1e-9")
