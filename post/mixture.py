@@ -11,17 +11,17 @@ over all disks in equilibrium, with its error.
 """
 
 from ricochet import Run, RunError
-from ricochet.analysis.speeds import means
+from ricochet.analysis.speed_laws import speed_test
+from ricochet.analysis.speeds import kt_of_frames, means
 from ricochet.analysis.statistics import (
     binned,
     combine_runs,
-    goodness_of_fit,
-    statistical_inefficiency,
+    correlated_mean,
     rounded_to_error,
 )
 from ricochet.analysis.thermodynamics import kinds_of_disks, mean_energy
 from ricochet.figures.drawing import COLOURS, bars, caption, plt
-from ricochet.predictions.theory import maxwell_cdf, maxwell_pdf
+from ricochet.predictions.theory import maxwell_pdf
 from ricochet.reading.nature import SETTLED, allow
 from ricochet.script import command_line, late_frames, launch, measured, report
 
@@ -36,15 +36,6 @@ def pooled(runs: list[Run], frames: list[list[int]], name: str) -> np.ndarray:
     return np.concatenate([run.speed(k)[run.of_species(name)] for run, own in each for k in own])
 
 
-def independent(runs: list[Run], frames: list[list[int]], name: str) -> int:
-    """Return the number of independent speeds; heavy disks decorrelate slowly."""
-    mask, found = runs[0].of_species(name), 0.0
-    for run, own in zip(runs, frames, strict=True):
-        series = np.array([run.kinetic_energy(frame)[mask].mean() for frame in own])
-        found += mask.sum() * len(own) / max(1.0, statistical_inefficiency(series))
-    return max(1, round(found))
-
-
 def table(runs: list[Run], frames: list[list[int]], skip: float | None = None) -> list[dict]:
     """Return mean speed and energy of each species at the start and in equilibrium, and theory."""
     rows = []
@@ -54,13 +45,21 @@ def table(runs: list[Run], frames: list[list[int]], skip: float | None = None) -
         speed, energy = means(runs, frames, name)
         theory = combine_runs([mean_energy(run, mass, skip) for run in runs])
         expected = theory.mean
-        u = pooled(runs, frames, name) * np.sqrt(mass / (2 * expected))
-        test = goodness_of_fit(u, maxwell_cdf, independent(runs, frames, name))
+        test = speed_test(runs, frames, name)
         row = {"species": name, "mass": mass, "v_start": float(start[0])}
         row |= {"K_start": float(start[2]), **measured("v", speed)}
         row |= {"v_theory": float(np.sqrt(np.pi * expected / (2 * mass))), **measured("K", energy)}
         row |= measured("K_theory", theory)
-        row |= {"speeds": test.n, "KS_D": test.ks, "KS_p": test.ks_p}
+        for k, axis in enumerate("xy"):
+            both = zip(runs, frames, strict=True)
+            tracks = [correlated_mean(kt_of_frames(run, own, name, k)) for run, own in both]
+            row |= measured(f"kT_{axis}", combine_runs(tracks))
+        row |= {
+            "speeds": round(test.independent),
+            "law": test.law,
+            "KS_D": test.ks,
+            "KS_p": test.ks_p,
+        }
         rows.append(row)
     return rows
 

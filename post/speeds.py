@@ -11,20 +11,21 @@ In a sheared box speeds are relative to its flow.  A gas that only loses energy 
 its histogram is of the frames after --equilibration, or else 15 collisions per disk, with the kT of
 each frame for itself.
 So is that of a gas whose sides move, or whose kT drifts; `kT_first` and `kT_last` say how far.
-Tests: Kolmogorov-Smirnov (KS) and chi-square against the Maxwell law, KS against the exact law of N
-disks that share a fixed kinetic energy, which matters if they are few; none where that law is not
-known: with gravity, losses, one periodic axis of two, or two and unequal masses.  A disk forgets
-its speed within 5 collisions: frames that are closer count for the tests as one frame every 5
-collisions per disk. a2 = <v^4> / (2 <v^2>^2) - 1.
+Each species of a mixture has a row and a curve of its own, with its kT and those of both
+components of its velocities, kT_x and kT_y.  Tests: Kolmogorov-Smirnov (KS) and chi-square, of
+speeds scaled by the energy of their own frame, against the law that applies: that of N disks that
+share a fixed kinetic energy, where it is fixed, otherwise Maxwell's.  The p-values are those of
+drawn samples that are scaled in the same way (docs/theory.md).  Frames that are close in time count
+less: `independent` speeds follow from the statistical inefficiency.  Disks that keep their angular
+momentum in a round container have no test.  a2 = <v^4> / (2 <v^2>^2) - 1.
 """
 
 from typing import NamedTuple
 
 from ricochet import Run, RunError
+from ricochet.analysis.speed_laws import speed_test
 from ricochet.analysis.speeds import (
     all_move,
-    exact_law,
-    independent_frames,
     kt_of_frames,
     moment,
     reduced_speeds,
@@ -38,11 +39,10 @@ from ricochet.analysis.statistics import (
     has_drift,
     estimate,
     has_trend,
-    goodness_of_fit,
     correlated_mean,
     rounded_to_error,
 )
-from ricochet.analysis.thermodynamics import motion_notes
+from ricochet.analysis.thermodynamics import motion_notes, refuse_others
 from ricochet.figures.drawing import bars, caption, colours, dilute_limit, noise_band, plt
 from ricochet.predictions.theory import RELAXATION, maxwell_cdf, maxwell_pdf
 from ricochet.reading.nature import TRAITS, Refused, allow
@@ -75,48 +75,60 @@ def state_of(run: Run) -> str:
     return EQUILIBRIUM if run.nature.in_equilibrium else STEADY
 
 
-def temperature(runs: list[Run], picked: list[list[int]]) -> tuple[SeriesMean, list[float], bool]:
+def temperature(
+    runs: list[Run], picked: list[list[int]], species: str | None = None
+) -> tuple[SeriesMean, list[float], bool]:
     """Return kT over these frames, that of the first and the last, and whether it drifts."""
-    tracks = [
-        kt_of_frames(run, slice(frames[0], frames[-1] + 1))
-        for run, frames in zip(runs, picked, strict=True)
-    ]
+    tracks = tracks_of(runs, picked, species)
     kt = combine_runs([correlated_mean(track) for track in tracks])
-    if all(run.nature.keeps_kinetic_energy for run in runs):
+    alone = species is None or len(runs[0].names) == 1
+    if alone and all(run.nature.keeps_kinetic_energy for run in runs):
         kt = kt._replace(error=0.0, drift=0.0)  # however few there are
     ends = [float(np.mean([track[k] for track in tracks])) for k in (0, -1)]
     return kt, ends, has_drift(kt) or any(map(has_trend, tracks))
 
 
+def tracks_of(
+    runs: list[Run], picked: list[list[int]], species: str | None, component: int | None = None
+) -> list[np.ndarray]:
+    """Return kT of all frames from the first to the last of those picked, of each run."""
+    spans = [slice(frames[0], frames[-1] + 1) for frames in picked]
+    return [
+        kt_of_frames(run, own, species, component) for run, own in zip(runs, spans, strict=True)
+    ]
+
+
 def pooled(
-    runs: list[Run], picked: list[list[int]], state: str, kts: tuple
+    runs: list[Run], picked: list[list[int]], state: str, name: str
 ) -> tuple[Estimate, dict]:
-    """Return density (B,) and tests of the speeds in late frames of runs of one N."""
+    """Return density (B,) and tests of the speeds of a species in late frames of runs of one N."""
     own, each = zip(runs, picked, strict=True), state not in (EQUILIBRIUM, STEADY)
-    u = np.concatenate([reduced_speeds(*one, each=each) for one in own])
-    n = runs[0].n_disks * sum(map(independent_frames, runs, picked))
-    maxwell, law = goodness_of_fit(u, maxwell_cdf, independent=n), exact_law(runs[0])
-    exact = goodness_of_fit(u, law, independent=n) if law else None
+    u = np.concatenate([reduced_speeds(*one, each=each, species=name) for one in own])
+    test, several = speed_test(runs, picked, name), len(runs[0].names) > 1
+    kt, ends, _ = temperature(runs, picked, name)
+    parts = {} if state == COOLING else measured("kT", kt)
+    for k, axis in enumerate("xy") if parts else ():
+        means = [correlated_mean(track) for track in tracks_of(runs, picked, name, k)]
+        parts |= measured(f"kT_{axis}", combine_runs(means))
     row = {
         "N": runs[0].n_disks,
+        **({"species": name} if several else {}),
         "runs": len(runs),
         "frames": sum(map(len, picked)),
         "speeds": len(u),
-        "independent": n,
-        **(measured("kT", kts[0]) if state != COOLING else {}),
-        "kT_first": kts[1][0],
-        "kT_last": kts[1][1],
-        **measured("mean_u", moment(u, 1, n)),
-        **measured("kurtosis", moment(u, 4, n)),
-        "KS_D": maxwell.ks,
-        "KS_limit_1%": 1.63 / n**0.5,
-        "KS_p": maxwell.ks_p,
-        "chi2/dof": maxwell.chi2,
-        "chi2_p": maxwell.chi2_p,
-        "KS_D_exact": exact and exact.ks,
-        "KS_p_exact": exact and exact.ks_p,
+        "independent": round(test.independent),
+        **parts,
+        "kT_first": ends[0],
+        "kT_last": ends[1],
+        **measured("mean_u", moment(u, 1, test.independent)),
+        **measured("kurtosis", moment(u, 4, test.independent)),
+        "law": test.law,
+        "KS_D": test.ks,
+        "KS_p": test.ks_p,
+        "chi2/dof": test.chi2,
+        "chi2_p": test.chi2_p,
     }
-    return binned(u, BINS, n), row
+    return binned(u, BINS, max(1, round(test.independent))), row
 
 
 class Scale(NamedTuple):
@@ -194,13 +206,16 @@ def cooling(row: dict) -> str:
 
 def label_of(row: dict, state: str) -> str:
     """Return temperature and tests as text."""
-    size, free, exact = row["speeds"], row["independent"], row["KS_p_exact"]
-    words = f"N = {row['N']}: {size} speeds" + (f", {free} independent" if free < size else "")
+    size, free = row["speeds"], row["independent"]
+    words = ", ".join(filter(None, (f"N = {row['N']}", row.get("species")))) + f": {size} speeds"
+    words += f", {free} independent" if free < size else ""
     steady = state in (STEADY, MOVING)
     words += f"\nkT = {' ± '.join(rounded_to_error(row['kT'], row['kT_error']))}" if steady else ""
     words += f"\n{cooling(row)}" if state in (COOLING, UNSTEADY) else ""
-    words += f"\nKS test: {chance(row['KS_p'])} for Maxwell"
-    return words + ("" if exact is None else f",\n{chance(exact)} for N disks of fixed energy")
+    laws = {"Maxwell": "Maxwell", "fixed_energy": "N disks of fixed energy"}
+    if row["law"] not in laws:
+        return words
+    return f"{words}\nKS test: {chance(row['KS_p'])} for {laws[row['law']]}"
 
 
 def chance(p: float) -> str:
@@ -224,16 +239,13 @@ def draw(
             axes.set_axis_off()
             axes.text(0.5, 0.5, f"{when}: disks at rest", ha="center", transform=axes.transAxes)
     densities, rows = zip(*pools, strict=True)
-    scales = [
-        scale_of(own[0], row.get("kT", 0.0), unscaled)
-        for (_, own), row in zip(groups, rows, strict=True)
-    ]
+    scales = [scale_of(largest, row.get("kT", 0.0), unscaled) for row in rows]
     draw_histogram(late, densities, [label_of(row, state) for row in rows], scales)
     top = max(
         max(1.0, np.max(density.mean)) / scale.thermal
         for density, scale in zip(densities, scales, strict=True)
     )
-    room = 0.1 + (0.4 if state in (EQUILIBRIUM, STEADY) else 0.6) * len(groups)
+    room = 0.1 + (0.4 if state in (EQUILIBRIUM, STEADY) else 0.6) * len(rows)
     late.set_ylim(0, top * (1 + room))
     draw_relaxation(way, groups)
     first.set_title("Start")
@@ -267,20 +279,23 @@ def main() -> None:
         odd = args.runs[1 + [other != state for other in others].index(True)]
         raise RunError(f"{odd.path}: is not of the kind of {args.runs[0].path}: draw them apart")
     groups = grouped(args.runs, lambda run: run.n_disks)
+    for _, runs in groups:
+        refuse_others(runs)
     picked = [[late_frames(run, args) for run in members] for _, members in groups]
     found = [temperature(runs, own) for (_, runs), own in zip(groups, picked, strict=True)]
     if state in (EQUILIBRIUM, STEADY) and any(drift for *_, drift in found):
         state = UNSTEADY
-    pools = [
-        pooled(runs, own, state, kts)
-        for (_, runs), own, kts in zip(groups, picked, found, strict=True)
-    ]
-    data, notes = {"u_low": BINS[:-1], "u_high": BINS[1:]}, motion_notes(args.runs)
-    for (count, _), (density, row) in zip(groups, pools, strict=True):
-        data[f"density_N{count}"], data[f"density_error_N{count}"] = density
-        if state in (COOLING, UNSTEADY):
-            why = "loses energy, no equilibrium" if state == COOLING else "has no steady kT yet"
-            notes.append(f"N = {count}: {why}; {cooling(row)}")
+    pools, data, notes = [], {"u_low": BINS[:-1], "u_high": BINS[1:]}, motion_notes(args.runs)
+    for (count, runs), own in zip(groups, picked, strict=True):
+        for name in runs[0].names:
+            density, row = pooled(runs, own, state, name)
+            end = f"N{count}_{name}" if "species" in row else f"N{count}"
+            data[f"density_{end}"], data[f"density_error_{end}"] = density
+            pools.append((density, row))
+            if state in (COOLING, UNSTEADY):
+                why = "loses energy, no equilibrium" if state == COOLING else "has no steady kT yet"
+                whose = f"N = {count}, {name}" if "species" in row else f"N = {count}"
+                notes.append(f"{whose}: {why}; {cooling(row)}")
     data["maxwell"] = np.diff(maxwell_cdf(BINS)) / np.diff(BINS)
     if args.unscaled:
         check_unscaled(args.runs, state)

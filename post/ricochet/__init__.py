@@ -47,6 +47,7 @@ if TYPE_CHECKING:  # the modules that `__getattr__` loads, for type checkers
     from .analysis import crater as crater
     from .analysis import fields as fields
     from .analysis import paths as paths
+    from .analysis import speed_laws as speed_laws
     from .analysis import speeds as speeds
     from .analysis import statistics as statistics
     from .analysis import streams as streams

@@ -4,26 +4,23 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..predictions.theory import Law, finite_n_cdf
 from ..reading.arrays import Index, chosen
 from ..reading.nature import Refused
 from ..reading.reader import Run
 from .statistics import Estimate, estimate, excess_kurtosis, correlated_mean
-from .thermodynamics import comoving, free_disks, thermal_energy
+from .thermodynamics import comoving, thermal_energy
 
 __all__ = [
-    "exact_law",
-    "independent_frames",
     "kt_of_frames",
     "means",
     "reduced_speeds",
     "relaxation",
 ]
 
-MEMORY = 5.0  # collisions per disk after which a speed is independent
 
-
-def kt_of_frames(run: Run, frames: Index) -> np.ndarray:
+def kt_of_frames(
+    run: Run, frames: Index, species: str | None = None, component: int | None = None
+) -> np.ndarray:
     """Return the kT of some frames, from the momenta that are free.
 
     Parameters
@@ -32,6 +29,10 @@ def kt_of_frames(run: Run, frames: Index) -> np.ndarray:
         a run
     frames : Index
         the frames
+    species : str, optional
+        the species [all disks together]
+    component : int, optional
+        0 or 1 for kT_x or kT_y, the part of the velocities along x or y [the mean of both]
 
     Returns
     -------
@@ -42,12 +43,21 @@ def kt_of_frames(run: Run, frames: Index) -> np.ndarray:
     --------
     >>> bool(np.allclose(speeds.kt_of_frames(run, [0, -1]), thermodynamics.kt_at_start(run)))
     True
+    >>> kt_x, kt_y = (speeds.kt_of_frames(run, [-1], component=k) for k in (0, 1))
+    >>> bool(np.allclose((kt_x + kt_y) / 2, thermodynamics.kt_at_start(run)))
+    True
     """
-    free = run.n_disks - 1 if run.shear_rate else free_disks(run)
-    return thermal_energy(run, frames).sum(axis=1) / free
+    own = slice(None) if species is None else run.of_species(species)
+    energy = thermal_energy(run, frames, component)[:, own].mean(axis=1)
+    bound = comoving(run) | bool(run.shear_rate)  # axes of which the mean motion is subtracted
+    if component is None:
+        return energy * run.n_disks / (run.n_disks - bound.sum() / 2)
+    return 2 * energy * run.n_disks / (run.n_disks - bound[component])
 
 
-def reduced_speeds(run: Run, frames: Index, each: bool = False) -> np.ndarray:
+def reduced_speeds(
+    run: Run, frames: Index, each: bool = False, species: str | None = None
+) -> np.ndarray:
     """Return speeds in units of the thermal speed sqrt(2 kT / m) of each species.
 
     Parameters
@@ -58,6 +68,8 @@ def reduced_speeds(run: Run, frames: Index, each: bool = False) -> np.ndarray:
         the frames
     each : bool
         whether each frame has a kT of its own, instead of one for all of these frames
+    species : str, optional
+        the species [all]
 
     Returns
     -------
@@ -82,10 +94,10 @@ def reduced_speeds(run: Run, frames: Index, each: bool = False) -> np.ndarray:
         if not kt.all():
             raise Refused(f"{run.path}: '{kind.name}' is at rest (kT = 0), it has no thermal speed")
         energy[:, kind.disks] /= kt
-    return np.sqrt(energy).ravel()
+    return np.sqrt(energy[:, slice(None) if species is None else run.of_species(species)]).ravel()
 
 
-def moment(u: np.ndarray, power: int, independent: int) -> Estimate:
+def moment(u: np.ndarray, power: int, independent: float) -> Estimate:
     """Return the mean of a power of speeds that are scaled to a mean square of 1."""
     mean = np.mean(u**power)
     rest = u**power - power / 2 * mean * u**2
@@ -96,31 +108,6 @@ def all_move(run: Run, frame: int) -> bool:
     """Whether in a frame at least one disk of each species moves."""
     energy = run.kinetic_energy(frame)
     return all(energy[kind.disks].any() for kind in run.by_species)
-
-
-def independent_frames(run: Run, frames: Index) -> int:
-    """Return the number of frames that are independent, five collisions per disk apart.
-
-    Parameters
-    ----------
-    run : Run
-        a run
-    frames : Index
-        the frames, in order
-
-    Returns
-    -------
-    int
-        the number, at least 1
-
-    Examples
-    --------
-    >>> speeds.independent_frames(run, [0])
-    1
-    """
-    numbers = chosen(run.n_frames, frames)
-    tau = run.collisions_per_disk_at(run.time)[numbers]
-    return min(len(numbers), 1 + int((tau[-1] - tau[0]) / MEMORY * (1 + 1e-9)))
 
 
 def relaxation(
@@ -154,31 +141,6 @@ def relaxation(
     else:
         chosen = list(range(min(frames, run.n_frames)))
     return tau[chosen], np.array([excess_kurtosis(reduced_speeds(run, [k])) for k in chosen])
-
-
-def exact_law(run: Run) -> Law | None:
-    """Return the exact distribution of speeds of a run whose kinetic energy is fixed.
-
-    Parameters
-    ----------
-    run : Run
-        a run
-
-    Returns
-    -------
-    callable or None
-        distribution function of the reduced speed; None of a run that has none
-
-    Examples
-    --------
-    >>> float(speeds.exact_law(run)(0.0))
-    0.0
-    """
-    axes = int(comoving(run).sum())
-    free = not run.nature.keeps_kinetic_energy or run.n_disks < 2 + axes / 2
-    if free or "round_container" in run.nature or axes == 1 or (axes == 2 and np.ptp(run.mass) > 0):
-        return None
-    return finite_n_cdf(run.n_disks, axes == 2)
 
 
 def means(runs: Sequence[Run], frames: Sequence[Index], name: str) -> tuple[Estimate, Estimate]:

@@ -248,7 +248,7 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
     Parameters
     ----------
     series : numpy.ndarray
-        (T,) samples at equal intervals
+        (T,) samples at equal intervals; or (T, K) of K quantities, whose autocorrelations are added
     least : float
         lower bound of the result; values below 1 occur where samples are anticorrelated
 
@@ -265,8 +265,8 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
     >>> bool(4 < statistical_inefficiency(np.repeat(noise, 5)) < 6)
     True
     """
-    count, rest = len(series), series - np.mean(series)
-    if np.ptp(series) <= 1e-12 * np.max(np.abs(series), initial=0):
+    count, rest = len(series), series - np.mean(series, axis=0)
+    if np.max(np.ptp(series, axis=0)) <= 1e-12 * np.max(np.abs(series), initial=0):
         return 1.0
     found, lag = 1.0, 0
     for lag in range(1, count // 2):

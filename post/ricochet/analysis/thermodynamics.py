@@ -286,15 +286,19 @@ def comoving(run: Run) -> np.ndarray:
     return kept
 
 
-def thermal_energy(run: Run, frames: Index) -> np.ndarray:
-    """Return m v^2 / 2 (F, N) with v relative to the flow and, where `comoving`, to the mean."""
+def thermal_energy(run: Run, frames: Index, component: int | None = None) -> np.ndarray:
+    """Return m v^2 / 2 (F, N) with v relative to the flow and, where `comoving`, to the mean.
+
+    `component` is 0 or 1 for the part of v along x or y alone.
+    """
     frames = chosen(run.n_frames, frames)
     velocity = run.velocity[frames]
     if run.shear_rate:
         velocity[..., 0] -= run.shear_rate * run.position[frames][..., 1]
     axes = comoving(run) | bool(run.shear_rate)
     velocity -= axes * np.average(velocity, axis=1, weights=run.mass)[:, None]
-    return 0.5 * run.mass * np.sum(velocity**2, axis=-1)
+    parts = slice(None) if component is None else slice(component, component + 1)
+    return 0.5 * run.mass * np.sum(velocity[..., parts] ** 2, axis=-1)
 
 
 def free_disks(run: Run) -> float:

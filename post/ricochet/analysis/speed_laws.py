@@ -1,0 +1,186 @@
+"""Tests of the speeds of disks against the law that applies to them.
+
+Each frame is scaled by its own energy, so that neither an energy that is fixed nor one that
+fluctuates slowly matters.  Scaled speeds are closer to their law than values that are drawn freely
+(Lilliefors, J. Am. Stat. Assoc. 62, 399 (1967)).  The p-values are therefore those of drawn frames
+of the same numbers of disks, scaled in the same way: velocities are uniform on the sphere of one
+energy, less the motion of the centre of mass where that is `comoving`.  Samples of frames that are
+correlated are counted by their statistical inefficiency.
+"""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from ..predictions.theory import Law, finite_n_cdf
+from ..reading.arrays import Index
+from ..reading.reader import Run
+from .statistics import statistical_inefficiency
+from .thermodynamics import comoving, thermal_energy
+
+__all__ = ["SpeedTest", "speed_test"]
+
+BINS = 30  # of equal probability
+WIDE = 5  # of these in a bin whose counts vary as slowly as the distance of two distributions does
+DRAWN = 4000  # drawn samples
+MOST = 1000  # speeds of a drawn sample; more have the same distribution of the scaled statistics
+MANY = 2000  # disks, among whom the motion of the centre of mass does not matter
+TAIL = 0.05  # share of the drawn samples whose exponential tail continues their distribution
+
+
+class SpeedTest(NamedTuple):
+    """Comparison of speeds with the law that applies."""
+
+    law: str  # "fixed_energy" of N disks that share one, or "Maxwell"
+    independent: float  # number of independent speeds
+    ks: float  # Kolmogorov-Smirnov distance
+    ks_p: float  # probability of a larger distance by chance
+    chi2: float  # per degree of freedom, bins of equal probability
+    chi2_p: float
+
+
+def shares(run: Run, frames: Index, name: str) -> np.ndarray:
+    """Return energies (F, n) of a species over the mean of the frame.
+
+    The mean is over all disks in equilibrium, over those of the species otherwise.
+    """
+    energy, own = thermal_energy(run, frames), run.of_species(name)
+    unit = energy if run.nature.in_equilibrium else energy[:, own]
+    return energy[:, own] / unit.mean(axis=1, keepdims=True)
+
+
+class Sample(NamedTuple):
+    """Frames of disks of one species that share an energy with others."""
+
+    sharing: int  # disks that share the energy
+    own: int  # disks of the species
+    frames: int
+    axes: tuple[bool, ...] = (False, False)  # along which the centre of mass is at rest
+    mass: tuple[
+        float, ...
+    ] = ()  # of all disks, those of the species first; () if it does not matter
+
+    def law(self) -> Law:
+        """Return the distribution function of u, to which distances are measured."""
+        return finite_n_cdf(self.sharing, all(self.axes) and self.own == self.sharing)
+
+    def smaller(self) -> "Sample":
+        """Return a sample of no more than `MOST` speeds, whose scaled statistics are the same."""
+        most = self
+        if self.sharing > MANY or not any(self.axes):
+            own = min(self.own, MANY)
+            most = Sample(round(self.sharing * own / self.own), own, self.frames)
+        return most._replace(frames=min(self.frames, -(-MOST // most.own)))
+
+    def draw(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Return `shares` (count, frames * own) of drawn samples."""
+        size = count * self.frames
+        if self.mass:
+            mass = np.array(self.mass)
+            v = rng.normal(size=(size, len(mass), 2)) / np.sqrt(mass)[:, None]
+            v -= np.array(self.axes) * np.average(v, axis=1, weights=mass)[:, None]
+            energy = mass * np.sum(v**2, axis=-1)
+            total = energy[:, : self.sharing].sum(axis=1)
+            energy = energy[:, : self.own]
+        else:
+            energy = rng.exponential(size=(size, self.own))
+            others = self.sharing - self.own
+            total = energy.sum(axis=1) + (rng.gamma(others, size=size) if others else 0.0)
+        return (energy * (self.sharing / total)[:, None]).reshape(count, -1)
+
+
+def sample_of(run: Run, name: str, frames: int) -> Sample:
+    """Return of what kind the `shares` of a species are."""
+    own, axes = run.of_species(name), tuple(map(bool, comoving(run) | bool(run.shear_rate)))
+    count = int(own.sum())
+    mass = (*run.mass[own], *run.mass[~own]) if any(axes) and run.n_disks <= MANY else ()
+    return Sample(run.n_disks if run.nature.in_equilibrium else count, count, frames, axes, mass)
+
+
+def statistics_of(values: np.ndarray) -> np.ndarray:
+    """Return n D^2 and chi^2 (2, S) of samples (S, n) that should be uniform from 0 to 1."""
+    samples, n = values.shape
+    ranks, ordered = np.arange(n) / n, np.sort(values, axis=1)
+    distance = np.maximum(ordered - ranks, ranks + 1 / n - ordered).max(axis=1)
+    which = np.minimum((values * BINS).astype(int), BINS - 1) + BINS * np.arange(samples)[:, None]
+    counts = np.bincount(which.ravel(), minlength=BINS * samples).reshape(samples, BINS)
+    chi2 = np.sum((counts - n / BINS) ** 2, axis=1) / (n / BINS)
+    return np.stack([n * distance**2, chi2])
+
+
+@lru_cache(maxsize=64)
+def by_chance(sample: Sample) -> np.ndarray:
+    """Return n D^2 and chi^2 (2, DRAWN) of drawn samples, in increasing order."""
+    rng, law, parts = np.random.default_rng(1), sample.law(), []
+    for _ in range(10):
+        parts.append(statistics_of(law(np.sqrt(sample.draw(rng, DRAWN // 10)))))
+    return np.sort(np.concatenate(parts, axis=1), axis=1)
+
+
+def chance(found: float, drawn: np.ndarray) -> float:
+    """Return the share of drawn statistics (S,) beyond that found, with an exponential tail."""
+    first = int(len(drawn) * (1 - TAIL))
+    if found <= drawn[first]:
+        return 1 - float(np.searchsorted(drawn, found)) / len(drawn)
+    mean = float(np.mean(drawn[first:] - drawn[first]))
+    return TAIL * float(np.exp((drawn[first] - found) / mean))
+
+
+def per_frame(counts: np.ndarray) -> float:
+    """Return the statistical inefficiency of counts in bins (F, B) of a run, at least 1."""
+    return max(1.0, statistical_inefficiency(counts)) if len(counts) > 2 else 1.0
+
+
+def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> SpeedTest:
+    """Compare the speeds of a species with the law that applies to them.
+
+    Parameters
+    ----------
+    runs : list of Run
+        (R,) runs that differ by their seed
+    frames : list of Index
+        (R,) frames of each run
+    name : str
+        the species
+
+    Returns
+    -------
+    SpeedTest
+        both statistics with their probabilities; the law is "none" and they are NaN where no law
+        is known: of disks that keep their angular momentum in a round container, and of fewer than
+        three disks that are not in equilibrium with others
+
+    Examples
+    --------
+    >>> test = speed_laws.speed_test(runs, [range(2, 12)] * 3, "gas")
+    >>> test.law, test.ks_p > 1e-3
+    ('fixed_energy', True)
+    """
+    each = [shares(run, own, name) for run, own in zip(runs, frames, strict=True)]
+    sample = sample_of(runs[0], name, sum(map(len, each)))
+    known = sample.sharing > 2 and not any("round_container" in run.nature for run in runs)
+    law, counts = sample.law(), []
+    values = [law(np.sqrt(one)) for one in each]
+    for one in values:
+        bins = np.minimum((one * BINS).astype(int), BINS - 1)
+        counts.append(np.stack([np.bincount(row, minlength=BINS) for row in bins]))
+    size = np.array(list(map(len, counts)))
+    memory = [
+        float(size @ [per_frame(of(own)) for own in counts]) / size.sum()
+        for of in (lambda own: own.reshape(len(own), -1, WIDE).sum(axis=2), lambda own: own)
+    ]
+    total = sample.own * sample.frames
+    if not known:
+        return SpeedTest("none", total / memory[0], *[np.nan] * 4)
+    square, chi2 = statistics_of(np.concatenate(values).reshape(1, -1))[:, 0]
+    drawn, fixed = by_chance(sample.smaller()), runs[0].nature.keeps_kinetic_energy
+    return SpeedTest(
+        "fixed_energy" if fixed else "Maxwell",
+        total / memory[0],
+        float(np.sqrt(square / total)),
+        chance(square / memory[0], drawn[0]),
+        chi2 / memory[1] / (BINS - 1),
+        chance(chi2 / memory[1], drawn[1]),
+    )
