@@ -1,4 +1,4 @@
-!> The command line: options, names of any length, and the answers to --help and other questions.
+!> The command line: options, file names of any length, and the answers to --help and other questions.
 module command_line
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use build_info, only: build_flags, git_commit
@@ -14,16 +14,17 @@ module command_line
   public :: command_t, read_command_line, parse_arguments, answer, help_text
 
   type :: command_t
-    character(len=:), allocatable :: question      !! "" to run; else help, version, print-defaults, print-variables or explain
-    character(len=:), allocatable :: topic         !! the variable of --explain
+    character(len=:), allocatable :: question  !! question to be answered: help, version, print-defaults, print-variables or
+                                               !! explain; "": a run
+    character(len=:), allocatable :: topic         !! variable or word of --explain
     character(len=:), allocatable :: input         !! path of the input file
     character(len=:), allocatable :: output        !! path of the output file
     type(text_t), allocatable :: overrides(:)      !! GROUP.VARIABLE=VALUE of each --set
     logical :: resume = .false.
-    logical :: check = .false.                     !! validate only
-    logical :: print_input = .false.               !! as JSON, only
+    logical :: check = .false.                     !! only validate the input
+    logical :: print_input = .false.               !! only print the input as JSON
     logical :: quiet = .false.
-    logical :: force = .false.                     !! replace a finished output, delete an unfinished one
+    logical :: force = .false.                     !! replace a finished output, or an unfinished one
   end type command_t
 
   character(len=17), parameter :: switches(*) = [character(len=17) :: "--resume", "--check", "--quiet", "--force", &
@@ -47,7 +48,7 @@ contains
     call parse_arguments(arguments, command, error)
   end subroutine read_command_line
 
-  !> Makes a command of the arguments, or an error of the first that is wrong. A question ends the reading.
+  !> Converts the arguments to a command, or reports the first invalid one. Reading ends at a question.
   subroutine parse_arguments(arguments, command, error)
     type(text_t), intent(in) :: arguments(:)
     type(command_t), intent(out) :: command
@@ -86,14 +87,14 @@ contains
 
   contains
 
-    !> Wrong usage; what was wrong first counts.
+    !> Reports wrong usage. Only the first report is kept.
     subroutine refuse(why)
       character(len=*), intent(in) :: why
 
       if (.not. allocated(error)) call fail(error, exit_usage, why)
     end subroutine refuse
 
-    !> Takes the option of argument k, and the next argument if it is the option's value.
+    !> Reads the option in argument k, and the next argument if it is the value of the option.
     subroutine take_option(name)
       character(len=*), intent(in) :: name
       type(text_t) :: override
@@ -108,7 +109,7 @@ contains
       case ("--set")
         call take_value(name, override%text)
         call expect_assignment(override%text)
-        command%overrides = [command%overrides, override]    ! of a `text_t(...)` gfortran 12 would lose the memory
+        command%overrides = [command%overrides, override]    ! with a constructor `text_t(...)` gfortran 12 would lose the memory
       case ("--explain")
         command%question = "explain"
         call take_value(name, command%topic)
@@ -131,7 +132,7 @@ contains
       end select
     end subroutine take_option
 
-    !> Takes the value after `=` or in the next argument.
+    !> Reads the value after `=` or in the next argument.
     subroutine take_value(name, value)
       character(len=*), intent(in) :: name
       character(len=:), allocatable, intent(out) :: value
@@ -144,7 +145,7 @@ contains
       if (value == "") call refuse("option "//name//" needs a value")
     end subroutine take_value
 
-    !> Refuses `--set NAME VALUE`, which would take the value for a file.
+    !> Refuses `--set NAME VALUE`, in which the value would be read as a file name.
     subroutine expect_assignment(text)
       character(len=*), intent(in) :: text
 
@@ -155,7 +156,7 @@ contains
       end associate
     end subroutine expect_assignment
 
-    !> The option may be misspelt, or a file name.
+    !> Reports an unknown option, which may be misspelt or a file name.
     subroutine report_unknown(name)
       character(len=*), intent(in) :: name
       character(len=:), allocatable :: meant
@@ -168,7 +169,7 @@ contains
     end subroutine report_unknown
   end subroutine parse_arguments
 
-  !> `runs/<input name>.h5`
+  !> Default path of the output: `runs/<input name>.h5`.
   pure function default_output(input) result(output)
     character(len=*), intent(in) :: input
     character(len=:), allocatable :: output
@@ -203,7 +204,7 @@ contains
     call print_text(text, error)
   end subroutine answer
 
-  !> Answer to `--version`: all that a bug report should state.
+  !> Answer to `--version`: all data that a bug report should contain.
   function version_text() result(text)
     character(len=:), allocatable :: text
 
@@ -212,7 +213,7 @@ contains
       "threads:  "//trim(merge("set by run.threads", "one, no OpenMP    ", index(build_flags, "-fopenmp") > 0))
   end function version_text
 
-  !> One screen.
+  !> Answer to `--help`: one screen of text.
   pure function help_text() result(text)
     character(len=:), allocatable :: text
 

@@ -1,5 +1,5 @@
-!> The values of the input variables as a run uses them, by group and name.
-!> The output file lists them all from here; `settings` has them as typed data.
+!> Values of the input variables as a run uses them, by group and name. The output file lists all of them; `settings` contains the
+!> same values as typed data.
 module input_groups
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
@@ -10,18 +10,18 @@ module input_groups
   public :: value_t, group_t, text_length, range_of, json_text, same_value, same_values
 
   integer, parameter :: text_length = 512      !! longest text value, in bytes
-  integer, parameter, public :: most_written = 100      !! values of a variable in an assignment: longer lists are cut
+  integer, parameter, public :: most_written = 100      !! longest list of values in an assignment; longer lists are cut
 
-  !> One variable. Numbers with a fraction are reals; everything else is kept as texts: integers as
-  !> digits, so that 64 bits fit, logicals as `.true.` or `.false.`. Neither is allocated without a value.
+  !> One variable. Real numbers are stored in `reals`, all other values in `texts`: integers as digits, so that all 64 bits are
+  !> kept, logicals as `.true.` or `.false.`. Without a value neither is allocated.
   type :: value_t
-    integer :: row = 0                         !! of the table
+    integer :: row = 0                         !! row in the table of variables
     character(len=name_length) :: name = ""
     character(len=8) :: kind = ""              !! "integer", "real", "logical" or "text"
-    logical :: given = .false.                 !! by the user
-    logical :: faulty = .false.                !! given, but wrong, and reported
-    integer :: line = 0                        !! where: line of the file, or -k: override k
-    integer :: elements = 0                    !! bit i: element i is given (name(i) = value)
+    logical :: given = .false.                 !! set by the user
+    logical :: faulty = .false.                !! set by the user, but invalid, which has been reported
+    integer :: line = 0                        !! line of the file, or -k for override k
+    integer :: elements = 0                    !! bit i: element i has been set (name(i) = value)
     real(real64), allocatable :: reals(:)
     character(len=text_length), allocatable :: texts(:)
   contains
@@ -32,14 +32,14 @@ module input_groups
     procedure :: json
   end type value_t
 
-  !> One group of the input; of a repeated group, one instance. The functions give the value of a
-  !> variable, or `otherwise` if it has none.
+  !> One group of the input, or one instance of a repeated group. The functions return the value of a variable, or `otherwise` if it
+  !> has none.
   type :: group_t
     character(len=8) :: name = ""
-    character(len=text_length) :: instance = ""  !! `name` of an obstacle or species; else blank
-    integer :: number = 0                      !! among the groups of its name, from 1
-    integer :: line = 0                        !! of its first line in the file; 0: not in the file
-    integer :: first = 0, last = 0             !! its place in the text, from & to /
+    character(len=text_length) :: instance = ""  !! `name` of an obstacle or species; otherwise blank
+    integer :: number = 0                      !! number among the groups of the same name, from 1
+    integer :: line = 0                        !! its first line in the file; 0: not in the file
+    integer :: first = 0, last = 0             !! position in the text, from & to /
     type(value_t), allocatable :: values(:)
   contains
     procedure :: integer_of, real_of, reals_of, text_of
@@ -83,7 +83,7 @@ contains
     end if
   end function integers
 
-  !> Whether no variable differs between the groups of two inputs, given or by default.
+  !> Whether all variables, given or default, have the same values in the groups of two inputs.
   pure function same_values(one, other) result(yes)
     type(group_t), intent(in) :: one(:), other(:)  !! in the same order
     logical :: yes
@@ -97,7 +97,7 @@ contains
     end do
   end function same_values
 
-  !> Whether two values of a variable are the same.
+  !> Whether two values of a variable are equal.
   pure function same_value(one, other) result(yes)
     type(value_t), intent(in) :: one, other
     logical :: yes
@@ -112,7 +112,7 @@ contains
     end if
   end function same_value
 
-  !> Takes the value away.
+  !> Removes the value.
   pure subroutine clear(self)
     class(value_t), intent(inout) :: self
 
@@ -165,7 +165,7 @@ contains
     end associate
   end function real_of
 
-  !> The first value of a variable of any kind but "real"; empty if it has none.
+  !> The first value of a variable of any kind except "real"; empty if it has none.
   pure function text_of(self, name) result(text)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -186,7 +186,7 @@ contains
     given = self%values(row_of(self%name, name))%given
   end function given
 
-  !> Whether a variable is set to something that has been reported as wrong.
+  !> Whether a variable has been set to an invalid value, which has been reported.
   pure function faulty(self, name)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -195,7 +195,7 @@ contains
     faulty = self%values(row_of(self%name, name))%faulty
   end function faulty
 
-  !> Gives a variable a single value that follows from others.
+  !> Sets a single value that follows from other variables.
   pure subroutine put_text(self, name, text)
     class(group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -208,7 +208,7 @@ contains
     end associate
   end subroutine put_text
 
-  !> Gives a variable values that follow from others.
+  !> Sets values that follow from other variables.
   pure subroutine put_reals(self, name, numbers)
     class(group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -217,11 +217,11 @@ contains
     self%values(row_of(self%name, name))%reals = numbers
   end subroutine put_reals
 
-  !> Reports what is wrong with a variable where it is set, or if it is not, where its group begins.
+  !> Reports a problem of a variable with the line where it is set or, if it is not set, the first line of its group.
   pure subroutine complain(self, name, what, problems)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
-    character(len=*), intent(in) :: what       !! what is wrong, what is allowed
+    character(len=*), intent(in) :: what       !! the problem and the allowed values
     type(problem_list_t), intent(inout) :: problems
 
     associate (line => self%values(row_of(self%name, name))%line)
@@ -229,7 +229,7 @@ contains
     end associate
   end subroutine complain
 
-  !> Reports a variable that has to be given and is not.
+  !> Reports a variable that is required and missing.
   pure subroutine demand(self, name, problems)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -240,10 +240,10 @@ contains
     end associate
   end subroutine demand
 
-  !> A choice that is not given follows from the variables that go with it; the last one in the table counts.
+  !> Sets choices that are not given and follow from variables that require them. The last such variable in the table decides.
   pure subroutine infer_choices(self)
     class(group_t), intent(inout) :: self
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, then its words
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, followed by its words
     integer :: k
 
     do k = 1, size(self%values)
@@ -253,12 +253,12 @@ contains
     end do
   end subroutine infer_choices
 
-  !> A choice may need a variable. A variable that does not go with the choice has no value; if it is given, that is a
-  !> mistake: nothing is ignored silently. Variables may exclude each other.
+  !> Checks choices. A choice may require a variable. A variable that does not apply to the choice has no value; if it is given,
+  !> that is reported, because nothing may be ignored silently. Mutually exclusive variables are reported as well.
   pure subroutine check_choices(self, problems)
     class(group_t), intent(inout) :: self
     type(problem_list_t), intent(inout) :: problems
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, then its words
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, followed by its words
     character(len=len(table%goes_with)) :: word
     integer :: j, k
 
@@ -284,10 +284,10 @@ contains
     end do
   end subroutine check_choices
 
-  !> First and last of the groups of some names; if there are none, the last comes before the first.
+  !> Indices of the first and the last group with one of these names. If there are none, the last index is smaller than the first.
   pure function range_of(groups, names) result(range)
     type(group_t), intent(in) :: groups(:)   !! in the order of the table
-    character(len=*), intent(in) :: names(:)           !! neighbours in the table
+    character(len=*), intent(in) :: names(:)           !! adjacent in the table
     integer :: range(2), k
     logical :: named(size(groups))
 
@@ -296,11 +296,11 @@ contains
     range(2) = range(1) + count(named) - 1
   end function range_of
 
-  !> Assignment that gives a variable its value: `species.bed.radius = 0.005`.
+  !> An assignment of the value of a variable: `species.bed.radius = 0.005`.
   pure function value_line(self, k, most) result(text)
     class(group_t), intent(in) :: self
-    integer, intent(in) :: k                   !! its place in the group
-    integer, intent(in), optional :: most      !! values; a longer list is cut
+    integer, intent(in) :: k                   !! index of the variable in the group
+    integer, intent(in), optional :: most      !! largest number of values; a longer list is cut
     character(len=:), allocatable :: text
     integer :: longest
 
@@ -311,7 +311,7 @@ contains
     text = text//trim(self%values(k)%name)//" = "//self%values(k)%json(longest)
   end function value_line
 
-  !> The value, or a list of them, as JSON; a list that is longer than wanted is cut.
+  !> The value or list of values as JSON. A list is cut if it is longer than `most`.
   pure function json(self, most) result(text)
     class(value_t), intent(in) :: self
     integer, intent(in), optional :: most
@@ -340,7 +340,7 @@ contains
     if (table(self%row)%size /= 1 .or. n > 1) text = "["//text//"]"
   end function json
 
-  !> A text without trailing blanks as JSON.
+  !> A text as JSON, without trailing blanks.
   pure function json_text(text) result(quoted)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: quoted

@@ -1,4 +1,4 @@
-!> Everything that is wrong with an input, collected to be reported at once.
+!> The problems of an input, collected in order to be reported together.
 module input_problems
   use errors, only: error_t, exit_files, exit_usage
   use texts, only: legible, text_t, written
@@ -6,19 +6,19 @@ module input_problems
   private
   public :: problem_list_t
 
-  integer, parameter, public :: most_problems = 100          !! worth reading
-  integer, parameter :: whole_file = 1000000000 !! sorts after every line
+  integer, parameter, public :: most_problems = 100          !! largest number of problems that are reported
+  integer, parameter :: whole_file = 1000000000 !! larger than any line number
 
   type :: problem_t
-    integer :: line                             !! > 0: in the file; 0: the file as a whole; -k: override k
+    integer :: line                             !! > 0: line of the file; 0: the whole file; -k: override k
     character(len=:), allocatable :: text
   end type problem_t
 
-  !> The problems in the order of the report: by line, then those of the whole file, then the overrides.
+  !> The problems in the order of the report: by line, then those of the whole file, then those of overrides.
   type :: problem_list_t
     integer :: count = 0
-    integer :: unreadable = 0                   !! those that are of a file that cannot be read
-    logical :: cut_short = .false.              !! there were more than the list holds
+    integer :: unreadable = 0                   !! number of problems with unreadable files
+    logical :: cut_short = .false.              !! there were more problems than the list can hold
     type(problem_t) :: items(most_problems)
   contains
     procedure :: add
@@ -27,12 +27,12 @@ module input_problems
 
 contains
 
-  !> Adds `where: what`, unless the list has it already.
+  !> Adds the problem `where: what`, unless it is already in the list.
   pure subroutine add(self, line, where, what)
     class(problem_list_t), intent(inout) :: self
     integer, intent(in) :: line                 !! as in `problem_t`
     character(len=*), intent(in) :: where       !! group or group.variable
-    character(len=*), intent(in) :: what        !! what is wrong, what is allowed
+    character(len=*), intent(in) :: what        !! the problem and the allowed values
     character(len=:), allocatable :: text
     integer :: k
 
@@ -53,7 +53,7 @@ contains
     self%count = self%count + 1
   end subroutine add
 
-  !> Place of a line in the report.
+  !> Position of a line in the report.
   pure function rank(line)
     integer, intent(in) :: line
     integer :: rank
@@ -61,12 +61,12 @@ contains
     rank = merge(line, whole_file - line, line > 0)
   end function rank
 
-  !> Makes all problems one error, a line for each: `path:line: group.variable: what is wrong, what is allowed`.
+  !> Converts all problems to one error, with a line for each: `path:line: group.variable: problem, allowed values`.
   subroutine report(self, path, error, overrides)
     class(problem_list_t), intent(in) :: self
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
-    type(text_t), intent(in), optional :: overrides(:)    !! that problems may be about
+    type(text_t), intent(in), optional :: overrides(:)    !! overrides to which problems may refer
     character(len=:), allocatable :: text, place
     integer :: k
 
@@ -81,7 +81,7 @@ contains
       end associate
     end do
     if (self%cut_short) text = text//new_line("a")//legible(path)//": there are more problems than these "//written(most_problems)
-    allocate (error)                            ! not by `fail`: there are several lines
+    allocate (error)                            ! not by `fail`, which accepts a single line
     error%message = text(2:)
     error%code = merge(exit_files, exit_usage, self%unreadable == self%count)
   end subroutine report

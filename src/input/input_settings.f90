@@ -1,4 +1,4 @@
-!> From the groups of the input to `settings`: what follows from what, and what goes with what.
+!> Converts the groups of the input to `settings`: derives values from others and checks combinations.
 module input_settings
   use kinds, only: int64, never, real64
   use box_geometry, only: box_t
@@ -21,15 +21,14 @@ module input_settings
 
 contains
 
-  !> Fills the settings. Values that follow from others are also put back into the groups, so that these hold every
-  !> value as it is used.
+  !> Fills the settings. Derived values are also stored in the groups, so that these contain every value as it is used.
   subroutine resolve_settings(groups, settings, problems, stepped)
-    type(group_t), intent(inout) :: groups(:)             !! those of one name side by side
+    type(group_t), intent(inout) :: groups(:)             !! groups of the same name are adjacent
     type(settings_t), intent(out) :: settings
     type(problem_list_t), intent(inout) :: problems
-    logical, intent(in), optional :: stepped              !! the caller decides when the run ends, and `&stop` may be empty
+    logical, intent(in), optional :: stepped              !! the caller decides when the run ends; `&stop` may be empty
     logical :: must_end
-    type(wall_law_t) :: wall_law                          ! of `&contact`
+    type(wall_law_t) :: wall_law                          ! law in `&contact`
     integer :: o(2), s(2), w(2), k
 
     must_end = .true.
@@ -53,7 +52,7 @@ contains
 
   contains
 
-    !> Title, seed and method.
+    !> Title, seed and numerical method.
     subroutine take_run(group)
       type(group_t), intent(in) :: group
 
@@ -70,7 +69,7 @@ contains
       end associate
     end subroutine take_run
 
-    !> The box without its obstacles.
+    !> Box without its obstacles.
     subroutine take_box(group)
       type(group_t), intent(in) :: group
       integer :: axis
@@ -89,10 +88,10 @@ contains
       end associate
     end subroutine take_box
 
-    !> Restitution by pair of species, and the law of walls without one of their own.
+    !> Coefficients of restitution by pair of species, and the default law of walls.
     subroutine take_contact(group, n)
       type(group_t), intent(inout) :: group
-      integer, intent(in) :: n                            !! species
+      integer, intent(in) :: n                            !! number of species
       real(real64), allocatable :: pairs(:)
       real(real64) :: restitution
 
@@ -125,7 +124,7 @@ contains
       end associate
     end subroutine take_contact
 
-    !> Kind and size of the kicks, and whom they reach.
+    !> Kind and strength of the driving, and the driven species.
     subroutine take_drive(group)
       type(group_t), intent(in) :: group
       character(len=:), allocatable :: wanted
@@ -147,7 +146,7 @@ contains
       end associate
     end subroutine take_drive
 
-    !> The rules that end the run.
+    !> Rules that end the run.
     subroutine take_stop(group)
       type(group_t), intent(in) :: group
 
@@ -164,7 +163,7 @@ contains
       end associate
     end subroutine take_stop
 
-    !> Contents of the output and the schedule of its samples.
+    !> Contents of the output and its sampling schedules.
     subroutine take_output(group)
       type(group_t), intent(in) :: group
       integer :: k
@@ -185,10 +184,10 @@ contains
       end associate
     end subroutine take_output
 
-    !> When frames or observables are written.
+    !> Sampling schedule of frames or observables.
     subroutine take_sampling(group, what, sampling)
       type(group_t), intent(in) :: group
-      character(len=*), intent(in) :: what                !! in `sampled`
+      character(len=*), intent(in) :: what                !! one of `sampled`
       type(sampling_t), intent(out) :: sampling
       integer :: k
 
@@ -204,12 +203,12 @@ contains
     end subroutine take_sampling
   end subroutine resolve_settings
 
-  !> Table of settings of different groups that cannot be combined, and of intervals that are too short. Variables of one group
-  !> that exclude each other are marked in the table of variables.
+  !> Reports settings of different groups that cannot be combined, and intervals that are too short. Mutually exclusive variables of
+  !> one group are marked in the table of variables.
   subroutine check_conflicts(settings, groups, must_end, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
-    logical, intent(in) :: must_end                       !! by a rule of the input
+    logical, intent(in) :: must_end                       !! the input must contain a stop rule
     type(problem_list_t), intent(inout) :: problems
     character(len=*), parameter :: other_rule = "; give another rule", energy = "stop.energy_fraction", &
       rest = "stop.at_rest"
@@ -264,9 +263,9 @@ contains
 
   contains
 
-    !> Reports that a variable, or group, does not go with something else.
+    !> Reports that a variable or group cannot be combined with another setting.
     subroutine refuse(together, variable, other)
-      logical, intent(in) :: together                     !! both are there
+      logical, intent(in) :: together                     !! both settings are present
       character(len=*), intent(in) :: variable, other
       integer :: dot
 
@@ -278,7 +277,7 @@ contains
       end associate
     end subroutine refuse
 
-    !> Reports too many intervals until stop.time.
+    !> Reports an interval that would occur too often before stop.time.
     subroutine limit(group, name, of_what, most)
       character(len=*), intent(in) :: group, name, of_what
       real(real64), intent(in) :: most

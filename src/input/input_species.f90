@@ -1,4 +1,4 @@
-!> The species of the input: names, placements, velocities, and how they depend on each other.
+!> The species of the input: names, placement, velocities, and relations between species.
 module input_species
   use kinds, only: int64, pi, real64
   use box_geometry, only: box_t
@@ -17,11 +17,11 @@ module input_species
 
 contains
 
-  !> Fills the settings of all species; derived values go back into the groups.
+  !> Fills the settings of all species. Derived values are also stored in the groups.
   subroutine take_species(groups, box, seed, species, problems)
     type(group_t), intent(inout) :: groups(:)             !! the species
     type(box_t), intent(in) :: box
-    integer(int64), intent(in) :: seed                    !! of the run
+    integer(int64), intent(in) :: seed                    !! seed of the run
     type(species_settings_t), allocatable, intent(out) :: species(:)
     type(problem_list_t), intent(inout) :: problems
     integer(int64) :: total
@@ -59,7 +59,7 @@ contains
 
   contains
 
-    !> Where the disks start.
+    !> Initial positions of the disks.
     subroutine take_placement(group, s)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(inout) :: s
@@ -80,7 +80,7 @@ contains
       call take_pairs(group, "position", s%position)
     end subroutine take_placement
 
-    !> How much the radii differ, and whether masses follow from them.
+    !> Polydispersity, and whether masses follow from radii.
     subroutine take_spread(group, s)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(inout) :: s
@@ -96,7 +96,7 @@ contains
         "has no effect on the radii of a file; give their mean as radius", problems)
     end subroutine take_spread
 
-    !> x1, y1, x2, y2, ... as (2,n).
+    !> Converts a list x1, y1, x2, y2, ... to an array (2,n).
     subroutine take_pairs(group, name, pairs)
       type(group_t), intent(in) :: group
       character(len=*), intent(in) :: name
@@ -135,7 +135,7 @@ contains
       end if
     end subroutine take_count
 
-    !> How the disks move at the start.
+    !> Initial velocities of the disks.
     subroutine take_velocities(group, s)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(inout) :: s
@@ -159,7 +159,7 @@ contains
     subroutine resolve_sizes()
       real(real64), dimension(size(species)) :: mass, radius
       character(len=:), allocatable :: wanted
-      integer :: base(size(species)), k, j, step            ! base: the species that `relative_to` names; 0: none
+      integer :: base(size(species)), k, j, step            ! base: index of the species in `relative_to`; 0: none
       logical :: fits
 
       do k = 1, size(species)
@@ -198,11 +198,11 @@ contains
       species%mean_radius = species%radius
     end subroutine resolve_sizes
 
-    !> The radius as given, or a multiple, or from the packing fraction; 0 if it cannot be known.
+    !> The radius, as given, as a multiple, or from the packing fraction; 0 if it is unknown.
     function own_radius(group, s, number) result(radius)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(in) :: s
-      integer, intent(in) :: number                       !! of the species
+      integer, intent(in) :: number                       !! index of the species
       real(real64) :: radius
       logical :: given, relative
 
@@ -210,7 +210,7 @@ contains
       relative = group%given("relative_to")
       radius = group%real_of("radius", 0.0_real64)
       if (group%given("packing_fraction") .and. (given .or. relative)) then
-        radius = 0                                        ! told already
+        radius = 0                                        ! reported elsewhere
       else if (group%given("packing_fraction")) then
         if (s%count > 0 .and. area(s%region) > 0) &
           radius = sqrt(group%real_of("packing_fraction", 0.0_real64)*area(s%region)/(pi*s%count))
@@ -223,7 +223,7 @@ contains
     end function own_radius
   end subroutine take_species
 
-  !> A name must fit into file paths, override paths and messages, and be unique among its kind.
+  !> Checks the name of an obstacle or species. It must be valid in file paths, override paths and messages, and unique.
   subroutine check_name(groups, k, problems)
     type(group_t), intent(in) :: groups(:)                !! all obstacles, or all species
     integer, intent(in) :: k
@@ -238,14 +238,14 @@ contains
     else if (any(own_names() == name) .or. any(beside_species == name)) then
       call groups(k)%complain("name", shown(name)//" is reserved for the output file", problems)
     end if
-    do j = 1, k - 1                                       ! without a copy of all names for each of them
+    do j = 1, k - 1                                       ! avoids a copy of all names for each of them
       if (groups(j)%instance == name) exit
     end do
     if (j < k) call groups(k)%complain("name", shown(name)//" is already the name of the group in line "// &
       written(groups(j)%line), problems)
   end subroutine check_name
 
-  !> Area of a region; 0 if its ends are the wrong way round.
+  !> Area of a region; 0 if its ends are interchanged.
   pure function area(region)
     real(real64), intent(in) :: region(4)                 !! xlo, xhi, ylo, yhi [length]
     real(real64) :: area

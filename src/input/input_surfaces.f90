@@ -1,4 +1,4 @@
-!> From the groups that describe sides and obstacles to their shapes and laws.
+!> Converts the groups of sides and obstacles to shapes and laws.
 module input_surfaces
   use box_geometry, only: box_t
   use circles, only: new_circle
@@ -20,13 +20,13 @@ module input_surfaces
 
 contains
 
-  !> Puts the obstacles into the box; none if one of them is incomplete.
+  !> Adds the obstacles to the box, unless one of them is incomplete.
   subroutine take_obstacles(groups, box, problems)
-    type(group_t), intent(inout) :: groups(:)             !! all whose name is in `obstacle_groups`
+    type(group_t), intent(inout) :: groups(:)             !! all groups whose name is in `obstacle_groups`
     type(box_t), intent(inout) :: box
     type(problem_list_t), intent(inout) :: problems
     logical :: complete
-    integer :: k, m, v, n(size(groups))                   ! n: obstacles of each group
+    integer :: k, m, v, n(size(groups))                   ! n: number of obstacles in each group
 
     complete = .true.
     do k = 1, size(groups)
@@ -35,7 +35,7 @@ contains
       call take_points(groups(k), problems)
       do v = 1, size(groups(k)%values)
         associate (value => groups(k)%values(v))
-          if (table(value%row)%status /= "example") cycle           ! has a default, or may be left out
+          if (table(value%row)%status /= "example") cycle           ! has a default, or is optional
           if (.not. has_many(groups(k))) call groups(k)%demand(trim(value%name), problems)
           complete = complete .and. value%is_set()
         end associate
@@ -62,7 +62,7 @@ contains
 
     !> The straight walls of a group.
     subroutine take_walls(from, to)
-      real(real64), intent(in) :: from(:), to(:)          !! x, y of each [length]
+      real(real64), intent(in) :: from(:), to(:)          !! x and y of each wall [length]
       integer :: i
 
       do i = 1, size(to)/2
@@ -72,7 +72,7 @@ contains
 
     !> The circles of a group.
     subroutine take_circles(centre, radius, encloses)
-      real(real64), intent(in) :: centre(:)               !! x, y of each [length]
+      real(real64), intent(in) :: centre(:)               !! x and y of each circle [length]
       real(real64), intent(in) :: radius(:)               !! [length]
       logical, intent(in) :: encloses
       integer :: i
@@ -83,7 +83,7 @@ contains
     end subroutine take_circles
   end subroutine take_obstacles
 
-  !> Whether a group has obstacles from a file, or is a polyline.
+  !> Whether a group describes obstacles from a file, or a polyline.
   pure function has_many(group) result(yes)
     type(group_t), intent(in) :: group
     logical :: yes
@@ -91,7 +91,7 @@ contains
     yes = has(group, "file") .or. has(group, "points")
   end function has_many
 
-  !> Whether a variable is given, if there is one of this name in the group.
+  !> Whether the group has a variable of this name and it is given.
   pure function has(group, name) result(yes)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: name
@@ -100,7 +100,7 @@ contains
     yes = any(group%values%name == name .and. group%values%given)
   end function has
 
-  !> Takes the obstacles of a file into the variables that one obstacle has.
+  !> Stores the obstacles of a file in the variables of a single obstacle.
   subroutine take_file(group, problems)
     type(group_t), intent(inout) :: group
     type(problem_list_t), intent(inout) :: problems
@@ -122,7 +122,7 @@ contains
     end if
   end subroutine take_file
 
-  !> Takes a polyline as straight walls from each point to the next.
+  !> Converts a polyline to straight walls between consecutive points.
   subroutine take_points(group, problems)
     type(group_t), intent(inout) :: group
     type(problem_list_t), intent(inout) :: problems
@@ -140,16 +140,16 @@ contains
     end associate
   end subroutine take_points
 
-  !> The laws of all walls: their own where their groups give one, else that of `&contact`.
+  !> The laws of all walls: from their own groups or, by default, from `&contact`.
   subroutine take_wall_laws(sides, obstacles, otherwise, box, problems)
     type(group_t), intent(inout) :: sides(:)
     type(group_t), intent(inout) :: obstacles(:)
-    type(wall_law_t), intent(in) :: otherwise             !! of walls without one of their own
+    type(wall_law_t), intent(in) :: otherwise             !! default law
     type(box_t), intent(inout) :: box
     type(problem_list_t), intent(inout) :: problems
     integer :: k, side, line_of(n_sides)
     integer :: axis
-    real(real64) :: width                                 ! of the box [length]
+    real(real64) :: width                                 ! width of the box [length]
 
     box%surface%law = otherwise
     if (otherwise%rule /= normal_rule) box%surface%law%tangential = tangential_law_t()
@@ -171,7 +171,7 @@ contains
         width = box%upper(axis) - box%lower(axis)
         call take_motion(sides(k), box%surface(side)%motion)
         if (.not. box%surface(side)%motion%moves()) cycle
-        ! Sides must not meet, whenever each is how far inwards.
+        ! The sides must not touch each other, at any combination of their phases.
         if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%innermost_position()) >= width) call sides(k)%complain( &
           culprit(box%surface(side)%motion), "lets the sides meet, which are "// &
           written(width)//" apart (box.upper)", problems)
@@ -183,7 +183,7 @@ contains
 
   contains
 
-    !> The law of one wall. Values that follow from `&contact` are put into its group.
+    !> The law of one wall. Values that follow from `&contact` are stored in its group.
     subroutine take_law(group, law)
       type(group_t), intent(inout) :: group
       type(wall_law_t), intent(out) :: law
@@ -208,7 +208,7 @@ contains
         "has no effect on disks without temperature or tangential_restitution of the same wall", problems)
     end subroutine take_law
 
-    !> The variable that decides how far inwards a side comes.
+    !> The variable that determines how far inwards a side moves.
     pure function culprit(motion) result(name)
       type(side_motion_t), intent(in) :: motion
       character(len=:), allocatable :: name
@@ -218,7 +218,7 @@ contains
       if (motion%kind == constant_velocity .and. motion%prescribed_velocity > 0) name = "end_time"
     end function culprit
 
-    !> How a side moves.
+    !> The motion of a side.
     subroutine take_motion(group, motion)
       type(group_t), intent(in) :: group
       type(side_motion_t), intent(out) :: motion
@@ -232,7 +232,7 @@ contains
       if (group%given("position") .and. .not. group%faulty("position")) motion%offset = merge( &
         group%real_of("position", 0.0_real64) - box%lower(axis), box%upper(axis) - group%real_of("position", 0.0_real64), &
         modulo(side, 2) == 1)
-      if (motion%kind == still .and. abs(motion%offset) > 0) motion%kind = constant_velocity    ! which is 0
+      if (motion%kind == still .and. abs(motion%offset) > 0) motion%kind = constant_velocity    ! with velocity 0
       if (motion%kind == sawtooth .and. group%given("velocity") .and. .not. motion%prescribed_velocity > 0) call group%complain( &
         "velocity", "must be > 0 with motion = 'sawtooth': the side strikes inwards", problems)
       if (motion%kind == constant_velocity) then
@@ -255,7 +255,7 @@ contains
     end subroutine take_motion
   end subroutine take_wall_laws
 
-  !> Reports restitutions that are given and too small for the law of their speed.
+  !> Reports given restitutions that are too small for their dependence on the impact velocity.
   subroutine check_least(group, name, by_speed, problems)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: name
@@ -267,7 +267,7 @@ contains
       problems)
   end subroutine check_least
 
-  !> How rough disks or walls are, by variables whose names have a prefix in &contact.
+  !> Tangential law of disks or walls, from variables whose names have a prefix in &contact.
   subroutine take_grip(group, prefix, otherwise, grip, problems)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: prefix

@@ -1,9 +1,9 @@
-!> The text of an input file: its bytes, lines and tokens. Fortran's own reader silently accepts nonsense, names neither line
-!> nor variable, and can be crashed; so the text is read here and in `namelist_input`, with a small strict grammar:
+!> The text of an input file: its bytes, lines and tokens. Fortran's own namelist reader silently accepts invalid text, names
+!> neither line nor variable, and can crash. The text is therefore read here and in `namelist_input`, with a small strict grammar:
 !>
 !>     &group  name = value, value  name(2) = value  name = 3*value  /     ! comment
 !>
-!> Anything else in the text is a problem with a line number.
+!> All other text is reported with its line number.
 module input_text
   use kinds, only: int64
   use errors, only: error_t, exit_files, exit_usage, fail
@@ -15,17 +15,17 @@ module input_text
   public :: assignment_t, content, cut, plain, token_t, word, unclosed, ending
 
   integer(int64), parameter :: largest_file = 4194304   !! bytes
-  integer, parameter, public :: longest_line = 1024     !! of a file of disks or obstacles
+  integer, parameter, public :: longest_line = 1024     !! longest line in a file of disks or obstacles
   integer, private :: i
   character(len=1), parameter :: control(*) = [(achar(i), i=0, 8), achar(11), achar(12), (achar(i), i=14, 31), achar(127)]
   character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
 
-  !> Kinds of tokens, besides quotes and what is a token by itself, as & and =.
+  !> Kinds of tokens, besides quotes and single characters such as & and =.
   character(len=1), parameter :: word = "w", unclosed = "u", junk = "?", ending = "e"
   character(len=*), parameter :: blanks = " "//achar(9), quotes = "'""", marks = "&/=,()"
   character(len=*), parameter :: word_characters = digits//".+-"//letters//"_*%#:$@?<>|[]{}~^`\"
 
-  !> `first` and `last` are its place in the text, with its quotes.
+  !> A token. `first` and `last` are its position in the text, including quotes.
   type :: token_t
     character(len=1) :: kind
     integer :: first, last, line
@@ -33,16 +33,16 @@ module input_text
   end type token_t
 
   type :: assignment_t
-    integer :: line = 0                          !! > 0: of the file; else no part of it, see `value_t`
+    integer :: line = 0                          !! > 0: line of the file; otherwise not in the file, see `value_t`
     character(len=:), allocatable :: where       !! group.variable, for messages
     integer :: element = 0                       !! the 2 of name(2) = value; 0: none
-    type(token_t), allocatable :: tokens(:)      !! its values
-    logical :: sound = .true.                    !! .false.: problems in it have been reported
+    type(token_t), allocatable :: tokens(:)      !! tokens of its values
+    logical :: sound = .true.                    !! .false.: problems of the assignment have been reported
   end type assignment_t
 
 contains
 
-  !> Finds where the words of a line of a table begin and end; text from a # on is a comment.
+  !> Finds the words in a line of a table. Text from a # on is a comment.
   pure subroutine find_words(line, first, last, n)
     character(len=*), intent(in) :: line
     integer, intent(out) :: first(:), last(:)
@@ -63,7 +63,7 @@ contains
     end do
   end subroutine find_words
 
-  !> The bytes of a regular file.
+  !> Reads the bytes of a regular file.
   subroutine read_text(path, text, error)
     character(len=*), intent(in) :: path
     character(len=:), allocatable, intent(out) :: text
@@ -94,7 +94,7 @@ contains
       " is a control character, code "//written(iachar(text(odd:odd))))
   end subroutine read_text
 
-  !> Names an input file that a path may mean: without its extension, or without the folder `input`.
+  !> Suggests an input file whose extension or folder `input` is missing in the path.
   function advice(path)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: advice
@@ -110,7 +110,7 @@ contains
     if (advice /= "") advice = "; did you mean "//advice//"?"
   end function advice
 
-  !> The text with line feeds as the only line ends, without byte order mark, ending in a line feed.
+  !> The text with line feeds as the only line ends, without byte order mark, and with a line feed at the end.
   pure function unix_lines(text) result(lines)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: lines
@@ -132,7 +132,7 @@ contains
     lines = lines(:n)//eol
   end function unix_lines
 
-  !> All tokens of a text, and several of kind `ending` to look ahead at.
+  !> Splits a text into tokens, followed by several tokens of kind `ending` for look-ahead.
   pure subroutine cut(text, tokens)
     character(len=*), intent(in) :: text         !! every line ends in a line feed
     type(token_t), allocatable, intent(out) :: tokens(:)
@@ -171,7 +171,7 @@ contains
 
   contains
 
-    !> Text in quotes ends in its line; a doubled quote stands for itself.
+    !> Finds the end of a quoted text, which must be in the same line. Doubled quotes represent a single one.
     pure subroutine end_quote(token)
       type(token_t), intent(inout) :: token
 
@@ -188,7 +188,7 @@ contains
     end subroutine end_quote
   end subroutine cut
 
-  !> The value that a token stands for: doubled quotes are single ones.
+  !> The value of a token. Doubled quotes are replaced by single ones.
   pure function content(text, token) result(value)
     character(len=*), intent(in) :: text
     type(token_t), intent(in) :: token
@@ -207,7 +207,7 @@ contains
     value = value(:n)
   end function content
 
-  !> A name as shown in a message: cut and quoted if it is long.
+  !> A name in the form used in messages: cut and quoted if it is long.
   pure function plain(name)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: plain

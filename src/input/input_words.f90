@@ -1,4 +1,4 @@
-!> From the words of the input to checked values: strict numbers, choices, counts and ranges.
+!> Converts words of the input to checked values: numbers, choices, counts and ranges.
 module input_words
   use kinds, only: int64, real64
   use input_problems, only: most_problems, problem_list_t
@@ -17,11 +17,11 @@ module input_words
 
 contains
 
-  !> Stores the values of an assignment in `slot`. A value that is wrong is reported; the slot is then
-  !> faulty and keeps the value that it had.
+  !> Stores the values of an assignment in `slot`. Invalid values are reported; the slot is then marked as faulty and keeps its
+  !> previous value.
   subroutine store_values(slot, text, assignment, problems)
     type(value_t), intent(inout) :: slot
-    character(len=*), intent(in) :: text                 !! that of which tokens are places
+    character(len=*), intent(in) :: text                 !! text to which the tokens refer
     type(assignment_t), intent(in) :: assignment
     type(problem_list_t), intent(inout) :: problems
     type(value_t) :: new
@@ -63,7 +63,7 @@ contains
 
   contains
 
-    !> The number of values must be what the variable takes.
+    !> Checks the number of values.
     subroutine check_number()
       problem = ""
       if (assignment%element > 0) then
@@ -82,7 +82,7 @@ contains
       end if
     end subroutine check_number
 
-    !> Hint for `0,9` in place of one real number.
+    !> A hint if one real number was written with a decimal comma, as in `0,9`.
     function decimal_hint() result(hint)
       character(len=:), allocatable :: hint
 
@@ -97,11 +97,11 @@ contains
       end associate
     end function decimal_hint
 
-    !> Checks one word and stores it after the first n values.
+    !> Checks one word and stores it behind the first n values.
     subroutine store_token(token, word)
       type(token_t), intent(in) :: token
       character(len=*), intent(in) :: word
-      character(len=:), allocatable :: normal        ! the word as it is kept
+      character(len=:), allocatable :: normal        ! the word in its normal form
       integer(int64) :: whole
       real(real64) :: number
       logical :: quoted
@@ -137,7 +137,7 @@ contains
       end if
     end subroutine store_token
 
-    !> Text must be in quotes, or need none, not too long, and one of the choices if there are any.
+    !> Checks a text: it must be in quotes (except in overrides), not too long, and one of the choices, if there are any.
     subroutine check_text(word, quoted)
       character(len=*), intent(in) :: word
       logical, intent(in) :: quoted
@@ -157,7 +157,7 @@ contains
     end subroutine check_text
   end subroutine store_values
 
-  !> Digits with an optional sign.
+  !> Whether a word consists of digits with an optional sign.
   pure function is_whole(word)
     character(len=*), intent(in) :: word
     logical :: is_whole
@@ -168,7 +168,7 @@ contains
     is_whole = first <= len(word) .and. verify(word(first:), digits) == 0
   end function is_whole
 
-  !> An integer within 64 bits.
+  !> Reads an integer of at most 64 bits.
   pure subroutine read_integer(word, value, problem)
     character(len=*), intent(in) :: word
     integer(int64), intent(out) :: value
@@ -185,14 +185,14 @@ contains
     if (status == 0) problem = ""
   end subroutine read_integer
 
-  !> A decimal number, as in Fortran with an optional exponent e or d; zero or between 1e-100 and 1e100 in
-  !> size, so that neither overflow nor denormal numbers can arise.
+  !> Reads a decimal number with an optional exponent e or d, as in Fortran. It must be zero or have a size between 1e-100 and
+  !> 1e100, so that neither overflow nor denormal numbers can occur.
   pure subroutine read_real(word, value, problem)
     character(len=*), intent(in) :: word
     real(real64), intent(out) :: value
     character(len=:), allocatable, intent(out) :: problem
     integer, parameter :: longest = 60
-    character(len=longest) :: mantissa                 ! without its point
+    character(len=longest) :: mantissa                 ! without the decimal point
     integer :: mark, exponent, status
 
     value = 0
@@ -211,7 +211,7 @@ contains
     end if
     problem = ""
     if (scan(word(:mark - 1), "123456789") == 0) return
-    if (abs(exponent) <= 200) then                 ! neither overflows nor underflows, so short a word
+    if (abs(exponent) <= 200) then                 ! so short a word neither overflows nor underflows
       read (word, "(f60.0)", iostat=status) value
       if (status == 0 .and. abs(value) >= smallest .and. abs(value) <= largest) return
     end if

@@ -1,4 +1,4 @@
-!> Reads input text and the `--set` overrides: tokens to assignments to values. Every problem is collected.
+!> Reads the input text and the `--set` overrides: tokens, assignments, values. All problems are collected.
 module namelist_input
   use input_groups, only: group_t, value_t
   use input_problems, only: most_problems, problem_list_t
@@ -12,28 +12,29 @@ module namelist_input
   private
   public :: read_groups
 
-  integer, parameter :: most_instances = 5000, most_repeats = 10000000   !! of a repeated group; of the value in 3*value
+  integer, parameter :: most_instances = 5000, most_repeats = 10000000  !! largest number of groups of one name; largest n in
+                                                                        !! n*value
 
 contains
 
-  !> Reads the text and applies the overrides: every value as given, or its default.
+  !> Reads the text and applies the overrides. Each variable has the given value or its default.
   subroutine read_groups(text, overrides, groups, problems, complete)
     character(len=*), intent(in) :: text
     type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
-    type(group_t), allocatable, intent(out) :: groups(:)            !! in the order of the table, those of one name side by side
+    type(group_t), allocatable, intent(out) :: groups(:)  !! in the order of the table; groups of the same name are adjacent
     type(problem_list_t), intent(out) :: problems
     logical, intent(out) :: complete                                !! .false.: parts of the text were skipped
     type(value_t) :: defaults(size(table))
-    type(group_t), allocatable :: found(:)                          ! in the order of the text
-    integer :: n, i, j, k                                           ! n: groups found
-    character(len=:), allocatable :: source                         ! what is being read: a default, the text, an override
-    type(token_t), allocatable :: token(:)                          ! of the source
-    integer :: at                                                   ! the next of them
+    type(group_t), allocatable :: found(:)                          ! groups in the order of the text
+    integer :: n, i, j, k                                           ! n: number of groups found
+    character(len=:), allocatable :: source                         ! text that is being read: a default, the input, or an override
+    type(token_t), allocatable :: token(:)                          ! tokens of the source
+    integer :: at                                                   ! index of the next token
     character(len=:), allocatable :: own                            ! name of the open group, for messages
-    integer :: group                                                ! to which assignments belong; 0: its name is unknown
-    integer :: opened                                               ! line of the open group; 0: none is open
-    logical :: too_many                                             ! groups of one name
-    logical :: quote_open                                           ! in this group: its / may be part of a text
+    integer :: group  ! index of the group to which assignments belong; 0: its name is unknown
+    integer :: opened                                               ! first line of the open group; 0: none is open
+    logical :: too_many                                             ! too many groups of one name
+    logical :: quote_open  ! a quote is not closed in this group; its / may be part of a text
 
     complete = .true.
     too_many = .false.
@@ -68,7 +69,7 @@ contains
 
   contains
 
-    !> Begins to read another source.
+    !> Begins to read another text.
     subroutine open_source(text)
       character(len=*), intent(in) :: text
 
@@ -89,7 +90,7 @@ contains
     !> Adds a group with the defaults of the table.
     subroutine add_group(name, line, number)
       character(len=*), intent(in) :: name
-      integer, intent(in) :: line, number                 !! number: among those of its name
+      integer, intent(in) :: line, number                 !! number: index among the groups of this name
       integer, allocatable :: rows(:)
       integer :: v
 
@@ -106,12 +107,12 @@ contains
       end associate
     end subroutine add_group
 
-    !> Stores a value that is not from the file: a default, or that of an override, where text needs no quotes.
+    !> Stores a value that is not from the file: a default or an override, in which texts need no quotes.
     subroutine assign_text(slot, text, line, element)
       type(value_t), intent(inout) :: slot
       character(len=*), intent(in) :: text
-      integer, intent(in) :: line                         !! -k: override k; 0: a default
-      integer, intent(in) :: element                      !! number of the value; 0: all values of the variable
+      integer, intent(in) :: line                         !! -k for override k; 0 for a default
+      integer, intent(in) :: element                      !! index of the value; 0: all values of the variable
       type(assignment_t) :: assignment
 
       call open_source(text//eol)
@@ -127,7 +128,7 @@ contains
       call store_values(slot, source, assignment, problems)
     end subroutine assign_text
 
-    !> Reads the whole text.
+    !> Reads the whole input text.
     subroutine read_text()
       opened = 0
       do while (problems%count < most_problems)
@@ -145,7 +146,7 @@ contains
           if (follow("&"//word) .and. lower_case(content(source, token(at + 1))) == "end") then
             call problems%add(token(at)%line, own, "a group ends with /, not with &end")
             at = at + 2
-          else if (.not. quote_open) then                 ! else it may have swallowed the end
+          else if (.not. quote_open) then                 ! otherwise the quote may contain the end
             call problems%add(opened, own, "the closing / is missing")
           end if
           opened = 0
@@ -158,7 +159,7 @@ contains
       end do
     end subroutine read_text
 
-    !> Outside groups only `&name` is allowed; anything else is skipped up to a line that begins with &.
+    !> Reads the text between groups. Only `&name` is allowed; other text is skipped up to a line that begins with &.
     subroutine between_groups()
       character(len=:), allocatable :: problem
 
@@ -178,7 +179,7 @@ contains
       end do
     end subroutine between_groups
 
-    !> Skips the rest of the line, of which nothing is understood.
+    !> Skips the rest of a line that cannot be interpreted.
     subroutine skip_line()
       integer :: line
 
@@ -189,7 +190,7 @@ contains
       end do
     end subroutine skip_line
 
-    !> From the next token to the end of its line.
+    !> The text from the next token to the end of its line.
     function rest_of_line() result(text)
       character(len=:), allocatable :: text
 
@@ -240,7 +241,7 @@ contains
       end if
     end subroutine read_element
 
-    !> Reports what is wrong with an assignment.
+    !> Reports a problem of an assignment.
     subroutine complain(assignment, what)
       type(assignment_t), intent(inout) :: assignment
       character(len=*), intent(in) :: what
@@ -297,7 +298,7 @@ contains
         if (own%first <= own%last) return
         if (scan(next%kind, "'"""//unclosed) > 0 .and. next%first == own%first) then
           next%repeats = own%repeats
-          own%kind = ","                                  ! the count is taken
+          own%kind = ","                                  ! the count has been used
         else
           call complain(assignment, "a value is missing after the *")
         end if
@@ -328,7 +329,7 @@ contains
       else
         if (.not. too_many) call problems%add(opened, name, "more than "//written(most_instances)//" groups of this name" &
           //trim(merge("; a file may hold many obstacles (file)", repeat(" ", 39), any(obstacle_groups == name))))
-        too_many = .true.                                 ! said once
+        too_many = .true.                                 ! reported once
         group = 0
       end if
       if (group > 0) found(group)%first = token(at)%first
@@ -358,7 +359,7 @@ contains
       end associate
     end subroutine take_assignment
 
-    !> The variable may be misspelt, have another name now, or belong to another group.
+    !> Reports an unknown variable, which may be misspelt, renamed, or in another group.
     subroutine report_unknown(group, name, line)
       character(len=*), intent(in) :: group, name
       integer, intent(in) :: line
@@ -374,7 +375,7 @@ contains
       call problems%add(line, trim(group)//"."//plain(name), "unknown variable; "//advice)
     end subroutine report_unknown
 
-    !> Gives a name to an obstacle or species that has none.
+    !> Sets the name of an obstacle or species that has none.
     subroutine name_instance(group)
       type(group_t), intent(inout) :: group
 
@@ -383,8 +384,8 @@ contains
       group%instance = group%text_of("name")
     end subroutine name_instance
 
-    !> Applies one `GROUP.VARIABLE=VALUE` or `GROUP.NAME.VARIABLE=VALUE`; VARIABLE may be an element, as in `gravity(2)`.
-    !> Without a value the variable gets its default back.
+    !> Applies an override `GROUP.VARIABLE=VALUE` or `GROUP.NAME.VARIABLE=VALUE`. VARIABLE may be an element, as in `gravity(2)`. An
+    !> empty VALUE restores the default.
     subroutine override(text, line)
       character(len=*), intent(in) :: text
       integer, intent(in) :: line                         !! -k for override k
@@ -424,10 +425,10 @@ contains
       end if
     end subroutine override
 
-    !> Separates the number of an element from the name of a variable. Brackets without a number stay part of the name.
+    !> Separates the index of an element from the name of a variable. Brackets without a number stay in the name.
     subroutine split_element(name, element)
       character(len=:), allocatable, intent(inout) :: name
-      integer, intent(out) :: element                     !! 0: no element is named
+      integer, intent(out) :: element                     !! 0: no element
       integer :: bracket
 
       element = 0
@@ -440,10 +441,10 @@ contains
       if (element > 0) name = name(:bracket - 1)
     end subroutine split_element
 
-    !> A cadence set by an override takes the place of that which the file has for the same samples.
+    !> A sampling interval in an override replaces that of the file for the same samples.
     subroutine replace_cadence(group, name)
       type(group_t), intent(inout) :: group
-      character(len=*), intent(in) :: name                !! of the variable that is set
+      character(len=*), intent(in) :: name                !! name of the variable that is set
       integer :: v
 
       if (track_of(name) == "") return
@@ -455,7 +456,7 @@ contains
       end do
     end subroutine replace_cadence
 
-    !> Finds the group that an override means; 0, and a problem, if there is none. Of a side one is made: each box has them.
+    !> Finds the group to which an override refers; 0, with a report, if there is none. A missing group of a side is created.
     subroutine find_group(group, instance, line, g)
       character(len=*), intent(in) :: group, instance
       integer, intent(in) :: line

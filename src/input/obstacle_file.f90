@@ -1,6 +1,6 @@
-!> Many obstacles of one group from a text file: a line of names, then a line for each, `x y radius` of a circle or
-!> `x1 y1 x2 y2` of a straight wall. Empty lines, and text from a # to the end of its line, are comments. Or from an HDF5 file
-!> with the datasets `centre` and `radius`, or `from` and `to`.
+!> Reads obstacles from a text file: a line of column names, then one line per obstacle, `x y radius` for circles or `x1 y1 x2 y2`
+!> for straight walls. Empty lines, and text from a # to the end of its line, are ignored. Alternatively reads an HDF5 file with the
+!> datasets `centre` and `radius`, or `from` and `to`.
 module obstacle_file
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds, only: int64, real64
@@ -29,7 +29,7 @@ contains
     yes = index(path//"|", ".h5|") > 0
   end function is_hdf5
 
-  !> Reads the obstacles, or says where in the file something is wrong.
+  !> Reads the obstacles, or reports the place of a problem in the file.
   subroutine read_obstacles(path, walls, rows, error)
     character(len=*), intent(in) :: path
     logical, intent(in) :: walls                           !! straight walls, not circles
@@ -44,7 +44,7 @@ contains
     if (size(rows, 2) == 0 .and. .not. allocated(error)) call fail(error, exit_usage, path//": contains no obstacles")
   end subroutine read_obstacles
 
-  !> Reads them from an HDF5 file, whose numbers nobody has checked.
+  !> Reads the obstacles from an HDF5 file and checks the numbers.
   subroutine read_hdf5(path, walls, rows, error)
     character(len=*), intent(in) :: path
     logical, intent(in) :: walls
@@ -58,7 +58,7 @@ contains
     if (allocated(error)) return
     do k = 1, size(rows, 2)
       do c = 1, size(rows, 1)
-        wrong = .not. ieee_is_finite(rows(c, k))           ! comparing a NaN is trapped by debug builds
+        wrong = .not. ieee_is_finite(rows(c, k))           ! comparisons with NaN are trapped in debug builds
         if (.not. wrong) wrong = abs(rows(c, k)) > largest .or. (c == 3 .and. .not. walls .and. rows(c, k) < smallest)
         if (.not. wrong) cycle
         call fail(error, exit_usage, path//": row "//written(k)//": "//written(rows(c, k))//" is out of range")
@@ -67,7 +67,7 @@ contains
     end do
   end subroutine read_hdf5
 
-  !> Reads them from a text.
+  !> Reads the obstacles from a text file.
   subroutine read_text(path, walls, rows, error)
     character(len=*), intent(in) :: path
     logical, intent(in) :: walls                           !! straight walls, not circles
@@ -75,8 +75,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: text, line, problem
     character(len=6), allocatable :: names(:)
-    integer, allocatable :: column(:)                      ! of the file, as places in `names`; none: not known yet
-    integer :: first(longest_line), last(longest_line)     ! of each word of the line
+    integer, allocatable :: column(:)  ! index in `names` of each column of the file; empty while they are unknown
+    integer :: first(longest_line), last(longest_line)     ! position of each word in the line
     integer(int64) :: past
     integer :: number, n, n_words
 
@@ -110,7 +110,7 @@ contains
 
   contains
 
-    !> The first line names the columns, in any order.
+    !> Reads the first line, which names the columns in any order.
     subroutine read_names()
       integer :: k
 
@@ -123,7 +123,7 @@ contains
       end do
     end subroutine read_names
 
-    !> The next lines are obstacles.
+    !> Reads a line with one obstacle.
     subroutine read_row()
       real(real64) :: value(size(names))
       integer :: k
@@ -148,7 +148,7 @@ contains
     end subroutine read_row
   end subroutine read_text
 
-  !> Where the n-th obstacle of a file stands, for messages.
+  !> The place of the n-th obstacle in its file, for messages.
   function origin_of_row(path, n) result(place)
     character(len=*), intent(in) :: path
     integer, intent(in) :: n
@@ -162,7 +162,7 @@ contains
     if (is_hdf5(path)) return
     call read_file(path, text, problem)
     number = 0
-    rows = -1                                              ! the line of names comes before them
+    rows = -1                                              ! the line of names precedes the obstacles
     past = 1
     do while (past <= len(text, int64) .and. rows < n)
       call next_line(text, past, line)
@@ -173,16 +173,16 @@ contains
     place = path//":"//written(number)
   end function origin_of_row
 
-  !> The next line of a text.
+  !> Reads the next line of a text.
   subroutine next_line(text, past, line)
     character(len=*), intent(in) :: text
-    integer(int64), intent(inout) :: past                  !! where it begins; then where the one after it does
+    integer(int64), intent(inout) :: past                  !! in: beginning of the line; out: beginning of the line after it
     character(len=:), allocatable, intent(out) :: line
     integer(int64) :: begin
 
     begin = past
     past = begin + index(text(begin:), eol, kind=int64)
-    if (past == begin) past = len(text, int64) + 2         ! the last line needs no end
+    if (past == begin) past = len(text, int64) + 2         ! the last line may lack a line end
     line = text(begin:past - 2)
     if (begin == 1 .and. index(line, byte_order_mark) == 1) line = line(len(byte_order_mark) + 1:)
   end subroutine next_line

@@ -1,4 +1,4 @@
-!> Names of earlier versions, and the names that took their places. An input that uses an old name is answered with the new one.
+!> Names of variables and choices in earlier versions, and their present names, which are reported if an input uses an old one.
 module old_names
   use variables, only: name_length
   implicit none
@@ -7,8 +7,8 @@ module old_names
 
   type :: old_name_t
     character(len=8) :: group
-    character(len=name_length) :: name        !! of the variable; of a choice, the variable's present name
-    character(len=20) :: choice               !! word of a text variable; blank: the variable itself has another name
+    character(len=name_length) :: name        !! name of the variable; for a choice, the present name of its variable
+    character(len=20) :: choice               !! choice of a text variable; blank if the variable itself was renamed
     character(len=name_length) :: now
   end type old_name_t
 
@@ -31,10 +31,10 @@ module old_names
 
 contains
 
-  !> The present name of a variable, or of one of its choices, that is known by an old one; else empty.
+  !> The present name of a variable or choice that was renamed; empty if it was not.
   pure function new_name(group, name, choice) result(now)
     character(len=*), intent(in) :: group, name
-    character(len=*), intent(in) :: choice     !! blank: of the variable
+    character(len=*), intent(in) :: choice     !! blank: the variable
     character(len=:), allocatable :: now
     integer :: k
 
@@ -44,8 +44,7 @@ contains
     end do
   end function new_name
 
-  !> The variables or the choices that have taken the place of an old one; empty if there is none. A variable is known with or
-  !> without its group.
+  !> The variables or choices that replace an old one; empty if there are none. Variables are found with or without their group.
   pure function present_names(name, of_choices) result(names)
     character(len=*), intent(in) :: name
     logical, intent(in) :: of_choices

@@ -1,5 +1,5 @@
-!> Texts about the input variables: the reference file, the answers to `--explain`, and JSON for other programs (the
-!> table of variables, and an input as the program has understood it).
+!> Texts about the input variables: the reference file, the answers to `--explain`, and JSON for other programs (the table of
+!> variables, and an input as the program interprets it).
 module variable_help
   use choices, only: meaning_of
   use errors, only: error_t, exit_usage, fail
@@ -12,12 +12,12 @@ module variable_help
   private
   public :: defaults_text, explain, groups_text, input_of, variables_text
 
-  integer, parameter :: comment_column = 40                !! of the reference file
-  integer, parameter :: help_width = 100                   !! of a line of help
+  integer, parameter :: comment_column = 40                !! column of the comments in the reference file
+  integer, parameter :: help_width = 100                   !! width of a line of help
 
 contains
 
-  !> The reference input file: every variable with its default. It is a valid input itself.
+  !> The reference input file, which contains every variable with its default. It is a valid input.
   pure function defaults_text() result(text)
     character(len=:), allocatable :: text
     integer :: g, k
@@ -35,7 +35,7 @@ contains
     end do
   end function defaults_text
 
-  !> The groups of walls are comments.
+  !> Margin of a group in the reference file, in which groups of boundaries are comments.
   pure function margin(group)
     character(len=*), intent(in) :: group
     character(len=:), allocatable :: margin
@@ -61,7 +61,7 @@ contains
     if (row%choices /= "") line = line//eol//next//allowed(row)
   end function reference_line
 
-  !> A text with blanks up to the comments, if it is not longer.
+  !> A text padded with blanks up to the column of comments.
   pure function padded(text)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: padded
@@ -69,7 +69,7 @@ contains
     padded = text//repeat(" ", max(comment_column - len(text), 0))
   end function padded
 
-  !> Answers `--explain`: a variable with or without its group, a whole group, or a word that names, choices and helps contain.
+  !> Answers `--explain` for a variable with or without its group, for a group, or for a word in names, choices or helps.
   pure subroutine explain(name, text, error)
     character(len=*), intent(in) :: name
     character(len=:), allocatable, intent(out) :: text
@@ -79,7 +79,7 @@ contains
     integer :: k
 
     wanted = bare(lower_case(trim(name)))
-    full = [character(len=len(full)) :: (trim(table(k)%group)//"."//table(k)%name, k=1, size(table))]
+    full = [character(len=len(full)) ::(trim(table(k)%group)//"."//table(k)%name, k=1, size(table))]
     text = explanations(pack([(k, k=1, size(table))], table%group == wanted))// &
       explanations(pack([(k, k=1, size(table))], table%name == wanted .or. full == wanted))
     if (text /= "") then
@@ -100,7 +100,7 @@ contains
 
   !> The explanations of some variables.
   pure function explanations(rows) result(text)
-    integer, intent(in) :: rows(:)                         !! of the table
+    integer, intent(in) :: rows(:)                         !! rows of the table
     character(len=:), allocatable :: text
     integer :: k
 
@@ -142,7 +142,7 @@ contains
     text = text(len(eol) + 1:)
   contains
 
-    !> Whether a text contains what is wanted; `packing_fraction` and `packing fraction` are the same.
+    !> Whether a text contains the wanted text; `packing_fraction` and `packing fraction` are equivalent.
     pure function has(where) result(yes)
       character(len=*), intent(in) :: where
       logical :: yes
@@ -163,7 +163,7 @@ contains
     end function spaced
   end function matches
 
-  !> All that the table knows about a variable, one fact a line.
+  !> All data of the table about a variable, one per line.
   pure function explanation(k) result(text)
     integer, intent(in) :: k                               !! row of the table
     character(len=:), allocatable :: text
@@ -186,7 +186,7 @@ contains
     end associate
   end function explanation
 
-  !> The default of a variable, or what applies without it.
+  !> The default of a variable, or a description of the case without a value.
   pure function default_of(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
@@ -201,7 +201,7 @@ contains
     end if
   end function default_of
 
-  !> The choice with which a variable has an effect; empty if it always has. In &species the choice may follow from the variable.
+  !> The choice for which a variable has an effect; empty if it always has one. In &species the variable can imply the choice.
   pure function condition_of(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
@@ -214,7 +214,7 @@ contains
     end associate
   end function condition_of
 
-  !> When a variable may have another value than at the start of a run.
+  !> When a variable may be changed after the start of a run.
   pure function change_text(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
@@ -224,7 +224,7 @@ contains
     if (row%may_change == in_motion) text = "may change in a running simulation (Python, laboratory page); fixed on --resume"
   end function change_text
 
-  !> The table: an object for each group, and in it one for each variable.
+  !> The table of variables as JSON: an object for each group with an object for each variable.
   pure function variables_text() result(text)
     character(len=:), allocatable :: text, between
     integer :: g, k
@@ -244,7 +244,7 @@ contains
     text = text//eol//"}"
   end function variables_text
 
-  !> A row of the table. Of a number `above` and `below` are excluded, `from` and `to` allowed.
+  !> A row of the table as JSON. For numbers, the bounds `above` and `below` are exclusive, `from` and `to` inclusive.
   pure function row_text(k) result(text)
     integer, intent(in) :: k                               !! row of the table
     character(len=:), allocatable :: text, value, meanings
@@ -289,8 +289,8 @@ contains
       member("changeable", .true., trim(merge("true ", "false", row%may_change == in_motion)))
   end function row_text
 
-  !> The groups of an input in the order of the file, each with what is given in it. `from` and `to` are its place in the
-  !> bytes of the file, counted from 0, without byte order mark and with line feeds as line ends; null: not in the file.
+  !> The groups of an input in the order of the file, each with its given variables. `from` and `to` are its position in bytes of
+  !> the file, counted from 0, without byte order mark and with line feeds as line ends; null: not in the file.
   pure function groups_text(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -320,7 +320,7 @@ contains
     text = "["//growing%text()//eol//"]"
   end function groups_text
 
-  !> An input file that says the same. Sizes of species are as used, and so relative to nothing.
+  !> An input file with the same content. Sizes of species have their resolved values, without `relative_to`.
   pure function input_of(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -356,7 +356,7 @@ contains
     text = growing%text()
   contains
 
-    !> A value that is no real number: texts in quotes.
+    !> A value that is not a real number, with texts in quotes.
     pure function word(kind, value)
       character(len=*), intent(in) :: kind, value
       character(len=:), allocatable :: word
@@ -373,7 +373,7 @@ contains
     end function word
   end function input_of
 
-  !> `, "name": value`, with null instead of a value that is not there.
+  !> `, "name": value` as JSON, with null if there is no value.
   pure function member(name, is_there, value) result(text)
     character(len=*), intent(in) :: name, value
     logical, intent(in) :: is_there
@@ -383,7 +383,7 @@ contains
     if (is_there) text = text(:len(text) - 4)//value
   end function member
 
-  !> A list of words.
+  !> A list of words as JSON.
   pure function list(words) result(text)
     character(len=*), intent(in) :: words(:)
     character(len=:), allocatable :: text
