@@ -4,12 +4,12 @@
     python post/driven.py runs/demon/*.h5 --show share -o demon.png
     python post/driven.py runs/constant_pressure/*.h5 --show width -o width.png
 
---show temperature: kT of all N disks, m <(v - u)^2> / 2 times N / (N - 1).  The dashed line is for
-equal disks with white-noise driving in a periodic box, where driving and dissipation balance (van
-Noije and Ernst 1998); or for equal elastic disks in a box with one side that moves at a constant
-velocity: the adiabat of the equation of state with the layers at the walls (`hard_disks.adiabat`),
-which slow strokes follow.  That needs several runs, because a single one has no error once the side
-is at rest.
+--show temperature: kT, in the table also its parts kT_x and kT_y, and that of each species; of all
+N disks, m <(v - u)^2> / 2 times N / (N - 1).  The dashed line is for equal disks with white-noise
+driving in a periodic box, where driving and dissipation balance (van Noije and Ernst 1998); or for
+equal elastic disks in a box with one side that moves at a constant velocity: the adiabat of the
+equation of state with the layers at the walls (`hard_disks.adiabat`), which slow strokes follow.
+That needs several runs, because a single one has no error once the side is at rest.
 --show width: of the box with a piston (motion = 'piston').  The dashed lines are for equal elastic
 disks: mean, and mean plus and minus a standard deviation, by the equation of state at constant
 enthalpy (docs/theory.md).  Also printed are the deviation, and the largest relative changes of the
@@ -56,7 +56,20 @@ def temperature(run: Run) -> Curves:
     if run.n_disks < 2:
         raise Refused(f"{run.path}: holds one disk; a temperature is about the motion of all")
     time, value = run.observable("all/temperature")
-    return {"": (time, value * run.n_disks / (run.n_disks - 1))}
+    curves = {"": (time, value * run.n_disks / (run.n_disks - 1))}
+    for kind in run.by_species if len(run.names) > 1 else ():
+        if (count := int(kind.disks.sum())) > 1:
+            time, value = run.observable(f"{kind.name}/temperature")
+            curves[kind.name] = time, value * count / (count - 1)
+    return curves
+
+
+def components(run: Run) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Return kT_x and kT_y of all disks about their mean motion, at the observables."""
+    time, tensor = run.observable("kinetic_tensor")
+    motion = 0 if run.shear_rate else run.observable("momentum").value ** 2 / run.mass.sum()
+    kt = (tensor[:, [0, 3]] - motion) / (run.n_disks - 1)
+    return {f"kT_{axis}": (time, kt[:, k]) for k, axis in enumerate("xy")}
 
 
 def keeps_energy(run: Run) -> bool:
@@ -267,7 +280,7 @@ def draw_curves(
             means = windows(time, value, (time[-1] - time[0]) / (FINE if fine else POINTS))
             style = {"label": label * (k == 0)} | drawing.lone(means[0])
             axes.plot(*means, color=colour, lw=1, alpha=0.4 if fine else 1, **style)
-        for level in laws[key[0]]:
+        for level in () if key[1] else laws[key[0]]:
             over = curves[0][0] if np.ndim(level) else np.array([0, curves[0][0][-1]])
             axes.plot(over, np.broadcast_to(level, over.shape), color=colour, ls="--", lw=1.6)
     if any(laws.values()):
@@ -328,14 +341,24 @@ def main() -> None:
         about = ", ".join(filter(None, (args.show, name, species)))
         row = {"input": name or None, "species": species or None, "runs": len(curves)}
         members = [correlated_mean(half) for half in late]
-        if args.show == "temperature":  # what fluctuates in one run does not tell how seeds differ
+        if (
+            args.show == "temperature" and not species
+        ):  # what fluctuates in one run does not tell how seeds differ
             own = zip(members, groups[name], strict=True)
             members = [m._replace(error=np.nan) if keeps_energy(run) else m for m, run in own]
         row |= over_runs("late", members, notes, about)
         notes += [f"{about}: grows or falls all the time, 'late' is not what lasts"] * any(
             map(has_trend, late)
         )
-        law, mean, error = expected[name], row["late"], row["late_error"]
+        law = None if species else expected[name]
+        mean, error = row["late"], row["late_error"]
+        known = all("kinetic_tensor" in run.observables for run in groups[name])
+        if args.show == "temperature" and not species and known:
+            parts = [components(run) for run in groups[name]]
+            for part in parts[0]:
+                both = [one[part] for one in parts]
+                halves = [value[time >= (time[0] + time[-1]) / 2] for time, value in both]
+                row |= measured(part, combine_runs(list(map(correlated_mean, halves))))
         if isinstance(law, Room):
             squares = combine_runs([correlated_mean((half - mean) ** 2) for half in late])
             found = Estimate(squares.mean**0.5, squares.error / 2 / squares.mean**0.5)

@@ -4,13 +4,14 @@
     python post/fields.py runs/hopper.h5 --grid 16,24 -o hopper.png
 
 Per cell, of the disks with their centres in it: number density n over the area that centres can
-reach, flow u (mean of v by mass), kT (mean of m c^2 / 2, c = v - u), kT_rot (mean of I omega^2) of
-disks that can turn, the stress that disks carry (sum of m c_a c_b over the area) and the heat that
-they carry (sum of m c^2 c / 2); what collisions hand on over the distance of two centres comes on
-top of both.  u changes within a cell as it does from cell to cell.  Frames count after
---equilibration, or in the second half of a run.  Errors are over blocks of time of all runs of one
-input (docs/theory.md); cells in which fewer than two of them saw a disk have a density alone, and
-three disks must be left without any block for kT, stress and heat.
+reach, flow u (mean of v by mass), kT (mean of m c^2 / 2, c = v - u), kT_x and kT_y (means of m
+c_x^2 and m c_y^2), kT_rot (mean of I omega^2) of disks that can turn, the stress that disks carry
+(sum of m c_a c_b over the area) and the heat that they carry (sum of m c^2 c / 2); what collisions
+hand on over the distance of two centres comes on top of both.  u changes within a cell as it does
+from cell to cell.  Frames count after --equilibration, or in the second half of a run.  Errors are
+over blocks of time of all runs of one input (docs/theory.md); cells in which fewer than two of them
+saw a disk have a density alone, and three disks must be left without any block for kT, stress and
+heat.  --species measures the disks of one species alone, about their own flow.
 
 --grid also draws the stream function psi of the flux j = n u, j_x = d psi / dy and j_y = -d psi /
 dx: its lines are the paths of the mean flow.  The longest arrow is the largest significant flow;
@@ -209,6 +210,7 @@ def main() -> None:
     whole = {"type": cells_of, "metavar": "N", "default": (20,), "help": "of the profile [20]"}
     shape.add_argument("--cells", **whole)
     shape.add_argument("--grid", type=cells_of, metavar="NX,NY", help="a map, no profile")
+    parser.add_argument("--species", metavar="NAME", help="measure this species alone")
     args = parser.parse_args()
     runs, axis, tables = args.runs, "xy".index(args.across), []
     cells = args.grid or (*args.cells, 1)[:: 1 if axis == 0 else -1]
@@ -217,7 +219,7 @@ def main() -> None:
     cooling = [run.path.name for run in runs if run.nature.cooling]
     notes = motion_notes(runs)
     notes += [f"{name} loses energy and gets none: means of what is not steady" for name in cooling]
-    own = fields(runs, args.equilibration, cells)
+    own = fields(runs, args.equilibration, cells, args.species)
     found = own.found
     middles = places(runs[0], cells)
     data = {"x": middles[:, 0], "y": middles[:, 1]} | spread({"": found})

@@ -19,7 +19,7 @@ from ..reading.files import RunError
 from ..reading.reader import SIDES, Run
 from .statistics import Estimate, statistical_inefficiency, student
 from .structure import periods
-from .thermodynamics import after_start, free_disks, refuse_others, unforced
+from .thermodynamics import after_start, comoving, free_disks, refuse_others, unforced
 
 __all__ = [
     "Fields",
@@ -253,39 +253,39 @@ def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
 # --- fields ---
 
 
-def sums(block: Block, cells: Cells, areas: list[np.ndarray]) -> np.ndarray:
-    """Return sums (12, C) over the disks of some frames in each cell.
+def sums(block: Block, cells: Cells, areas: list[np.ndarray], own: np.ndarray) -> np.ndarray:
+    """Return sums (12, C) over those disks, a mask (N,), of some frames in each cell.
 
     They are the numbers of frames and of disks, disks per area, and the sums of m, m v, m v v (xx,
     xy, yy), m v^2 v / 2 and I omega^2.  In a sheared box v is relative to the profile; where noise
     moves the centre of mass, v is relative to that.
     """
     run, frames, _ = block
-    place = run.position[frames].reshape(-1, 2) - run.lower
+    place = run.position[frames][:, own].reshape(-1, 2) - run.lower
     cell = np.clip((place / run.edges * cells).astype(int), 0, np.array(cells) - 1) @ (1, cells[0])
-    mass, count = np.tile(run.mass, len(frames)), int(np.prod(cells))
-    x, y = own_motion(run, frames).reshape(-1, 2).T
+    mass, count = np.tile(run.mass[own], len(frames)), int(np.prod(cells))
+    x, y = own_motion(run, frames)[:, own].reshape(-1, 2).T
     square = mass * (x**2 + y**2) / 2
-    area = np.array(areas)[np.tile(run.species - 1, len(frames)), cell]
+    area = np.array(areas)[np.tile(run.species[own] - 1, len(frames)), cell]
     dense = 1 / np.where(area > 0, area, run.edges.prod() / np.prod(cells))  # beyond a moving side
     carried = [mass * x, mass * y, mass * x * x, mass * x * y, mass * y * y, square * x, square * y]
     turning = 0 * mass
     if "angular_velocity" in run.disk_data:
-        turning = (run.inertia * run.angular_velocity[frames] ** 2).ravel()
+        turning = (run.inertia * run.angular_velocity[frames] ** 2)[:, own].ravel()
     each = [None, dense, mass, *carried, turning]
     rows = [np.bincount(cell, values, minlength=count) for values in each]
     return np.stack([np.full(count, float(len(frames))), *rows])
 
 
 NAMES = (
-    *("density", "flow_x", "flow_y", "temperature", "rotational_temperature"),
+    *("density", "flow_x", "flow_y", "temperature", "kT_x", "kT_y", "rotational_temperature"),
     *("stress_xx", "stress_xy", "stress_yy", "heat_x", "heat_y"),
 )
 BY_FRAMES = np.array([name.startswith(("density", "stress", "heat")) for name in NAMES])
 
 
 def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
-    """Return the fields (10, C) that follow from `sums`; NaN where there are no disks.
+    """Return the fields (12, C) that follow from `sums`; NaN where there are no disks.
 
     Cells with fewer than `FEWEST_DISKS` have no kT, stress or heat flux.  A flow that changes by g
     h across a cell contributes m (g h)^2 / 12 to m v v, which is subtracted.
@@ -306,10 +306,10 @@ def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
         stress = [
             s - mass * one / 12 for s, one in zip(stress, (du * du, du * dv, dv * dv), strict=True)
         ]
-    kt = (stress[0] + stress[2]) / 2 / n
+    kt_x, kt_y = stress[0] / n, stress[2] / n
     u = u + run.shear_rate * (places(run, cells)[:, 1] - run.lower[1] - run.edges[1] / 2)
     carried = [density * one / n for one in (*stress, heat_x, heat_y)]
-    return np.stack([density, u, v, kt, turning / n, *carried])
+    return np.stack([density, u, v, (kt_x + kt_y) / 2, kt_x, kt_y, turning / n, *carried])
 
 
 class Fields(NamedTuple):
@@ -322,7 +322,7 @@ class Fields(NamedTuple):
     kinship: dict[str, float]  # of the blocks, by name; NaN without errors
 
 
-def fields(runs: list[Run], skip: float | None, cells: Cells) -> Fields:
+def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | None = None) -> Fields:
     """Measure density, flow, temperature, stress and heat flux in cells, over the steady state.
 
     Parameters
@@ -333,6 +333,8 @@ def fields(runs: list[Run], skip: float | None, cells: Cells) -> Fields:
         collisions per disk that are left out at the start [the first half of each run]
     cells : tuple of int
         numbers of cells along x and y
+    species : str, optional
+        the only species that is measured; its kT is relative to its own flow [all disks]
 
     Returns
     -------
@@ -354,11 +356,14 @@ def fields(runs: list[Run], skip: float | None, cells: Cells) -> Fields:
     blocks, most = blocks_of(runs, skip, cells)
     run = runs[0]
     areas = [accessible(run, cells, kind.radius) for kind in run.by_species]
-    parts = np.stack([sums(block, cells, areas) for block in blocks])
+    own = run.species > 0 if species is None else run.of_species(species)
+    parts = np.stack([sums(block, cells, areas, own) for block in blocks])
     weights = parts[:, np.where(BY_FRAMES, 0, 1)]
     values, share = jackknife(lambda total: of_sums(total, run, cells), parts, weights)
     # All disks share what the conserved motion of them all does not have (docs/theory.md).
     values[:, NAMES.index("temperature")] *= run.n_disks / free_disks(run)
+    for axis, name in enumerate(("kT_x", "kT_y")):
+        values[:, NAMES.index(name)] *= run.n_disks / (run.n_disks - comoving(run)[axis])
     members = Members(values, share)
     near = kinship(members, blocks, most)
     mean, error = members.estimate(near[:, None])

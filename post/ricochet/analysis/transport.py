@@ -17,6 +17,7 @@ the growth of the energy: species that diffuse take some along, each its own ent
 energy is lost, or noise replaces it, fluctuations do not say how a gas flows: in the theory of the
 gas that cools the moments meet others, which take the unknown law of its states (Baskaran, Dufty
 and Brey, Phys. Rev. E 77, 031311 (2008)), and noise obeys no law of fluctuation and dissipation.
+Rough disks are refused: the sums of the run leave out the energy of rotation that they carry.
 """
 
 from typing import NamedTuple
@@ -45,7 +46,8 @@ HEAT, MEMORY = 2.06, 20.0
 CLOSE = 1e-6  # relative difference of steps that are equal
 UNLIKE = 0.05  # largest relative difference of Enskog's viscosity between runs of one group
 TAKES = (
-    "transport takes elastic smooth disks in a periodic box, whose fluctuations say how they flow; "
+    "transport takes elastic smooth disks in a periodic box, whose fluctuations determine how they "
+    "flow, and whose heat is all in their translation; "
     "of others driven.py --show viscosity (box.shear_rate) and correlations.py, D(t)"
 )
 MOMENTS = ("viscosity", "bulk_viscosity", "conductivity")  # from Helfand moments
