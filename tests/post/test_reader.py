@@ -318,7 +318,7 @@ def test_a_run_that_met_no_stop_rule_says_so(tmp_path, monkeypatch, capsys, name
 def test_a_file_with_the_names_of_an_earlier_version_is_refused_in_one_line(tmp_path, capsys):
     path = tiny(tmp_path / "a.h5", 4, 3)
     with h5py.File(path, "r+") as file:
-        file["observables/wall_collisions"] = 0
+        file["observables"]["pressure"] = 0
     with pytest.raises(RunError, match=r"a\.h5: was written by an earlier version of Ri"):
         read_run(path)
     assert run_script("snapshot", path) == 2

