@@ -21,7 +21,7 @@ module event_driven
   use simulation_state, only: simulation_t
   use signals, only: stop_requested
   use histories, only: histories_t
-  use wall_collisions, only: collide_wall
+  use boundary_collisions, only: collide_wall
   implicit none
   private
   public :: event_driven_t

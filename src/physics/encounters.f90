@@ -12,7 +12,7 @@ module encounters
   use simulation_state, only: simulation_t
   use tally, only: dissipated, heat_virial, stress, virial, work
   use texts, only: written
-  use wall_collisions, only: collide_wall
+  use boundary_collisions, only: collide_wall
   implicit none
   private
   public :: collide, collide_pair, encounter_text, is_periodic_side, pass_side

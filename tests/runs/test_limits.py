@@ -122,7 +122,7 @@ def test_the_memory_of_a_run_does_not_grow(memory_of):
 
 
 def assumed_memory(ricochet, *words) -> float:
-    """What --check says that a run of gas.nml needs [bytes]."""
+    """The memory that a run of gas.nml needs, as --check states it [bytes]."""
     said = ricochet("gas.nml", "--check", *options(words)).stdout
     return 1e6 * float(said.split("needs about ")[1].split(" MB of memory")[0])
 

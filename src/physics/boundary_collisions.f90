@@ -1,5 +1,5 @@
 !> Executes collisions of a disk with a side or an obstacle.
-module wall_collisions
+module boundary_collisions
   use kinds, only: int32, never, real64
   use box_geometry, only: next_obstacle, normal_surface_velocity, tangential_surface_velocity, wall_normal
   use box_sides, only: side_time
@@ -185,4 +185,4 @@ contains
     call sim%tally%surface_sums(impulse:gain, k)%add([-mass*(sim%disk(i)%v - v), gained])
   end subroutine add_wall_sums
 
-end module wall_collisions
+end module boundary_collisions
