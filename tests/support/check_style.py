@@ -4,13 +4,16 @@
 
 Arrows between folders (the pictures in src/README.md and post/ricochet/README.md), lengths of
 files, procedures and argument lists, comments before procedures, privacy, names, no preprocessor;
-and no path of somebody's machine in any file of the project.
+help texts, first words of sentences and a few denied words; and no path of somebody's machine in
+any file of the project.
 """
 
 import ast
+import io
 import re
 import subprocess
 import sys
+import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -29,10 +32,30 @@ TYPES = "type|class|real|integer|logical|character|procedure"
 DECLARATION = re.compile(rf"(?:use|import|implicit)\b|(?:{TYPES})\b.*::")
 EMPTY_WORDS = re.compile(r"(?:get|set(?!_in_)|do|handle)_|(?:\w+_)?(?:manager|utils?)(?:_|$)")
 MACHINE_PATH = re.compile(r"""(?:^|[\s"'=(:])/(?:home|root|Users|work|tmp|mnt|scratch)/\w""")
+# The help of a variable names the quantity first: a capital noun, no preposition, pronoun or verb.
+HELP = re.compile(r'variable_t\("(\w*)", "(\w+)", "\w+", \d+, "\w+", "[^"]*",[ &\n]*"(\w*)')
+NO_NOUN = {"Of", "In", "On", "At", "By", "With", "For", "From", "To", "How", "Whether", "When"}
+NO_NOUN |= {"What", "That", "Those", "Where", "Which", "Use", "Set", "Give", "The", "It", "This"}
+# A sentence that begins so has a clause or a pronoun for its subject: readers look for the noun.
+NO_SUBJECT = re.compile(
+    r"(?:^|[.!?] +)((?:What|Whom)\b(?![^.]*\?)|That which\b|(?:That|Those) (?:of|that|in)\b)"
+)
+# Each of these occurred several times where readers stopped, and no right sentence needs it.
+DENIED = {
+    r"by turns": "alternately, or interleaved",
+    r"\bof late[,.;]": "recently",
+    r"some (?:seconds|minutes|hours)\b": "several ...: 'some' is an unknown number",
+    r"in the mean\b": "on average",
+    r"molten\b": "melted: 'molten' is an adjective",
+    r"\bnormal (?:number|law)s?\b": "Gaussian: 'normal' is the direction of a wall",
+    r"every bit of\b": "bit-identical to",
+    r"\bblinks?\b": "the name of the time: negligible time",
+    r"disks push\b": "piston, as textbooks do",
+}
 
 
 class Problem(NamedTuple):
-    """What is wrong, and where."""
+    """A violation of a rule, and its place."""
 
     path: Path
     line: int
@@ -217,6 +240,71 @@ def path_problems(root: Path) -> Iterator[Problem]:
                 yield Problem(Path(name), number, "path of one machine")
 
 
+def comments_of(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and text of each comment and docstring; comment lines that follow each other are one."""
+    text = path.read_text()
+    if path.suffix == ".py":
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+                for part in re.split(r"\n *\n", ast.get_docstring(node) or ""):
+                    yield getattr(node, "lineno", 1), part
+        found = [
+            (token.start[0], token.string.lstrip("#: "))
+            for token in tokenize.generate_tokens(io.StringIO(text).readline)
+            if token.type == tokenize.COMMENT
+        ]
+    else:
+        lines = (re.sub(r"'[^']*'|\"[^\"]*\"", "''", line) for line in text.splitlines())
+        found = [
+            (number, line.split("!", 1)[1].lstrip("!> "))
+            for number, line in enumerate(lines, start=1)
+            if "!" in line
+        ]
+    previous, start, words = 0, 0, ""
+    for number, line in found:
+        if words and number == previous + 1:
+            words += " " + line
+        else:
+            if words:
+                yield start, words
+            start, words = number, line
+        previous = number
+    if words:
+        yield start, words
+
+
+def language_problems(root: Path) -> Iterator[Problem]:
+    """Helps that begin with no noun, sentences that begin with `What`, and denied words."""
+    for path in sorted((root / "src" / "variables").glob("*.f90")):
+        text = path.read_text()
+        for row in HELP.finditer(text):
+            if row[3] in NO_NOUN or not row[3][:1].isupper():
+                line = text.count("\n", 0, row.start()) + 1
+                what = f"the help of {row[1]}.{row[2]} begins with no capital noun"
+                yield Problem(path.relative_to(root), line, f"{what}: {row[3]}")
+    sources = [path for name in ("src", "post", "tests") for path in (root / name).rglob("*.*")]
+    for path in sorted(sources):
+        if path.suffix not in (".f90", ".py"):
+            continue
+        for line, comment in comments_of(path):
+            words = " ".join(comment.split())
+            if begin := NO_SUBJECT.search(words):
+                what = f"a sentence begins with {begin[1]}: name the noun"
+                yield Problem(path.relative_to(root), line, what)
+            if "tests" not in path.relative_to(root).parts:
+                yield from denied_words(path.relative_to(root), line, words)
+    for path in sorted((root / "docs").glob("*.md")):
+        for number, words in enumerate(path.read_text().splitlines(), start=1):
+            yield from denied_words(path.relative_to(root), number, words)
+
+
+def denied_words(path: Path, line: int, words: str) -> Iterator[Problem]:
+    """The denied words in a text."""
+    for pattern, better in DENIED.items():
+        if found := re.search(pattern, words):
+            yield Problem(path, line, f"{found[0]!r}: write {better}")
+
+
 def problems_of(root: Path) -> Iterator[Problem]:
     """All problems of the project in `root`."""
     arrows = arrows_of((root / "src" / "README.md").read_text())
@@ -242,6 +330,7 @@ def problems_of(root: Path) -> Iterator[Problem]:
     yield from name_problems(root, paths)
     if (package := root / "post" / "ricochet").is_dir():
         yield from import_problems(root, package)
+    yield from language_problems(root)
     yield from path_problems(root)
 
 

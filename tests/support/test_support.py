@@ -282,6 +282,9 @@ def test_a_submodule_is_a_file_of_its_name_that_needs_no_private(tmp_path):
         ("contains\n", "#include 'x'\ncontains\n", 7, "preprocessor"),
         ("contains\n", "contains\n" + "! a line\n" * 587, 601, "more than 600 lines"),
         ("It says:", f"It says: '/{'home'}/me'", 1, "path of one machine"),
+        ("!> Twice.", "!> Twice. What is doubled", 8, "a sentence begins with What"),
+        ("!> Twice.", "!> Those of all.", 8, "a sentence begins with Those of"),
+        ("!> Twice.", "!> Drawn by turns.", 8, "'by turns': write alternately"),
     ],
 )
 def test_a_style_problem_is_reported_at_its_line(tmp_path, before, after, line, words):
@@ -289,6 +292,24 @@ def test_a_style_problem_is_reported_at_its_line(tmp_path, before, after, line, 
     (problem,) = style_problems(tmp_path, MODULE.replace(before, after, 1))
     assert problem.startswith(f"src/high/upper.f90:{line}: ")
     assert words in problem
+
+
+def test_words_of_python_pages_and_helps_are_looked_at(tmp_path):
+    """Questions may begin with What; a help begins with a noun."""
+    folder = tmp_path / "src" / "variables"
+    folder.mkdir(parents=True)
+    row = 'variable_t("run", "dt", "real", 1, "optional", "0.1", &\n      "{}", positive)'
+    (folder / "README.md").write_text("A folder.\n")
+    for name, text in (("good", "Length of a step."), ("bad", "of a step")):
+        rows = f"!> Rows.\nmodule {name}\n  private\n{row.format(text)}\nend module {name}\n"
+        (folder / f"{name}.f90").write_text(rows)
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "page.md").write_text("# What is it?\n\nIt has molten.\n")
+    (tmp_path / "post").mkdir()
+    (tmp_path / "post" / "script.py").write_text('"""What is it?\n\nGood.  What it does."""\n')
+    found = style_problems(tmp_path, MODULE, PICTURE + "  high --> variables\n")
+    places = sorted(problem.split(": ")[0] for problem in found)
+    assert places == ["docs/page.md:3", "post/script.py:1", "src/variables/bad.f90:4"], found
 
 
 def test_folders_and_what_they_use_are_those_of_the_picture(tmp_path):
