@@ -1,10 +1,10 @@
-// ---------- which part of the box is seen ----------
+// ---------- the camera: the visible part of the box ----------
 
-// The canvas has the shape of the room: the box, and where its sides move. At zoom 1 it shows all of it; a periodic box goes
-// on beyond its sides.
+// The canvas has the shape of the visible region: the box and the range of its moving sides. At zoom 1 it shows the whole region.
+// A periodic box continues beyond its sides.
 const camera = { zoom: 1, x: 0, y: 0, follow: -1 };
 const page = { dots: 1, width: 0, height: 0, unit: 1, margin: 3 };  // of the canvas, in pixels
-const view = { unit: 1, x: 0, y: 0 };  // pixels per length; what is at the lower left corner of the canvas
+const view = { unit: 1, x: 0, y: 0 };  // pixels per unit of length; position of the lower left corner of the canvas
 
 const across = x => (x - view.x) * view.unit, up = y => page.height - (y - view.y) * view.unit;
 const backAcross = px => view.x + px / view.unit, backUp = py => view.y + (page.height - py) / view.unit;
@@ -16,7 +16,7 @@ function aim() {
   [camera.x, camera.y] = [[camera.x, page.width], [camera.y, page.height]].map(([centre, size], axis) => {
     const low = film.lower[axis], edge = film.edges[axis], half = size / 2 / view.unit, margin = page.margin / view.unit;
     if (film.periodic[axis]) return centre - edge * Math.floor((centre - low) / edge);
-    const reach = Math.max(0, edge / 2 + margin - half);  // walls keep the camera in
+    const reach = Math.max(0, edge / 2 + margin - half);  // the camera does not leave a box with walls
     return Math.max(low + edge / 2 - reach, Math.min(low + edge / 2 + reach, centre));
   });
   view.x = camera.x - page.width / 2 / view.unit;
@@ -27,7 +27,7 @@ function lookAtAll() {
   Object.assign(camera, { zoom: 1, x: film.lower[0] + film.edges[0] / 2, y: film.lower[1] + film.edges[1] / 2, follow: -1 });
 }
 
-// Zoom, with the same place below a point of the canvas.
+// Zooms by a factor. The position below the point (px, py) of the canvas stays there.
 function zoom(factor, px = page.width / 2, py = page.height / 2) {
   const x = backAcross(px), y = backUp(py);
   camera.zoom = Math.max(1, Math.min(mostZoom(), camera.zoom * factor));
@@ -43,7 +43,7 @@ function pan(dx, dy) {
   camera.y += dy / view.unit;
 }
 
-// The periods by which a thing from low to high is shifted where it is seen: first and last.
+// The first and the last number of periods by which an object from `low` to `high` must be shifted to be visible.
 function firstCopy(axis, high) {
   return film.periodic[axis] ? Math.ceil(((axis ? view.y : view.x) - high) / film.edges[axis]) : 0;
 }

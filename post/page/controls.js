@@ -1,8 +1,8 @@
-// ---------- what the user chooses ----------
+// ---------- choices of the user ----------
 
 const state = { playing: false, colour: '', traced: [], arrows: false, sofar: null, total: false };
-let pace;          // time of the film per second, at speed 1
-let usual = true;  // whether that is for the length of this film, not of another one
+let pace;          // time of the film per second of real time, at speed 1
+let usual = true;  // whether the pace follows from the length and the speeds of this film
 
 function begin() {
   lookAtAll();
@@ -15,14 +15,14 @@ function begin() {
   prepareFilm();
 }
 
-// The whole film takes a quarter of a minute or more; no usual disk crosses more than half of the box in a second.
+// The pace lets the film last at least 15 seconds, and lets a disk of usual speed cross at most half of the box in a second.
 function usualPace() {
   const most = Math.min((last() - first()) / 15 || Infinity, 0.5 * Math.max(...film.edges) / film.scales.speed[1]) || 1;
   const power = 10 ** Math.floor(Math.log10(most));
   return power * Math.floor(most / power);
 }
 
-// What depends on the frames that there are.
+// Prepares everything that depends on the frames available so far.
 function prepareFilm() {
   sums = null;
   const alike = s => kinds[s].count >= FEWEST && kinds[s].alike;
@@ -35,14 +35,14 @@ function prepareFilm() {
   $('event').hidden = !source.hasEvents();
 }
 
-// ---------- what is shown ----------
+// ---------- drawing ----------
 
-let told = 0;  // when words and plots were renewed
+let told = 0;  // when texts and plots were last drawn
 
 function show(time, anew = false) {
   move(time);
   drawStage();
-  if (state.playing && !anew && performance.now() - told < (disks > 4000 ? 250 : 90)) return;  // they may come later than disks
+  if (state.playing && !anew && performance.now() - told < (disks > 4000 ? 250 : 90)) return;  // texts and plots are drawn less often than disks
   told = performance.now();
   if (source.grows) drawEnergies();
   $('cursor').style.transform = `translateX(${Math.min(cursorAt(moment.time), $('energy').width / page.dots - 4)}px)`;
@@ -56,15 +56,15 @@ function show(time, anew = false) {
 }
 
 function layout() {
-  if (!film || !$('main').clientWidth) return;  // it is still to come, or is not seen
-  tell();  // the stage gets the room that plots and words leave
-  $('pressures').hidden = false;  // to be measured
+  if (!film || !$('main').clientWidth) return;  // there is no film yet, or it is not visible
+  tell();  // the stage takes the space that plots and texts leave
+  $('pressures').hidden = false;  // visible, so that it can be measured
   layOutStage();
-  drawLegend();  // words that depend on how large disks are on the screen
+  drawLegend();  // its texts depend on the size of the disks on the screen
   tellLimits();
   layOutStage();
   for (const canvas of ['histogram', 'energy', 'pressure'].map($)) {
-    const { clientWidth, clientHeight } = canvas;  // asked for once, for it takes long
+    const { clientWidth, clientHeight } = canvas;  // read once, because it forces a layout
     Object.assign(canvas, { width: Math.round(clientWidth * page.dots), height: Math.round(clientHeight * page.dots) });
   }
   layTableOut();
@@ -92,7 +92,7 @@ function refresh() {
 
 const paceNow = () => live.on && live.newest ? live.pace : pace * 10 ** +$('pace').value;
 
-let ticking;  // what comes with the next picture
+let ticking;  // the request of the next animation frame
 function play(on) {
   if (state.playing === on) return;
   state.playing = on;
@@ -130,7 +130,7 @@ const back = () => step(frameTime(moment.frame) < moment.time ? moment.frame : m
 const next = () => { if (!source.goOn?.('step')) step(moment.frame + 1); };
 const toEvent = () => { if (!$('event').hidden && !source.goOn?.('event')) go(source.nextEvent()); };
 
-// A paused film has its moment in the address, as a link to it.
+// The address of a paused film contains its time, so that it can be sent as a link.
 let remembering;
 function remember() {
   clearTimeout(remembering);
@@ -143,10 +143,10 @@ function fromAddress() {
   return isFinite(time);
 }
 
-// ---------- the stage as a control ----------
+// ---------- mouse and fingers on the stage ----------
 
-const pointers = new Map();  // fingers on the stage
-let moved = 0;               // how far they went
+const pointers = new Map();  // fingers or mouse buttons that are down
+let moved = 0;               // how far they have moved [pixels]
 
 const onStage = ({ clientX, clientY }) => {
   const box = $('stage').getBoundingClientRect();
@@ -154,7 +154,7 @@ const onStage = ({ clientX, clientY }) => {
 };
 
 function look() {
-  $('stage').style.touchAction = camera.zoom > 1 ? 'none' : 'pan-y';  // else a finger scrolls the page
+  $('stage').style.touchAction = camera.zoom > 1 ? 'none' : 'pan-y';  // without zoom a finger scrolls the page
   press({ follow: camera.follow >= 0 });
   show(moment.time, true);
 }
@@ -179,7 +179,7 @@ function pointerMoved(event) {
   look();
 }
 
-// The disk nearest to a place, if one is near.
+// Traces the disk nearest to a point of the canvas, or none if no disk is near.
 function pick(px, py) {
   let nearest = [], least = 12 * page.dots;
   for (let i = 0; i < disks; i++) {
@@ -204,7 +204,7 @@ function followOrNot() {
   look();
 }
 
-// ---------- what acts ----------
+// ---------- events of the page ----------
 
 function on(id, action) { $(id).addEventListener('click', action); }
 

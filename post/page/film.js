@@ -1,16 +1,16 @@
 'use strict';
 
-// ---------- what is shown, whatever it comes from ----------
+// ---------- the film: state shared by files and workers ----------
 
 const $ = id => document.getElementById(id);
-let film, disks, kinds;         // facts; the number of disks; species
-let speciesOf, sizeOf, masses;  // by disk
-let X, Y, VX, VY;               // of all disks at the moment; inside the box along a periodic axis
-let UX, UY, HITS;               // places without jumps since the frame before; collisions since then
-let angles;                     // orientations at the moment, if disks have them
-let source;                     // the file, or what comes from a worker: what goes on, and what comes next
-let past = [];                  // frames: time, place and velocity (x1 y1 x2 y2 ...), angle, crossed (periods since the first), ...
-let origins;                    // x1 y1 x2 y2 ... where displacements count from
+let film, disks, kinds;         // the facts of the film; the number of disks; the species
+let speciesOf, sizeOf, masses;  // of each disk: number of its species, number of its size, mass
+let X, Y, VX, VY;               // positions and velocities at the present moment; positions are wrapped into a periodic box
+let UX, UY, HITS;               // positions that are continuous since the frame before; events since that frame
+let angles;                     // orientations at the present moment, if the disks have any
+let source;                     // where frames and events come from: a file or a worker
+let past = [];                  // the frames: time, position and velocity (x1 y1 x2 y2 ...), angle, periods crossed since the first frame, ...
+let origins;                    // the positions x1 y1 x2 y2 ... from which displacements are measured
 const moment = { time: 0, shown: 0, frame: 0, kinetic: [], potential: [], collisions: 0 };
 
 function bytes(text) {
@@ -19,7 +19,7 @@ function bytes(text) {
   return array;
 }
 
-// The box, its disks, and which of them has what.
+// Sets the box, the disks and their properties.
 function setScene(facts, blocks) {
   film = facts;
   kinds = film.species;
@@ -34,7 +34,7 @@ function setScene(facts, blocks) {
 const first = () => past[0].time, last = () => past.at(-1).time;
 const clamp = (value, low, high) => Math.max(low, Math.min(high, value));
 
-// How many of these ascending numbers are not larger.
+// The number of elements of an ascending list that are not larger than a value (binary search).
 function upTo(values, value, number = one => one) {
   let low = 0, high = values.length;
   while (low < high) {
@@ -44,23 +44,23 @@ function upTo(values, value, number = one => one) {
   return low;
 }
 
-const frameAt = time => Math.max(0, upTo(past, time, frame => frame.time) - 1);  // the last one that is not later
+const frameAt = time => Math.max(0, upTo(past, time, frame => frame.time) - 1);  // the last frame that is not later
 const frameTime = k => past[clamp(k, 0, past.length - 1)].time;
 
-// The periods that disks have crossed since the first frame, x1 y1 x2 y2 ..., if there are any: `moved` tells them since the last.
+// Adds to a frame the periods that disks have crossed since the first one, x1 y1 x2 y2 .... `moved` returns those since the last frame.
 function cross(frame, moved) {
   const before = past.at(-1);
   if (film.periodic.some(Boolean)) frame.crossed = new Int16Array(2 * disks).map((_, k) => before ? before.crossed[k] + moved(before, k) : 0);
   return frame;
 }
 
-// ---------- the way from frame to frame ----------
+// ---------- motion between frames ----------
 
-// In the time between two frames a disk flies from the first one on, by way of its turns; each flight is straight, or a parabola
-// under gravity. Where the ways are not known all disks stand: the frame is shown as it is. What comes from a worker has no ways,
-// but frames that are close enough.
-let ways;    // of a film: the first turn after each frame (start); disk, and share of the time, new velocity of each (turns)
-let events;  // of a film: when, partners (i, j), and how many were collisions of two disks up to each (pairs)
+// Between two frames a disk flies from its position in the first one, and its velocity changes at the events of the log. Each flight is
+// straight, or a parabola under gravity. Without an event log disks stay at their positions of the frame. Frames of a worker need no
+// log, because they are close enough.
+let ways;    // velocity changes: the first one after each frame (start); of each its disk, its share of the interval and the new velocity (turns)
+let events;  // events of the log: time (when), partners (i, j), number of collisions of two disks so far (pairs)
 
 function move(time) {
   moment.time = clamp(time, first(), last());
@@ -106,7 +106,7 @@ function move(time) {
   Object.assign(moment, { kinetic: kinetic.map(mean), potential: potential.map(mean) });
 }
 
-// Where the sides are at a time: a picture only, events are those of the engine. Left, right, bottom, top.
+// Positions of the left, right, bottom and top side at a time. They are for drawing only; the engine computes the events.
 function sidesAt(time) {
   return past[moment.frame].sides ?? film.sides.map(({ place, motion, amplitude, period, phase, velocity, start_time: start, end_time: end, way }, k) => {
     if (way?.[0].length > 1) {
@@ -126,8 +126,8 @@ function displacement(i) {
   return Math.hypot(UX[i] + x - origins[2 * i], UY[i] + y - origins[2 * i + 1]);
 }
 
-// The path of a disk between two moments, flight by flight: from, to, and what bends it (0, 0 if straight). Straight from frame
-// to frame if it is not known.
+// The flights of a disk between two times: from, to, and the offset of the control point of a parabola (0, 0 if straight). Without an
+// event log the flights are straight lines from frame to frame.
 function flights(i, from, to) {
   const result = [], plus = (a, b) => a.map((one, axis) => one + b[axis]);
   for (let k = frameAt(from); k < past.length - 1 && past[k].time < to; k++) {
@@ -147,7 +147,7 @@ function flights(i, from, to) {
   return result;
 }
 
-// The speeds of all disks in the frames up to the moment, in some of them if there are very many; returns how many.
+// Calls `action` for the speed of each disk in the frames so far, or in some of them if there are very many. Returns the number of frames.
 function eachSpeed(action) {
   const some = Math.ceil((moment.frame + 1) * disks / 2e6);
   let samples = 0;
@@ -156,7 +156,7 @@ function eachSpeed(action) {
   return samples;
 }
 
-// ---------- a film: a file that holds all of it ----------
+// ---------- a film from a file ----------
 
 const running = counts => counts.reduce((sums, one) => { sums.push(sums.at(-1) + one); return sums; }, [0]);
 

@@ -1,22 +1,22 @@
 'use strict';
 
-// ---------- the laboratory: a form, and runs in films, each of them with a worker of its own ----------
+// ---------- the laboratory: a form and several films, each with a worker of its own ----------
 
 const $ = id => document.getElementById(id);
-const lab = JSON.parse($('data').textContent);  // table: group -> variable; inputs: what there is to choose
+const lab = JSON.parse($('data').textContent);  // the table of variables by group, and the inputs to choose from
 const state = {
-  input: null, groups: [],   // the input: name, title, sliders, ...; kind, place, given values of each group of its file
-  settings: {}, added: [],   // what the form changes: variable -> text; groups that are not in the file: [kind, name]
-  has: {},                   // what `settings` of the run is
-  waiting: {},               // variables whose new text cannot be: that text, and what is said about it
-  runs: 0,                   // so far
-  boxes: [],                 // runs: { figure, frame, letter, words, run, shown }, the newest last; the others are kept
+  input: null, groups: [],   // the input (name, title, sliders, ...); the groups of its file with kind, address and values
+  settings: {}, added: [],   // variables that the form changes, with their texts; groups that are not in the file: [kind, name]
+  has: {},                   // the settings that the run has taken over
+  waiting: {},               // variables with a text that was refused: the text and the message
+  runs: 0,                   // number of runs so far
+  boxes: [],                 // kept runs { figure, frame, letter, words, run, shown }, and the present one at the end
   paused: false,
 };
-// What acts on the disks that move; all else starts anew.
+// Variables that can change in a running simulation. All others start a new run.
 const acts = key => /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|surface_velocity|velocity|mass|force))/.test(key);
 const MEASURED = { 'all/kinetic_energy': 'mean kinetic energy', 'all/mean_speed': 'mean speed', virial_pressure: 'pressure', dissipated_energy: 'energy lost per time', collisions: 'collisions per time' };
-const MOST_KEPT = 3, FULL = 0.5;  // runs on the shelf; share of the area that random placing fills with ease
+const MOST_KEPT = 3, FULL = 0.5;  // number of kept runs; packing fraction that random placement reaches easily
 
 function make(tag, more = {}, ...children) {
   const element = Object.assign(document.createElement(tag), more);
@@ -47,7 +47,7 @@ const shownOf = key => state.waiting[key]?.text ?? textOf(key);
 function set(key, text) {
   const old = textOf(key);
   delete state.waiting[key];
-  delete state.settings[key];  // the newest is the last
+  delete state.settings[key];  // so that the newest setting is the last one
   if (text !== givenAs(key)) state.settings[key] = text;
   sync();
   if (text !== old) changed(key);
@@ -61,9 +61,9 @@ const changesInWords = () => Object.entries(wish().settings).map(([key, value]) 
   return `${slider ? slider.words.replace(/ \(.*/, '') : key} = ${slider?.at >= 0 ? split(value)[slider.at] : value}`;
 }).join(' · ') || 'as in the file';
 
-// ---------- sliders with words ----------
+// ---------- sliders ----------
 
-// [variable or variable[component], words, from, to, 'log' or nothing]
+// [variable or variable[component], label, from, to, 'log' or nothing]
 function sliderOf([name, text, from, to, log]) {
   const [key, at] = name.replace(']', '').split('[');
   return { key, at: at === undefined ? -1 : +at, words: text, from, to, log: !!log };
@@ -71,7 +71,7 @@ function sliderOf([name, text, from, to, log]) {
 
 const textWith = ({ key, at }, text) => at < 0 ? text : split(valueOf(key)).map((one, k) => k === at ? text : one).join(',');
 
-// The largest value that has room, up to another limit: all disks fill no more than a share of their region.
+// The largest value of a slider with which all disks fill at most a certain share of their region.
 function mostOf({ key, to = Infinity }) {
   const [kind, name, variable] = key.split('.');
   if (kind !== 'species' || !['count', 'radius'].includes(variable) || textOf(`species.${name}.placement`)) return to;
@@ -88,7 +88,7 @@ function mostOf({ key, to = Infinity }) {
   return isFinite(most) ? Math.min(to, most) : to;
 }
 
-// Values from one end of a slider to the other, rounded: no two are alike.
+// Rounded values from one end of a slider to the other, without repetitions.
 function valuesOf(spec, steps) {
   const { key, from, to, log } = spec, top = mostOf(spec), whole = variableOf(key).type === 'integer';
   const unit = whole ? 1 : 10 ** Math.floor(Math.log10((to - from) / 100));
@@ -96,7 +96,7 @@ function valuesOf(spec, steps) {
   return [...new Set(Array.from({ length: steps + 1 }, (_, k) => near(log ? from * (top / from) ** (k / steps) : from + k / steps * (top - from))))];
 }
 
-// The program judges what is typed; only the decimal comma is not its own.
+// The program checks the text that is typed. A decimal comma is replaced beforehand, because the program does not accept it.
 function buildSlider(spec) {
   const { key, at } = spec, id = 'slide.' + key + at;
   const range = make('input', { type: 'range', min: 0, id }), field = make('input', { inputMode: 'text', spellcheck: false });
@@ -126,7 +126,7 @@ function mark(row, key) {
   row.lastChild.textContent = state.waiting[key]?.said ?? '';
 }
 
-// ---------- everything: by the program's own table ----------
+// ---------- the form of all variables, from the table of the program ----------
 
 function buildEverything() {
   if (!$('everything').open) { $('groups').replaceChildren(); return; }
@@ -172,9 +172,9 @@ function addGroup(kind, name) {
   run();
 }
 
-// ---------- an input ----------
+// ---------- choosing an input ----------
 
-// Its run starts before the form is there.
+// The run starts before the form is complete.
 async function choose(name) {
   const input = lab.inputs.find(one => one.name === name);
   Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: [], settings: {}, has: {}, waiting: {}, added: [] });
@@ -188,7 +188,7 @@ async function choose(name) {
   const answer = await fetch('form?' + encodeURIComponent(name)).catch(() => null);
   if (!answer?.ok) { tell(answer ? await answer.text() : 'No answer: the laboratory has ended.', true); return; }
   const form = await answer.json();
-  if (state.input.name !== name) return;  // another has been chosen meanwhile
+  if (state.input.name !== name) return;  // another input has been chosen meanwhile
   state.groups = form.groups;
   $('about').replaceChildren(...form.about.split(/\n\n+/).map(text => make('p', { textContent: text })));
   $('sliders').replaceChildren(...state.input.sliders.map(buildSlider));
@@ -220,8 +220,8 @@ function newBox() {
   return box;
 }
 
-// One start at a time; values that change meanwhile are the next one's.
-const PLACING = 2000;  // ms, after which placing the disks keeps no other wish waiting
+// Only one run starts at a time. Values that change meanwhile belong to the next start.
+const PLACING = 2000;  // time [ms] after which a placement of disks is given up for newer settings
 let busy = 0, again = false, timer, latest = {};
 function run() {
   timer = clearTimeout(timer);
@@ -242,14 +242,14 @@ function run() {
   if (isThere(box)) begin(); else box.frame.addEventListener('load', begin, { once: true });
 }
 
-// What acts on the running state does so at once, while the slider moves; the rest starts anew.
+// Changes that a running simulation allows act at once, while the slider moves. Others start a new run.
 function changed(key) {
   if (busy || !acts(key) || !current()?.run) { run(); return; }
   latest[key] = state.settings[key] ?? givenAs(key);
   timer ??= setTimeout(() => { filmOf(current()).send({ do: 'change', settings: latest }); latest = {}; timer = undefined; }, 25);
 }
 
-// What a film hears from its worker.
+// Handles the messages of the worker of a film.
 function hear(source, news) {
   const box = state.boxes.find(one => one.frame.contentWindow === source);
   if (!box) return;
@@ -261,7 +261,7 @@ function hear(source, news) {
     tell(Object.keys(state.waiting).length ? 'one value waits: see the form' : '');
     arrangeAll();
   } else if (news.is === 'problems') {
-    if (!news.change) { showProblems(news.problems); ready(); } else if (!busy) run();  // it does not act on what runs
+    if (!news.change) { showProblems(news.problems); ready(); } else if (!busy) run();  // the variable cannot change in a running simulation
   } else if (news.is === 'state') {
     box.changes = news.changes;
     if (box === current()) for (const [, key, value] of news.changes) state.has[key] = value;
@@ -276,7 +276,8 @@ function hear(source, news) {
 
 function ready() { busy = 0; if (again) run(); }
 
-// Once, where it belongs, or at what has changed last: that text waits, what it would replace goes on, and the others act.
+// Shows each problem once, at its variable or else at the one that changed last. The refused text waits, its old value stays, and the
+// other changes act.
 function showProblems(problems) {
   const changes = () => Object.keys({ ...state.has, ...state.settings }).filter(differs), before = changes();
   for (const { place, text } of problems) {
@@ -291,7 +292,7 @@ function showProblems(problems) {
   again ||= before.length > 0 && changes().length > 0;
 }
 
-// ---------- the shelf of kept runs ----------
+// ---------- kept runs ----------
 
 function keep() {
   if (!current()?.run) return;
@@ -327,7 +328,7 @@ function tellShelf() {
   state.boxes.forEach(box => { box.figure.firstChild.textContent = `${box.letter}: ${whatIs(box)}`; });
 }
 
-// Boxes of one size side by side; the newest has all plots, with the curves of the others in them.
+// Arranges boxes of one size side by side. The newest has all plots, which contain the curves of the others.
 function arrangeAll() {
   const boxes = shownBoxes(), many = boxes.length > 1, { clientWidth, clientHeight } = $('runs');
   const upright = clientWidth < 560, count = many ? boxes.length : 1, width = Math.floor(clientWidth / count);
@@ -356,7 +357,7 @@ function overlayAll() {
 }
 setInterval(() => { if (shownBoxes().length > 1) overlayAll(); }, 1000);
 
-// What is done in one film is done in all that stand beside it.
+// Repeats an action on one film in all films beside it.
 function played(source, on) {
   if (source === filmOf(current())) state.paused = !on;
   for (const one of films()) if (one !== source && one.inside().film) one.play(on);
@@ -370,7 +371,7 @@ function paced(source) {
 
 // ---------- a scan: one variable, five values, one curve that grows ----------
 
-let scan, scanner;  // what is measured; where from
+let scan, scanner;  // the measured quantity and values; the worker that measures
 function beginScan() {
   const spec = state.input.sliders[$('scanned').value], { key, log } = spec, values = valuesOf(spec, 4), texts = values.map(value => textWith(spec, String(value)));
   scan = { x: spec.words, y: MEASURED[$('measured').value], log, points: [], values, said: '' };
@@ -382,7 +383,7 @@ function beginScan() {
 
 function drawScan() { if (scan && isThere(current()) && filmOf(current()).inside().film) filmOf(current()).showScan(scan); }
 
-function addToScan({ is, index, mean, error, problems }) {  // a value with which nothing can be measured leaves a gap
+function addToScan({ is, index, mean, error, problems }) {  // values that cannot be measured leave a gap
   if (problems) scan.said = (is === 'scan' ? `${short(scan.values[index])}: ` : '') + problems[0].text;
   else scan.points.push([scan.values[index], mean, error]);
   drawScan();
@@ -391,7 +392,7 @@ function addToScan({ is, index, mean, error, problems }) {  // a value with whic
   scanner.leave();
 }
 
-// ---------- what acts ----------
+// ---------- events of the page ----------
 
 function bare(on) {
   document.body.classList.toggle('bare', on);
@@ -399,7 +400,7 @@ function bare(on) {
   arrangeAll();
 }
 
-// All films are as the page.
+// All films have the theme of the page.
 function dress() {
   for (const one of state.boxes.filter(isThere).map(filmOf)) {
     one.document.documentElement.classList.toggle('larger', document.documentElement.classList.contains('larger'));
@@ -419,7 +420,7 @@ const actions = {
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());
 const keys = { r: 'run', p: 'pause', k: 'keep', s: 'settings', l: 'larger' };
 
-// A key of the laboratory, wherever the focus is; its other keys are for all films, while none has the focus.
+// Keys of the laboratory act wherever the focus is. The other keys act on all films while none of them has the focus.
 function typed(event) {
   const { key, target } = event, own = target.ownerDocument === document;
   if (target.matches('input:not([type=range]), select') || event.ctrlKey || event.metaKey || event.altKey || $('inputs').open) return;

@@ -1,8 +1,8 @@
-// ---------- a run that goes on ----------
+// ---------- unfinished runs ----------
 
-// A page without a film asks the server of `player.py --live` for one, and goes on asking until the run has ended.
-// The film goes as fast as brings it to the newest frame when the next answer is due, until one goes elsewhere.
-// As a part of the laboratory it shows what a worker does.
+// A page without a film asks the server of `player.py --live` for one, again and again until the run has ended. The film plays at the
+// pace that reaches the newest frame when the next answer is due, unless the user goes to another time. Inside the laboratory it shows
+// the run of a worker.
 const enclosed = JSON.parse($('film').textContent);
 const isPart = parent !== window && !enclosed;
 const live = { on: false, stamp: '', newest: true, heard: 0, pace: 0 };
@@ -39,7 +39,7 @@ function tellLive(end) {
     + (live.newest ? 'the film follows it.' : 'End follows it.') : '';
 }
 
-// Follow the newest frame, or leave it.
+// Starts or stops following the newest frame.
 function follow(newest) {
   if (!live.on) return;
   live.newest = newest;
@@ -47,7 +47,7 @@ function follow(newest) {
   if (newest) { show(last(), true); play(true); }
 }
 
-// ---------- here it begins ----------
+// ---------- start of the page ----------
 
 listen();
 document.documentElement.classList.toggle('part', isPart);

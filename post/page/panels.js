@@ -1,4 +1,4 @@
-// ---------- words and numbers ----------
+// ---------- texts and numbers ----------
 
 const short = value => (Math.abs(value) >= 1e5 || (value && Math.abs(value) < 1e-3)
   ? value.toExponential(2) : String(+value.toPrecision(4))).replace('-', '−');
@@ -19,7 +19,7 @@ function tell() {
     `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) at <b>${short(X[i])}, ${short(Y[i])}</b>`).join('<br>');
 }
 
-// What is seen, for those who do not: of the stage, and of each plot.
+// Descriptions of the stage and of each plot, for screen readers.
 const listed = words => words.filter(Boolean).join(', ');
 function describe() {
   const [width, height] = film.edges, each = kinds.map(({ name, count, sizes }) => `${count} ${name} (${sizes})`);
@@ -38,7 +38,7 @@ function describe() {
 const describeLaw = (name, { temperature, speed, motion }) => (temperature || speed || motion) && `${name} ${listed([
   temperature && `heats: kT = ${short(temperature)}`, speed && `slides with ${short(speed)}`, motion && `moves (${motion})`])}`;
 
-// A species and its colour.
+// A label with the colour of a species.
 function chip(kind, text) {
   const element = Object.assign(document.createElement('span'), { className: 'chip', textContent: text });
   element.style.setProperty('--own', css(speciesColour(kind)));
@@ -47,7 +47,7 @@ function chip(kind, text) {
 
 const PATTERN_WORDS = ['', ', striped', ', striped upright', ', chequered'];
 
-// The pattern of a species, if the whole box shows it.
+// The name of the pattern of a species, if its disks are large enough for it at zoom 1.
 function patternOf(s) {
   const radius = Math.max(leastRadius(), page.unit * film.radii[sizeOf[speciesOf.indexOf(s)]]);
   return isStriped(s, radius) ? PATTERN_WORDS[s % PATTERN_WORDS.length] : '';
@@ -62,13 +62,13 @@ function drawLegend() {
     const middle = state.colour === 'collisions' ? Math.expm1(Math.log1p(scale[1]) / 2) : scale[1] / 2;
     legend.innerHTML = `<div id="scale"><i></i>
       <span><b>0</b><b>${short(+middle.toPrecision(2))}</b><b>≥ ${short(+scale[1].toPrecision(2))}</b></span></div>`;
-    legend.querySelector('i').style.background = `linear-gradient(to right, ${stops})`;  // the page's policy refuses it in the text
+    legend.querySelector('i').style.background = `linear-gradient(to right, ${stops})`;  // the security policy of the page refuses inline styles
   }
   const notes = [scale?.[0], ...film.sides.map((law, k) => describeLaw(film.surfaces[k], law))].filter(Boolean);
   if (notes.length) legend.append(Object.assign(document.createElement('p'), { textContent: notes.join('; ') }));
 }
 
-// What the picture cannot show, below the controls.
+// Says below the controls what the picture does not show truly.
 function tellLimits() {
   const tiny = angles && film.radii.every(radius => Math.max(leastRadius(), radius * page.unit) < LEAST_TO_TURN * page.dots);
   $('between').textContent = [film.note && `Frames only: ${film.note}.`, enlarged() && 'Small disks are drawn larger than they are.',
@@ -81,11 +81,11 @@ function prepare(canvas) {
   const pen = canvas.getContext('2d'), width = canvas.width / page.dots, height = canvas.height / page.dots;
   pen.setTransform(page.dots, 0, 0, page.dots, 0, 0);
   pen.clearRect(0, 0, width, height);
-  const size = parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;  // larger on a projector
+  const size = parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;  // texts are larger on a projector
   return { pen, size, left: 42 * size, right: width - 4, top: 6, bottom: height - 26 * size };
 }
 
-// Axes from (x0, y0) to (x1, y1) with three or so round numbers each; returns the maps to pixels.
+// Draws axes from (x0, y0) to (x1, y1) with about three round numbers each. Returns the maps from values to pixels.
 function axes(plot, [x0, x1], [y0, y1], words, name = short, nameOfY = name) {
   const { pen, size, left, right, top, bottom } = plot;
   const x = value => left + (value - x0) / (x1 - x0) * (right - left);
@@ -106,7 +106,7 @@ function axes(plot, [x0, x1], [y0, y1], words, name = short, nameOfY = name) {
   return { x, y };
 }
 
-// The multiples of a number of one digit, 1, 2 or 5.
+// Round numbers between two values: multiples of 1, 2 or 5 times a power of ten.
 function round(low, high) {
   const least = (high - low) / 4, power = 10 ** Math.floor(Math.log10(least) + 1e-9), values = [];
   const step = power * [1, 2, 5, 10].find(k => k * power >= least * (1 - 1e-9));
@@ -114,8 +114,8 @@ function round(low, high) {
   return values;
 }
 
-// Lines { time, values, colour, dash, letter } in one plot, from 0 on if none is lower; the part that is still to come is
-// pale; null is a gap. Returns the map of times.
+// Plots lines { time, values, colour, dash, letter }. The axis of the values includes 0. The part after `now` is pale, and null makes a
+// gap. Returns the map from times to pixels.
 function plotLines(canvas, lines, now) {
   const range = lines.map(({ time }) => [time[0], time.at(-1)]), start = Math.min(...range.map(([t]) => t));
   const end = Math.max(...range.map(([, t]) => t)), plot = prepare(canvas), { pen } = plot;
@@ -145,19 +145,19 @@ function plotLines(canvas, lines, now) {
 
 // ---------- speeds ----------
 
-const FEWEST = 10;  // disks of a species that has a histogram
-let counted;        // species that have one
-let sums;           // the histograms of all frames so far, and of which frame they are
+const FEWEST = 10;  // least number of disks of a species for a histogram
+let counted;        // species that have a histogram
+let sums;           // the histograms of all frames so far, and the number of the last of these frames
 
-// The axis of the histogram, up to a speed: where disks rest it grows by factors, for a bar of resting disks beside Maxwell's
-// curve would say nothing.
-const RESTING = 0.02;  // of the disks
+// Sets the bins of the histogram up to a speed. Where many disks rest the axis is logarithmic, because a single bar of resting disks
+// beside Maxwell's curve would show nothing.
+const RESTING = 0.02;  // share of the disks at rest from which the axis is logarithmic
 function setBins(most, resting) {
   const rest = resting > RESTING && resting < 1;
   film.speeds = { rest, edges: Array.from({ length: 41 }, (_, k) => rest ? most * 10 ** (k / 10 - 4) : most * k / 40) };
 }
 
-// Shares of the disks of each species in each bin: of the moment, or of all frames up to it.
+// Share of the disks of each species in each bin, at the present moment or in all frames so far.
 function speedsNow() {
   const { edges, rest } = film.speeds, bins = edges.length - 1, width = edges[1] - edges[0];
   const bin = speed => rest ? speed > 0 ? Math.max(1, upTo(edges, speed)) : 0 : Math.floor(speed / width);
@@ -211,7 +211,7 @@ function drawHistogram() {
   pen.restore();
 }
 
-// Where many disks are at rest there is no Maxwell curve, but speeds of many sizes: both axes grow by factors.
+// Where many disks are at rest, both axes are logarithmic and there is no Maxwell curve.
 function drawSpeedsAndRest(plot, counts) {
   const edges = film.speeds.edges.map(Math.log10), most = Math.log10(1.5 * Math.max(10, ...kinds.map(kind => kind.count)));
   const { pen } = plot, power = value => short(+(10 ** value).toPrecision(1));
@@ -229,8 +229,8 @@ function drawSpeedsAndRest(plot, counts) {
 // ---------- energies and pressure, from the observables ----------
 
 const ENERGIES = { kinetic: [], potential: [5, 3], rotational: [1.5, 2.5] }, DASHES = [[], [7, 2], [2, 2], [7, 2, 2, 2]];
-let cursorAt;      // from time to pixels
-let overlaid = [];  // other runs in the same plots: { letter, curves, kinds }
+let cursorAt;      // the map from times to pixels
+let overlaid = [];  // kept runs in the same plots: { letter, curves, kinds }
 
 const share = s => state.total ? kinds[s].count : 1;
 const there = () => Object.keys(ENERGIES).filter(kind => source.curves()[kind]);
@@ -276,9 +276,9 @@ function tellEnergies() {
   }));
 }
 
-// ---------- numbers of a worker, with their errors, beside what theory says ----------
+// ---------- measured values of a worker with errors, and theory ----------
 
-function withError({ value, error }) {  // to two digits of the error
+function withError({ value, error }) {  // rounded to two digits of the error
   const last = Math.floor(Math.log10(error)) - 1, rounded = one => (Math.round(one / 10 ** last) * 10 ** last).toFixed(Math.max(0, -last)).replace('-', '−');
   return value === null ? '' : !error ? short(value) : [value, error].map(Math.abs(last) > 7 ? short : rounded).join(' ± ');
 }
@@ -292,7 +292,7 @@ function tellNumbers() {
     + Object.entries({ temperature, 'mean speed': speed, pressure }).filter(([, one]) => one && one.value !== null).map(row).join('');
 }
 
-// ---------- events to come, of few disks ----------
+// ---------- the next events of few disks ----------
 
 const meeting = ([, i, j]) => `disk ${i + 1} and ${j < 0 ? film.surfaces[-1 - j] : `disk ${j + 1}`}`;
 

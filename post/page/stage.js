@@ -1,18 +1,18 @@
-// ---------- the stage: ground (box, obstacles), disks, marks (traces, arrows, events to come) ----------
+// ---------- the stage has three layers: ground (box, obstacles), disks, marks (traces, arrows, next events) ----------
 
 const layers = ['ground', 'disks', 'marks'].map($);
 const [ground, disksBrush, marks] = layers.map((layer, k) => layer.getContext('2d', { willReadFrequently: k === 1 }));
-let ink;                       // colours of the theme
-let picture, pixels, palette, paper;  // the layer of the disks; its pixels as integers; the colours of disks, of the ground
-let radii;                     // in pixels
-let groundShown, marked;       // what the ground shows; whether there are marks
+let ink;                       // the colours of the theme
+let picture, pixels, palette, paper;  // image of the disks; its pixels as integers; colours of disks and of the ground as such integers
+let radii;                     // of each size [pixels]
+let groundShown, marked;       // the view that the ground was drawn for; whether the layer of marks has any
 
 const dark = () => document.documentElement.dataset.theme === 'dark';
 const cssColour = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
 const css = rgb => `rgb(${rgb})`;
 
-// Colours of disks have at least 3:1 of contrast with the ground, in both themes; a scale grows in luminance from end to end,
-// and species differ in it, so both can be told in grey, too.
+// Colours of disks have a contrast of at least 3:1 with the ground in both themes. The luminance of a scale grows from end to end, and
+// species differ in luminance, so that both can be distinguished in grey.
 const VIRIDIS = [[68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141], [39, 173, 129], [92, 200, 99], [170, 220, 50], [253, 231, 37]];
 const LIGHTS = { false: [0.02, 0.29, [0.11, 0.28, 0.04, 0.2, 0.07]], true: [0.14, 0.85, [0.27, 0.5, 0.14, 0.38, 0.2]] };
 const toLinear = part => part <= 10.3 ? part / 3294.6 : ((part / 255 + 0.055) / 1.055) ** 2.4;
@@ -34,11 +34,11 @@ function scaleColour(place) {
   return withLuminance(VIRIDIS[k].map((part, c) => part + (at - k) * (VIRIDIS[k + 1][c] - part)), low + (high - low) * place / 255);
 }
 
-// The places of the disks on the scale of a quantity at the moment, 0 to 255; nothing for species.
+// Values of the disks on the scale of a quantity at the present moment, from 0 to 1. There is none for species.
 const quantities = {
   speed: i => Math.sqrt(VX[i] * VX[i] + VY[i] * VY[i]) / film.scales.speed[1],
   displacement: i => displacement(i) / film.scales.displacement[1],
-  collisions(i) {  // by factors
+  collisions(i) {  // on a logarithmic scale
     const scale = Math.log1p(film.scales.collisions[1]), before = past[moment.frame].hits[i] / 255;
     return HITS[i] ? Math.log1p(Math.expm1(before * scale) + HITS[i]) / scale : before;
   },
@@ -68,22 +68,22 @@ function layOutStage() {
   groundShown = '';
 }
 
-// In CSS pixels: beside the controls on a flat screen, else above them. On a telephone the view has no card of its own,
-// and between disks and controls is the histogram.
+// Space of the stage in CSS pixels: beside the controls on a flat screen, else above them. On a telephone the histogram stands between
+// disks and controls.
 function roomOfStage() {
   if (boxSize) return boxSize;
   const full = document.fullscreenElement === $('view'), bare = getComputedStyle($('view')).display === 'contents';
   const frame = bare ? $('main') : $('view'), style = getComputedStyle(frame);
   const inner = size => parseFloat(style[size]) || 0;
   const width = frame.clientWidth - inner('paddingLeft') - inner('paddingRight');
-  // The height of the screen without what a telephone adds while something is too wide for it.
+  // clientHeight, because the inner height of a telephone grows while something is too wide for it.
   const height = document.documentElement.clientHeight - (full ? 0 : $('top').offsetHeight) - inner('paddingTop') - inner('paddingBottom') - 2;
   if (cssColour('flat')) return { width: width - Math.max(260, 0.45 * width), height };
   const between = bare ? $('speeds').offsetHeight : 0;
   return { width, height: Math.max(full ? 100 : isPart ? 200 : 300, height - $('controls').offsetHeight - between - 16) };
 }
 
-// Small disks far apart would be lost: they are drawn larger than they are, and the legend says so.
+// Small disks far apart could not be seen. They are drawn larger than they are, and the page says so.
 const leastRadius = () => clamp(0.06 * Math.sqrt(film.edges[0] * film.edges[1] / disks) * page.unit, 1.1, 3 * page.dots);
 const enlarged = () => film.radii.some(radius => radius * page.unit < leastRadius());
 
@@ -97,7 +97,8 @@ function drawStage() {
   drawMarks();
 }
 
-// A surface that heats is drawn in a colour: hot, or cold beside a hotter one; dashes slide with it. Returns whether it does either.
+// Sets the style of a side or an obstacle: thermal ones have a colour, hot or (beside a hotter one) cold; sliding ones have dashes that
+// move. Returns whether it is thermal or slides.
 const actsOn = law => !!(law && (law.temperature || law.surface_velocity));
 const laws = () => [...film.sides, ...film.laws.obstacle, ...film.laws.wall];
 const slides = () => laws().some(law => law?.surface_velocity);
@@ -139,7 +140,7 @@ function drawGround() {
       ground.stroke(new Path2D(`M${across(a + dx)},${up(b + dy)}L${across(c + dx)},${up(d + dy)}`));
     }));
   });
-  // The sides, dashed where they are periodic; what heats or slides has a band outside.
+  // The sides are dashed where they are periodic. Thermal and sliding sides have a band outside.
   copies([x0, x1], [y0, y1], (dx, dy) => {
     const left = across(x0 + dx), right = across(x1 + dx), bottom = up(y0 + dy), top = up(y1 + dy);
     [[left, bottom, left, top], [right, bottom, right, top], [left, bottom, right, bottom], [left, top, right, top]].forEach(([a, b, c, d], k) => {
@@ -158,7 +159,7 @@ function drawGround() {
   ground.setLineDash([]);
 }
 
-// What is seen of the room and of its periodic images: left, top, right, bottom.
+// Left, top, right and bottom of the visible part of the box and of its periodic images [pixels].
 function seenBox() {
   const [x0, y0] = film.lower, [width, height] = film.edges, [wrapX, wrapY] = film.periodic;
   return [wrapX ? 0 : Math.max(0, across(x0)), wrapY ? 0 : Math.max(0, up(y0 + height)),
@@ -177,11 +178,11 @@ function inBox(brush, action) {
 
 // ---------- disks ----------
 
-// Pixel by pixel into an array: far faster than thousands of arcs. Species are plain, or striped where there is room for it:
-// across (1), upright (2), both (3). Between the stripes the paper shows.
+// Disks are drawn pixel by pixel into an array, which is far faster than thousands of arcs. The disks of a species are plain, or striped
+// if they are large enough: across (1), upright (2) or both (3). The ground shows between the stripes.
 const SMALLEST_PATTERN = 3.5, PATTERNS = [0, 1, 2, 3];
 const isStriped = (kind, radius) => PATTERNS[kind % PATTERNS.length] > 0 && radius >= SMALLEST_PATTERN * page.dots;
-const bare = share => share - Math.floor(share) > 0.66;  // of the period of the stripes
+const bare = share => share - Math.floor(share) > 0.66;  // the last third of a period is without colour
 
 function drawDisks() {
   const code = codesNow(state.colour), [width, height] = film.edges, wraps = film.periodic.some(Boolean);
@@ -213,7 +214,8 @@ function drawDisk(x, y, radius, colour, stripes, [left, top, right, bottom]) {
   }
 }
 
-// A pixel, so far `old`, on the rim of a disk: beside other disks the colours are mixed, what they cover adds up.
+// The new value of a pixel `old` on the rim of a disk, of which the disk covers a part (0 to 255). Colours of several disks are mixed,
+// and their parts are added.
 function painted(old, colour, covered) {
   const there = old >>> 24;
   if (there === 0) return colour & 0xffffff | covered << 24;
@@ -239,7 +241,7 @@ function drawMarks() {
   });
 }
 
-// A radius of each disk that is large enough for one shows its orientation.
+// Draws a radius at the orientation of each disk that is large enough.
 const LEAST_TO_TURN = 2;
 function drawRadii() {
   marks.strokeStyle = ink.stage;
@@ -257,7 +259,7 @@ function drawRadii() {
   marks.stroke();
 }
 
-// Where a disk was lately, the older part pale, dotted where the path is not known.
+// Draws the recent path of a disk. The older part is pale, and paths without an event log are dotted.
 function drawTrace(i) {
   const [old, recent] = [300, 30].map(k => frameTime(moment.frame - k));
   for (const [from, to, colour, width] of [[old, recent, ink.soft, 0.9], [recent, moment.shown, ink.ink, 1.6]]) {
@@ -269,7 +271,7 @@ function drawTrace(i) {
   ring(X[i], Y[i], Math.max(radii[sizeOf[i]], 3 * page.dots) + 2 * page.dots);
 }
 
-// The free flights of the disks to their next contact, and where they will be then.
+// Draws the free flights of the partners of the next event, and their positions at that time.
 function drawNextEvent() {
   const [when, ...both] = source.coming().next[0] ?? [], after = when - moment.time, g = film.gravity;
   marks.strokeStyle = ink.accent;
@@ -291,7 +293,7 @@ function ring(x, y, radius) {
   });
 }
 
-// A flight through periodic sides shows in each image of the box.
+// Draws flights; those through periodic sides appear in each image of the box.
 function drawPath(list, colour, width) {
   marks.strokeStyle = colour;
   marks.lineWidth = width * page.dots;
@@ -310,7 +312,7 @@ function drawPath(list, colour, width) {
   marks.stroke();
 }
 
-// The longest arrow of a usual speed is as long as disks are apart.
+// The arrow of a usual speed is as long as the mean distance of disks.
 function drawArrows() {
   const usual = film.scales.speed[1], apart = Math.sqrt(film.edges[0] * film.edges[1] / Math.max(10, disks));
   const length = apart * view.unit / usual / Math.sqrt(camera.zoom);
@@ -328,7 +330,7 @@ function drawArrows() {
       marks.lineTo(x - head * (vx - 0.5 * vy), y - head * (vy + 0.5 * vx));
     });
   }
-  for (const [colour, width] of [[ink.stage, 3.2], [ink.ink, 1.4]]) {  // with a rim, to be seen on dark disks, too
+  for (const [colour, width] of [[ink.stage, 3.2], [ink.ink, 1.4]]) {  // with a light rim, so that arrows can be seen on dark disks
     marks.strokeStyle = colour;
     marks.lineWidth = width * page.dots;
     marks.lineCap = marks.lineJoin = 'round';
@@ -336,7 +338,7 @@ function drawArrows() {
   }
 }
 
-// In disks that have the room, else beside them.
+// Draws the ids of disks inside them, or beside them if they are too small.
 function drawNumbers() {
   const code = codesNow(state.colour), least = 7 * page.dots;
   marks.textAlign = 'center';

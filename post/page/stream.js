@@ -1,13 +1,13 @@
-// ---------- a run of the laboratory: frames as a worker makes them ----------
+// ---------- a run of the laboratory: frames from a worker ----------
 
-// The page draws the newest frame; those before are kept, as far as there is room, to go back to. A film that has been gone
-// back in plays until it is where the worker is, which goes on then.
-const PAST_ROOM = 6e7, HEAD = 6, MOST_CURVE = 3000;  // bytes of frames; numbers before the places; samples of a plot
+// The page draws the newest frame. Earlier frames are kept up to a limit of memory, so that the user can go back. After going back the
+// film plays the kept frames first, and the worker continues afterwards.
+const PAST_ROOM = 6e7, HEAD = 6, MOST_CURVE = 3000;  // memory for frames [bytes]; numbers before the positions of a message; samples of a plot
 const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, numbers: {}, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
 
 function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSON.stringify(wish)); }
 
-// A worker of its own for a wish; what it says.
+// Starts a worker for a request and handles its messages.
 function talk(wish, heard) {
   const socket = Object.assign(new WebSocket(new URL('ws', location.href.replace(/^http/, 'ws'))), { binaryType: 'arraybuffer', leave() { this.onclose = null; this.close(); } });
   socket.onopen = () => socket.send(JSON.stringify(wish));
@@ -19,7 +19,7 @@ function talk(wish, heard) {
 function starts(on) { document.documentElement.classList.toggle('starting', on); }
 const isStarting = () => document.documentElement.classList.contains('starting');
 
-// The run that the laboratory wishes, on the same line for all runs of this film.
+// Starts the run that the laboratory requests, over the same connection as earlier runs of this film.
 function start(run) {
   const same = stream.wish?.input === run.input, wish = { do: 'start', ...run, pace: same ? stream.sent : null, playing: !parent.isPaused() };
   if (!same) [stream.sent, usual] = [0, usual || !!stream.wish];
@@ -33,7 +33,7 @@ function start(run) {
   });
 }
 
-// The next run has another worker: this one finds no place for its disks, or not soon.
+// Gives up a worker that cannot place its disks soon. The next run has another one.
 function leave() { stream.socket.leave(); }
 
 const hear = {
@@ -48,7 +48,7 @@ const hear = {
       refresh();
       return;
     }
-    stream.scene = { facts, blocks, run };  // it is shown with its first frame
+    stream.scene = { facts, blocks, run };  // the scene is shown together with its first frame
   },
   numbers(news) {
     const { curves } = stream, { time } = news;
@@ -70,11 +70,11 @@ const hear = {
     if (!state.playing && source) show(moment.time, true);
   },
   state({ playing, ended }) {
-    if (isStarting()) return;  // that is said of the run before
+    if (isStarting()) return;  // the message is about the run before
     stream.ended = ended;
     if (!playing && state.playing && stream.live && past.length) play(false);
   },
-  problems({ change }) { if (!change) starts(false); },  // a change that cannot be was one of the run before
+  problems({ change }) { if (!change) starts(false); },  // a refused change belongs to the run before
   gone: () => starts(false),
 };
 
@@ -87,7 +87,7 @@ function open({ facts, blocks, run }) {
   source = fromWorker;
 }
 
-// Gases are heated and cooled, and disks that rest are set in motion.
+// Adapts the scale of speeds when a gas has been heated or cooled, or when resting disks begin to move.
 function fitScales(mean) {
   const [, top] = film.scales.speed, rest = VX.filter((vx, i) => vx === 0 && VY[i] === 0).length / disks;
   if ((rest > RESTING && rest < 1) === film.speeds.rest && !(mean > 0.8 * top) && !(mean && mean < 0.1 * top && !film.speeds.rest)) return;
@@ -108,10 +108,10 @@ function take(buffer) {
   const head = new Float64Array(buffer, 0, HEAD), pairs = from => new Float32Array(buffer, 8 * HEAD + 8 * from * disks, 2 * disks);
   const frame = { time: head[0], collisions: head[1], sides: [...head.slice(2)], place: pairs(0), velocity: pairs(1) };
   if (film.turning) frame.angle = new Float32Array(buffer, 8 * HEAD + 16 * disks, disks);
-  // Frames are so dense that no disk crosses half of the box between two.
+  // No disk crosses half of the box between two frames, because they are so close.
   cross(frame, ({ place }, k) => film.periodic[k % 2] ? Math.round((place[k] - frame.place[k]) / film.edges[k % 2]) : 0);
   const isFirst = !past.length, follows = stream.live && moment.time === past.at(-1)?.time;
-  if (past.at(-1)?.time === frame.time) past.pop();  // as of the start, and of a change
+  if (past.at(-1)?.time === frame.time) past.pop();  // a start and a change repeat a time
   past.push(frame);
   while (past.length > 2 && past.length * buffer.byteLength > PAST_ROOM) past.shift();
   stream.fresh++;
@@ -119,7 +119,7 @@ function take(buffer) {
     document.documentElement.classList.remove('empty');
     origins = frame.place;
     const squares = Array.from({ length: disks }, (_, i) => frame.velocity[2 * i] ** 2 + frame.velocity[2 * i + 1] ** 2).filter(Boolean);
-    setTop(1.5 * Math.sqrt(2 * squares.reduce((sum, one) => sum + one, 0) / squares.length) || 1);  // of those that move
+    setTop(1.5 * Math.sqrt(2 * squares.reduce((sum, one) => sum + one, 0) / squares.length) || 1);  // mean over the disks that move
     move(frame.time);
     begin();
     refresh();
@@ -128,7 +128,7 @@ function take(buffer) {
   if (!state.playing) drawn();
 }
 
-// Each frame is answered: the worker is never more than two ahead.
+// The page confirms each frame, so that the worker is never more than two frames ahead.
 function drawn() { for (; stream.fresh > 0; stream.fresh--) send({ do: 'got' }); }
 
 const fromWorker = {
@@ -148,8 +148,8 @@ const fromWorker = {
     stream.live = moment.time === last();
     if (stream.live) send({ do: 'play' });
   },
-  rest() { send({ do: 'pause' }); if (stream.live) show(last(), true); },  // and so with what comes until it is heard
-  // One step beyond what is there is the worker's.
+  rest() { send({ do: 'pause' }); if (stream.live) show(last(), true); },  // the newest frame is shown
+  // A step beyond the last frame is computed by the worker.
   goOn(what) {
     play(false);
     if (what === 'step' && moment.time !== last()) return false;
@@ -173,9 +173,9 @@ const fromWorker = {
   },
 };
 
-// ---------- a part of the laboratory ----------
+// ---------- a film inside the laboratory ----------
 
-// What the laboratory asks its films for, which stand side by side.
+// The functions that the laboratory calls in its films.
 function inside() { return { film, source, state, moment, kinds, stream, overlaid }; }
 
 function overlay(list) {
@@ -194,7 +194,7 @@ function choices(wish) {
   return { pace, speed: $('pace').value, state: { colour, arrows, sofar, total } };
 }
 
-// From the start of what is kept, as long as another run starts beside it.
+// Plays again from the first kept frame, while another run starts beside this one.
 function replay() {
   if (!film) return;
   show(first(), true);
@@ -203,7 +203,7 @@ function replay() {
   play(true);
 }
 
-// A box among others, with room for the stage of `size`; none: a page of its own.
+// Shows the film as one of several boxes with a stage of `size`, or without `size` as the whole page.
 let boxSize = null;
 function arrange(size, bare) {
   boxSize = size;
@@ -212,7 +212,7 @@ function arrange(size, bare) {
   layout();
 }
 
-// Measured values of a scan and their errors against the variable, as far as they are there.
+// Plots the measured values of a scan with their errors against the variable.
 function showScan({ x: variable, y: measured, log, points, values }) {
   const canvas = $('curve'), scaled = value => log ? Math.log10(value) : value;
   $('scan').hidden = false;
