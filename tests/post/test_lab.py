@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from ricochet import Simulation, lab as module
-from ricochet.pages.worker import AHEAD, pressure_between, sampled
+from ricochet.pages.worker import FRAMES_AHEAD, pressure_between, sampled
 from synthetic_run import ROOT, run_script
 from whole_runs import PATIENCE, wait_for
 
@@ -186,12 +186,12 @@ def test_a_page_that_draws_slowly_lets_nothing_pile_up(address):
             frames = 0
             with suppress(TimeoutError):
                 async with asyncio.timeout(None) as limit:
-                    while frames <= AHEAD:
+                    while frames <= FRAMES_AHEAD:
                         message = await one.socket.receive()
                         frames += message.type == aiohttp.WSMsgType.BINARY
-                        if frames == AHEAD:
+                        if frames == FRAMES_AHEAD:
                             limit.reschedule(asyncio.get_running_loop().time() + 2)
-            assert frames == AHEAD
+            assert frames == FRAMES_AHEAD
             await one.say("got")
             await one.until("frame")
 

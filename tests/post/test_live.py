@@ -10,7 +10,7 @@ import urllib.request
 import numpy as np
 import pytest
 
-from ricochet.pages.live import LOOK
+from ricochet.pages.live import CHECK_INTERVAL
 from synthetic_run import ROOT, run_script, write_run
 from whole_runs import PATIENCE, frames_in, wait_for, write_input
 
@@ -94,7 +94,7 @@ def test_the_show_ends_with_the_run_and_says_so(live, browser, tmp_path, capsys,
     part, left = tmp_path / "gas.h5.part", tmp_path / "gas.h5"
     if seen:
         opened(browser, address)
-    time.sleep(4 * LOOK)
+    time.sleep(4 * CHECK_INTERVAL)
     assert show.poll() is None
     if how == "has ended":
         part.rename(left)  # as a run does at its end

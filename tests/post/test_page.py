@@ -14,7 +14,7 @@ from PIL import Image
 import player
 from ricochet import Simulation
 from ricochet.pages.lab import form
-from ricochet.pages.worker import DISKS, told
+from ricochet.pages.worker import DISKS, setting_lines
 from ricochet.running.program import ProgramError
 from synthetic_run import ROOT
 from whole_runs import PATIENCE, wait_for
@@ -217,7 +217,7 @@ def test_a_text_at_a_slider_is_the_value_that_runs_or_waits_with_one_message(ope
         plain = text.strip().replace(",", ".")
         wish = good | {key: f"0,{plain}" if key == "box.gravity" else plain}
         try:
-            with Simulation._of(path.read_text(), told(wish)) as trial:
+            with Simulation._of(path.read_text(), setting_lines(wish)) as trial:
                 fine = trial.n_disks <= DISKS
         except ProgramError:
             fine = False
@@ -234,7 +234,7 @@ def test_a_text_at_a_slider_is_the_value_that_runs_or_waits_with_one_message(ope
         wait_for(lambda: opened.run("return window.kept"))
         with (
             Simulation(opened.run("return window.kept")) as there,
-            Simulation._of(path.read_text(), told(good)) as expected,
+            Simulation._of(path.read_text(), setting_lines(good)) as expected,
         ):
             assert there.parameters == expected.parameters, text
 
@@ -353,5 +353,5 @@ def test_everything_has_a_name_and_nothing_is_covered_or_too_wide(opened, size):
     assert names == []
     values = "return [...document.querySelectorAll('[type=range]')].map(one => one.ariaValueText)"
     assert all(" from " in text for text in opened.run(values))
-    told = opened.run("return filmOf(current()).document.getElementById('stage').ariaLabel")
-    assert "1000 gas" in told and "coloured by speed" in told
+    label = opened.run("return filmOf(current()).document.getElementById('stage').ariaLabel")
+    assert "1000 gas" in label and "coloured by speed" in label

@@ -1,8 +1,8 @@
-"""The laboratory: pages of a browser, and the processes that simulate for them.
+"""The laboratory: the server of its pages, and the worker processes that simulate for them.
 
-Each run, and each scan, has a socket with a worker behind it (`ricochet.worker`), which ends with
-the socket.  One worker more is always ready, so that nobody waits until Python has started.  There
-is one list of all of them; the kernel ends those of a laboratory that is killed.
+Each run and each scan has a socket and a worker process (`ricochet.worker`), which ends with the
+socket.  A spare worker is always ready, so that a page need not wait for Python to start.  If the
+laboratory is killed, the kernel ends its workers.
 """
 
 import asyncio
@@ -20,20 +20,20 @@ from aiohttp import web
 from ..reading.files import RunError
 from ..running.program import find_program, value_text
 
-RUNS = 24  # at a time, of all pages
-GRACE = 3.0  # seconds, after which a worker that has been asked to end is forced to
-ENDED = b"No answer: the laboratory has ended."  # why a socket closes: 123 bytes at most
+RUNS = 24  # largest number of runs of all pages at a time
+GRACE = 3.0  # time after which a worker that has been asked to end is killed [s]
+ENDED = b"No answer: the laboratory has ended."  # reason of a closed socket, at most 123 bytes
 DIED = b"It has ended: it needs more memory than it may have here (fewer disks do), or was killed."
 NAME = re.compile(r"[\w.-]{1,200}")  # name of a variable or a group
 
 
-# --- inputs, as the program understands them ---
+# --- inputs, as the program parses them ---
 
 
 def printed(*words: str | Path) -> object:
     """Return the JSON that the program prints; problems with the input are ignored."""
-    said = subprocess.run([find_program(), *words], capture_output=True, text=True, check=False)
-    return json.loads(said.stdout or "[]")
+    done = subprocess.run([find_program(), *words], capture_output=True, text=True, check=False)
+    return json.loads(done.stdout or "[]")
 
 
 def form(path: Path) -> dict:
@@ -76,8 +76,8 @@ class Lab:
 
     # --- processes ---
 
-    async def begun(self) -> Process:
-        """A new worker."""
+    async def start_worker(self) -> Process:
+        """Start a worker process."""
         pipe = subprocess.PIPE
         worker = await asyncio.create_subprocess_exec(
             *self.command, stdin=pipe, stdout=pipe, limit=1 << 24
@@ -90,10 +90,10 @@ class Lab:
     def prepare(self) -> None:
         """Start a worker in advance."""
         if not (self.spare or self.closed):
-            self.spare = asyncio.create_task(self.begun())
+            self.spare = asyncio.create_task(self.start_worker())
 
     async def worker(self) -> Process:
-        """One that is ready, or will be soon; the next is prepared."""
+        """Return the spare worker, and start the next one."""
         self.prepare()
         task, self.spare = self.spare, None
         if task is None:
@@ -102,11 +102,11 @@ class Lab:
         self.prepare()
         if is_alive(worker):
             return worker
-        self.workers.discard(worker)  # something has killed it
+        self.workers.discard(worker)  # it was killed from outside
         return await self.worker()
 
     async def end(self, worker: Process) -> None:
-        """It is not needed any more."""
+        """End a worker."""
         terminate(worker)
         try:
             async with asyncio.timeout(GRACE):
@@ -117,7 +117,7 @@ class Lab:
         self.workers.discard(worker)
 
     async def close(self) -> None:
-        """End everything."""
+        """End all workers."""
         self.closed = True
         if self.spare:
             with suppress(OSError, asyncio.CancelledError):
@@ -127,7 +127,7 @@ class Lab:
     # --- runs ---
 
     async def socket(self, request: web.Request) -> web.StreamResponse:
-        """A run of a page, as long as its socket is open."""
+        """Handle the socket of a run; the run lasts as long as the socket is open."""
         if self.runs >= RUNS:
             raise RunError(f"{RUNS} runs are open, which is all that can be: close a page")
         self.runs += 1
@@ -135,33 +135,33 @@ class Lab:
         try:
             worker = await self.worker()
             await socket.prepare(request)
-            await self.converse(worker, socket)
+            await self.pass_requests(worker, socket)
         finally:
             if worker:
                 await self.end(worker)
             self.runs -= 1
         return socket
 
-    async def converse(self, worker: Process, socket: web.WebSocketResponse) -> None:
-        """Until the page leaves, or the worker has ended."""
-        listening = asyncio.create_task(self.listen(worker, socket))
+    async def pass_requests(self, worker: Process, socket: web.WebSocketResponse) -> None:
+        """Pass requests of a page to its worker until the page leaves or the worker has ended."""
+        answers = asyncio.create_task(self.pass_answers(worker, socket))
         try:
             async for message in socket:
                 try:
-                    wish = self.allowed(json.loads(message.data))
+                    query = self.allowed(json.loads(message.data))
                 except (RunError, OSError) as problem:
-                    await say(socket, wrong(problem))
+                    await send(socket, refusal(problem))
                 except (AttributeError, LookupError, RecursionError, TypeError, ValueError):
-                    await say(socket, {"is": "state", "reason": "not understood"})
+                    await send(socket, {"is": "state", "reason": "not understood"})
                 else:
-                    with suppress(ConnectionError, RuntimeError):  # it may have ended
-                        worker.stdin.write(json.dumps(wish).encode() + b"\n")
+                    with suppress(ConnectionError, RuntimeError):  # the worker may have ended
+                        worker.stdin.write(json.dumps(query).encode() + b"\n")
                         await worker.stdin.drain()
         finally:
-            listening.cancel()
+            answers.cancel()
 
-    async def listen(self, worker: Process, socket: web.WebSocketResponse) -> None:
-        """Pass on what a worker says; the socket closes with it, and says why."""
+    async def pass_answers(self, worker: Process, socket: web.WebSocketResponse) -> None:
+        """Pass answers of a worker to its page; close the socket with a reason when it ends."""
         with suppress(asyncio.IncompleteReadError, ConnectionError):
             while True:
                 kind, length = struct.unpack(">cI", await worker.stdout.readexactly(5))
@@ -169,26 +169,26 @@ class Lab:
                 await (socket.send_bytes(body) if kind == b"b" else socket.send_str(body.decode()))
         await socket.close(message=ENDED if self.closed else DIED)
 
-    def allowed(self, wish: dict) -> dict:
+    def allowed(self, query: dict) -> dict:
         """Return a request of a page with the text of its input, after checking it.
 
         Raises LookupError, TypeError or ValueError if it is malformed.
         """
-        if wish["do"] not in ("start", "scan"):
-            return wish
-        name, settings, added = (wish[word] for word in ("input", "settings", "added"))
+        if query["do"] not in ("start", "scan"):
+            return query
+        name, settings, added = (query[word] for word in ("input", "settings", "added"))
         text = self.inputs[name].read_text(encoding="utf-8", errors="surrogateescape")
         for kind, label in added:
             if kind not in self.table or not NAME.fullmatch(label):
                 raise RunError(f"no group can be called {kind} {label}")
             text = f"{text.rstrip()}\n\n&{kind}\n  name = {value_text('name', label)}\n/\n"
-        scanned = [(wish["variable"], one) for one in wish.get("values", ())]
+        scanned = [(query["variable"], one) for one in query.get("values", ())]
         for key, value in [*settings.items(), *scanned]:
             if not NAME.fullmatch(key) or not value.isprintable():
                 raise RunError(f"{key!r:.80} and {value!r:.80}: no variable and its value")
             if key.lower().endswith("file"):
                 self.allow(value)
-        return wish | {"text": text}
+        return query | {"text": text}
 
     def allow(self, file: str) -> None:
         """Refuse a starting file outside the folders of the inputs."""
@@ -197,10 +197,10 @@ class Lab:
             raise RunError(f"{file}: lies elsewhere; start the laboratory with --files FOLDER")
 
 
-async def say(socket: web.WebSocketResponse, news: dict) -> None:
-    """Tell a page something, if it is still there."""
+async def send(socket: web.WebSocketResponse, message: dict) -> None:
+    """Send a message to a page, if it is still there."""
     with suppress(ConnectionError):
-        await socket.send_json(news)
+        await socket.send_json(message)
 
 
 def terminate(worker: Process) -> None:
@@ -220,7 +220,7 @@ def is_alive(worker: Process) -> bool:
     return False
 
 
-def wrong(problem: object) -> dict:
+def refusal(problem: object) -> dict:
     """Return the answer to a request that is refused."""
     lines = [{"place": "", "text": str(problem)}]
     return {"is": "problems", "change": False, "problems": lines}

@@ -1,16 +1,16 @@
-"""The process behind a page of the laboratory: one simulation, and frames of it as they are made.
+"""The worker process behind a page of the laboratory: it simulates and sends frames.
 
-It is told what to do by lines of JSON on its input, and answers on its output: a letter, the length
-as four bytes, and a text in JSON (t) or a frame (b).  Texts are named by `is`: scene (what stays
-as it is in a picture), numbers, events (to come), state, problems, file, scan.  A page has two
-frames that it has not drawn (`got`) at most.
+Requests are lines of JSON on standard input.  Answers on standard output consist of a letter, the
+length in four bytes, and a text in JSON (t) or a frame (b).  The key `is` names the kind of a text:
+scene (the constant part of a picture), numbers, events (the next ones), state, problems, file,
+scan.  At most two frames are sent that the page has not confirmed as drawn (`got`).
 
-A frame has, in this order and in the byte order of the machine: time, collisions per disk and the
-places of the left, right, bottom and top side as 8-byte floats; then as 4-byte floats x and y of
-all disks, their velocities, and their angles if they turn.
+A frame contains, in this order and in the byte order of the machine: time, collisions per disk and
+the positions of the left, right, bottom and top side as 8-byte floats; then as 4-byte floats x and
+y of all disks, their velocities, and their angles if they rotate.
 
-Whatever is changed on the way is changed at a time that has been reached with all its events, so
-that `script` can do the same again, to the last bit.
+A change is applied at a time at which all events are complete, so that `script` repeats the run
+bit for bit.
 """
 
 import base64
@@ -43,46 +43,47 @@ from ..running.simulation import NEVER, Simulation
 DISKS = 20000  # largest number of disks
 MEMORY = 2 << 30  # bytes of a process
 INTERVAL = 1 / 60  # s between two frames
-SLICE = 0.012  # s that the engine may take before it looks up
-AHEAD = 2  # frames that the page has not drawn yet
-SPEAK = 0.1  # s between two messages with numbers
-FEW = 20  # disks whose events to come are told
-COMING = 6  # number of next events that are shown
-WAY = 0.2  # share of the box beyond a piston that is shown
-FEWEST = 40  # samples of a mean with an error
-MOST = 4000  # samples that are kept
-LOOKS, SOME = 160, 1000  # samples for a value of a scan; disks of a run whose collisions are enough
-LONGEST = 4.0  # s that they may take
-COUNTED = ("collisions", "dissipated_energy")  # since the start
+SLICE = 0.012  # s that the engine may advance before requests are read
+FRAMES_AHEAD = 2  # frames that the page need not have drawn yet
+NUMBERS_INTERVAL = 0.1  # s between two messages with numbers
+FEW_DISKS = 20  # largest number of disks whose next events are sent
+EVENTS_SENT = 6  # number of next events that are shown
+PISTON_MARGIN = 0.2  # region beyond a piston that is shown [largest edge of the box]
+FEWEST = 40  # smallest number of samples of a mean with an error
+MOST_SAMPLES = 4000  # largest number of samples that are kept
+SCAN_SAMPLES = 160  # samples of a value in a scan
+SCAN_EVENTS = 1000  # smallest number of events in four intervals of samples
+SCAN_SECONDS = 4.0  # s that a value in a scan may take
+COUNTED = ("collisions", "dissipated_energy")  # observables that count from the start
 TURNS = "angular_velocity"
 ENDINGS = {"input": ".nml", "script": ".py", "output": ".h5.part"}
 UNREAD = bytearray()  # the start of an incomplete line
-DEATH = 1  # prctl's PR_SET_PDEATHSIG
+PR_SET_PDEATHSIG = 1  # option PR_SET_PDEATHSIG of prctl
 
 
-class Bench:
-    """A simulation, and the speed at which it is shown."""
+class Session:
+    """A simulation, and the pace at which it advances for a page."""
 
-    def __init__(self, pictured: Callable[[Run], tuple[dict, dict]]) -> None:
-        """Take the function that returns the constant part of a picture: facts and arrays."""
-        self.pictured = pictured
+    def __init__(self, describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
+        """Take the function that describes the constant part of a picture: facts and arrays."""
+        self.describe_scene = describe_scene
         self.simulation: Simulation | None = None
         self.playing, self.ended, self.reason = False, False, ""
         self.pace = 0.0  # simulated time per second
-        self.due = self.spoken = time.perf_counter()
-        self.unseen = 0  # frames on the way to the page
-        self.actions: list[tuple] = []  # since the start: time, what, value as told, and exactly
-        self.samples: deque[tuple[float, ...]] = deque(maxlen=MOST)
-        self.happened: tuple | None = None
+        self.due = self.numbers_sent = time.perf_counter()
+        self.unconfirmed = 0  # frames that the page has not confirmed
+        self.actions: list[tuple] = []  # changes: time, kind, value as requested, exact value
+        self.samples: deque[tuple[float, ...]] = deque(maxlen=MOST_SAMPLES)
+        self.last_event: tuple | None = None
         self.goal: tuple[float, int, int] | None = None  # the end of a step that is in progress
 
-    # --- what it is told ---
+    # --- requests ---
 
-    def start(self, wish: dict) -> None:
-        """Replace the simulation by another one, if its input is accepted."""
-        pace = max(0.0, float(wish["pace"] or 0.0))
+    def start(self, request: dict) -> None:
+        """Start another simulation in place of the present one, if its input is accepted."""
+        pace = max(0.0, float(request["pace"] or 0.0))
         try:
-            other = Simulation._of(wish["text"], told(wish["settings"]))
+            other = Simulation._of(request["text"], setting_lines(request["settings"]))
             if other.n_disks > DISKS:
                 raise ProgramError(f"{other.n_disks} disks; here a run may have {DISKS}", 2)
         except (ProgramError, ValueError) as problem:
@@ -90,18 +91,18 @@ class Bench:
             return
         if self.simulation:
             self.simulation.close()
-        self.simulation, self.wish, self.initial, self.pace = other, wish, other.input, pace
+        self.simulation, self.request, self.initial, self.pace = other, request, other.input, pace
         self.actions, self.ended, self.reason = [], False, ""
-        self.playing, self.goal = bool(wish["playing"]), None
-        self.unseen = 0
-        self.renew(changed=False)
+        self.playing, self.goal = bool(request["playing"]), None
+        self.unconfirmed = 0
+        self.send_scene(changed=False)
 
-    def renew(self, changed: bool) -> None:
-        """Send the present scene; something other than positions and velocities has changed."""
-        run = self.run = pictured_run(self.simulation)
+    def send_scene(self, changed: bool) -> None:
+        """Send the present scene, after a start or a change."""
+        run = self.run = snapshot_run(self.simulation)
         self.settles = run.nature.in_equilibrium
         self.samples.clear()
-        facts, blocks = self.pictured(run)
+        facts, blocks = self.describe_scene(run)
         letters = {name: base64.b64encode(block).decode() for name, block in blocks.items()}
         speed = run.speed(0)
         facts |= {
@@ -110,24 +111,24 @@ class Bench:
             "turning": TURNS in run.disk_data,
             "stepped": bool(run.time_step),
         }
-        scene = {"is": "scene", "changed": changed, "run": self.wish.get("run")}
-        tell(scene | {"facts": facts, "blocks": letters})
-        self.show()
-        self.speak()
-        self.tell_state()
+        scene = {"is": "scene", "changed": changed, "run": self.request.get("run")}
+        send_json(scene | {"facts": facts, "blocks": letters})
+        self.send_frame()
+        self.send_numbers()
+        self.send_state()
 
-    def change(self, wish: dict) -> None:
-        """Change what acts on the disks from now on."""
-        settings = wish["settings"]
-        self.act("change", settings, lambda: self.simulation._change(told(settings)))
+    def change(self, request: dict) -> None:
+        """Change variables of the running simulation."""
+        settings = request["settings"]
+        self.apply("change", settings, lambda: self.simulation._change(setting_lines(settings)))
 
-    def heat(self, wish: dict) -> None:
-        """Multiply all velocities."""
-        factor = float(wish["factor"])
-        self.act("heat", factor, lambda: speed_up(self.simulation, factor))
+    def heat(self, request: dict) -> None:
+        """Multiply all velocities by a factor."""
+        factor = float(request["factor"])
+        self.apply("heat", factor, lambda: scale_velocities(self.simulation, factor))
 
-    def act(self, what: str, value: object, change: Callable[[], object]) -> None:
-        """Do something at a time that another run can reach exactly."""
+    def apply(self, what: str, value: object, change: Callable[[], object]) -> None:
+        """Apply a change at a time that another run can reach exactly."""
         try:
             now = self.simulation._settle()
             change()
@@ -139,49 +140,49 @@ class Bench:
             known = self.simulation._values()
             exact = {name: known.get(name) for name in value}
         self.actions.append((now, what, value, exact))
-        self.renew(changed=True)
+        self.send_scene(changed=True)
 
     def play(self, _: dict) -> None:
         """Continue."""
         self.playing, self.goal, self.due = True, None, time.perf_counter()
-        self.tell_state()
+        self.send_state()
 
     def pause(self, _: dict) -> None:
         """Pause."""
         self.playing, self.goal = False, None
-        self.speak()
-        self.tell_state()
+        self.send_numbers()
+        self.send_state()
 
-    def set_pace(self, wish: dict) -> None:
+    def set_pace(self, request: dict) -> None:
         """Set how much simulated time passes in a second."""
-        self.pace = max(0.0, float(wish["pace"]))
+        self.pace = max(0.0, float(request["pace"]))
 
     def got(self, _: dict) -> None:
         """Note that the page has drawn a frame."""
-        self.unseen = max(0, self.unseen - 1)
+        self.unconfirmed = max(0, self.unconfirmed - 1)
 
-    def step(self, wish: dict) -> None:
+    def step(self, request: dict) -> None:
         """Advance by some time, then pause."""
-        if not (more := float(wish["time"])) >= 0:
-            raise ValueError("a step goes on")
+        if not (more := float(request["time"])) >= 0:
+            raise ValueError("a step cannot go back in time")
         self.playing, self.goal = False, (self.simulation.time + more, NEVER, NEVER)
 
-    def event(self, wish: dict) -> None:
+    def event(self, request: dict) -> None:
         """Advance by one event, then pause."""
         coming = [] if self.run.time_step else self.simulation.next_events(1)
         if not coming and not self.run.time_step:
-            self.pause(wish)  # nothing will happen
+            self.pause(request)  # nothing will happen
             return
         self.playing, self.goal = False, (np.inf, NEVER, self.simulation.events + 1)
-        self.happened = coming[0] if coming else None
+        self.last_event = coming[0] if coming else None
 
-    def keep(self, wish: dict) -> None:
+    def keep(self, request: dict) -> None:
         """Send a file of the run: `input`, `script` or `output`."""
-        name, part = self.wish["input"], wish["part"]
+        name, part = self.request["input"], request["part"]
         try:
             end = self.simulation.time if self.ended else self.simulation._settle()
             if part == "output":
-                body = self.saved(f"{name}.h5")
+                body = self.output_file(f"{name}.h5")
             elif part == "script":
                 body = script(name, self.initial, self.actions, end)
             else:
@@ -192,9 +193,9 @@ class Bench:
         if isinstance(body, str):
             body = body.encode(errors="surrogateescape")
         letters = base64.b64encode(body).decode()
-        tell({"is": "file", "name": name + ENDINGS[part], "body": letters})
+        send_json({"is": "file", "name": name + ENDINGS[part], "body": letters})
 
-    def saved(self, name: str) -> bytes:
+    def output_file(self, name: str) -> bytes:
         """Return the output file; signals wait until its folder is removed."""
         ends: list[int] = []  # not blocked: another thread of a library would take the signal
         before = signal.signal(signal.SIGTERM, lambda number, _: ends.append(number))
@@ -206,38 +207,38 @@ class Bench:
             if ends:
                 sys.exit()
 
-    # --- what it does ---
+    # --- advancing and sending ---
 
-    def moves(self) -> bool:
+    def is_advancing(self) -> bool:
         """Whether the simulation should advance now."""
-        ready = self.simulation and not self.ended and self.unseen < AHEAD
+        ready = self.simulation and not self.ended and self.unconfirmed < FRAMES_AHEAD
         return bool(ready and (self.goal or (self.playing and self.pace > 0)))
 
-    def go_on(self) -> None:
-        """Advance to the time of the next frame, or as far as possible in a short while."""
+    def advance(self) -> None:
+        """Advance to the time of the next frame, but for at most `SLICE` seconds."""
         now = time.perf_counter()
         passed, self.due = min(now - self.due, 0.1), now
         stepping = self.goal
         limits = stepping or (self.simulation.time + self.pace * passed, NEVER, NEVER)
         try:
             if self.simulation._go_on(limits, SLICE) and stepping:
-                return  # a step is shown as a whole
+                return  # a step is shown only when it is complete
         except ProgramError as problem:
             self.ended, self.reason = True, str(problem)
         self.goal = None
-        self.show()
-        if self.ended or stepping or now > self.spoken + SPEAK:
-            self.speak()
+        self.send_frame()
+        if self.ended or stepping or now > self.numbers_sent + NUMBERS_INTERVAL:
+            self.send_numbers()
         if self.ended or stepping:
-            self.tell_state()
+            self.send_state()
 
-    def show(self) -> None:
+    def send_frame(self) -> None:
         """Send a frame."""
         run, simulation = self.run, self.simulation
         now = simulation.time
         lower, upper = run.corners_at(now)
         if np.any(lower < run.bounds[0]) or np.any(upper > run.bounds[1]):
-            self.renew(changed=True)
+            self.send_scene(changed=True)
             return
         head = [
             now,
@@ -252,13 +253,13 @@ class Bench:
             parts.append(simulation.orientation)
         body = b"".join(np.asarray(part, dtype=np.float32).tobytes() for part in parts)
         send(b"b", struct.pack("6d", *head) + body)
-        self.unseen += 1
-        if run.n_disks <= FEW and not run.time_step and not self.ended:
-            coming = simulation.next_events(COMING)
-            tell({"is": "events", "next": coming, "happened": self.happened})
-            self.happened = None
+        self.unconfirmed += 1
+        if run.n_disks <= FEW_DISKS and not run.time_step and not self.ended:
+            coming = simulation.next_events(EVENTS_SENT)
+            send_json({"is": "events", "next": coming, "happened": self.last_event})
+            self.last_event = None
 
-    def tell_state(self) -> None:
+    def send_state(self) -> None:
         """Send the state of the simulation, and its changes so far."""
         changes = [
             (when, name, value)
@@ -268,11 +269,11 @@ class Bench:
             )
         ]
         state = {"playing": self.playing, "ended": self.ended, "reason": self.reason}
-        tell({"is": "state", "changes": changes} | state)
+        send_json({"is": "state", "changes": changes} | state)
 
-    def speak(self) -> None:
+    def send_numbers(self) -> None:
         """Send the present energies, and means with errors since the last change."""
-        self.spoken = time.perf_counter()
+        self.numbers_sent = time.perf_counter()
         run, value = self.run, observed(self.simulation)
         now = value["time"]
         energies = {
@@ -289,7 +290,7 @@ class Bench:
             self.samples.append(sample)
         hit = value["collisions"] > 0
         pressure = value["virial_pressure"] if hit else None
-        tell(
+        send_json(
             {"is": "numbers", "time": now, "pressure": pressure, "settles": self.settles}
             | energies
             | means(run, np.array(self.samples).T, value, self.settles)
@@ -300,7 +301,7 @@ class Bench:
 
 
 @dataclass(frozen=True)
-class Pictured(Run):
+class SnapshotRun(Run):
     """The present state of a simulation as a run with one frame and the present observables."""
 
     simulation: Simulation
@@ -313,9 +314,9 @@ class Pictured(Run):
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """The corners of the box, with some room for sides that move."""
+        """The corners of the box, with a margin beyond pistons."""
         way = np.zeros(4)
-        way[[*self.piston_positions]] = WAY * self.edges.max()
+        way[[*self.piston_positions]] = PISTON_MARGIN * self.edges.max()
         lower, upper = Run.bounds.func(self)
         return lower - way[::2], upper + way[1::2]
 
@@ -324,7 +325,7 @@ class Pictured(Run):
         return self.simulation.nature
 
 
-def pictured_run(simulation: Simulation) -> Pictured:
+def snapshot_run(simulation: Simulation) -> SnapshotRun:
     """Return the present state of a simulation as a run."""
     parameters = simulation.parameters
     box, kinds = parameters["box"], parameters["species"]
@@ -332,7 +333,7 @@ def pictured_run(simulation: Simulation) -> Pictured:
     elements = {}
     if "all/rotational_energy" in simulation.observables:
         elements[TURNS] = simulation.angular_velocity[None]
-    return Pictured(
+    return SnapshotRun(
         simulation=simulation,
         path=Path(parameters.get("run", {}).get("title") or "simulation"),
         time=np.array([simulation.time]),
@@ -362,7 +363,7 @@ def observed(simulation: Simulation) -> dict[str, float]:
 
 
 def sampled(count: int, value: dict) -> tuple[float, ...]:
-    """Return the quantities that means are made of: time, kinetic energy, virial, accessible area.
+    """Return the quantities behind all means: time, kinetic energy, virial, accessible area.
 
     The observable `virial_pressure` follows from them.
     """
@@ -379,11 +380,11 @@ def pressure_between(samples: np.ndarray, count: int) -> SeriesMean:
 
 
 def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
-    """Return temperature, mean speed and pressure: value, error, and the value of theory.
+    """Return temperature, mean speed and pressure, each with its error and the value by theory.
 
-    In a run that relaxes to equilibrium they are means since it has relaxed, with the error of the
-    series; otherwise the present values.  The pressure is that between the first and the last
-    sample.
+    In a run that relaxes to equilibrium they are means over the samples in equilibrium, with the
+    error of the series.  In other runs they are present values.  The pressure is that between the
+    first and the last sample.
     """
     time, kt, speed = samples[[0, 4, 5]]
     found = {
@@ -409,7 +410,7 @@ def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
         if (
             run.periodic.all()
             and not run.nature & {"obstacles", "time_stepped"}
-            and run.n_disks > FEW
+            and run.n_disks > FEW_DISKS
         ):
             area = float(np.prod(run.edges))
             eta = float(np.pi * np.sum(run.radius**2)) / area
@@ -420,10 +421,10 @@ def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
     }
 
 
-# --- what it hears and says ---
+# --- messages ---
 
 
-def told(settings: dict[str, str]) -> list[str]:
+def setting_lines(settings: dict[str, str]) -> list[str]:
     """Return GROUP.VARIABLE=VALUE of each setting, as --set expects it."""
     lines = [f"{name}={value}" for name, value in settings.items()]
     if any("\n" in line or "\r" in line for line in lines):
@@ -443,17 +444,17 @@ def problems(reason: Exception) -> list[dict]:
 
 def refuse(reason: Exception, change: bool = False) -> None:
     """Answer with the problems of a request."""
-    tell({"is": "problems", "change": change, "problems": problems(reason)})
+    send_json({"is": "problems", "change": change, "problems": problems(reason)})
 
 
-def speed_up(simulation: Simulation, factor: float) -> None:
+def scale_velocities(simulation: Simulation, factor: float) -> None:
     """Multiply all velocities of a simulation."""
     simulation.velocity = factor * simulation.velocity
 
 
 def script(name: str, text: str, actions: list[tuple], end: float) -> str:
     """Return a script that repeats the run with all its changes, up to a time."""
-    lines = [f'"""What was done with {name} in the laboratory, to the last bit."""', ""]
+    lines = [f'"""The run of {name} in the laboratory with all its changes, bit for bit."""', ""]
     quoted = repr(text) if "\\" in text or '"""' in text else f'"""{text}"""'
     lines += ["from ricochet import Simulation", "", f"INPUT = {quoted}", ""]
     lines += ["with Simulation(INPUT) as simulation:"]
@@ -474,7 +475,7 @@ def send(kind: bytes, body: bytes) -> None:
     sys.stdout.buffer.flush()
 
 
-def tell(message: dict) -> None:
+def send_json(message: dict) -> None:
     """Write one answer as JSON."""
     try:
         text = json.dumps(message, allow_nan=False)
@@ -483,51 +484,53 @@ def tell(message: dict) -> None:
     send(b"t", text.encode())
 
 
-def wishes(wait: float | None) -> list[dict]:
-    """Return the requests that have arrived; wait for the first one so long, None for ever."""
+def requests(wait: float | None) -> list[dict]:
+    """Return the requests that have arrived; wait at most so many seconds, None without limit."""
     if select.select([0], [], [], wait)[0]:
-        news = os.read(0, 1 << 20)
-        if not news:
+        data = os.read(0, 1 << 20)
+        if not data:
             sys.exit()  # the laboratory has ended
-        UNREAD.extend(news)
+        UNREAD.extend(data)
     *lines, rest = UNREAD.split(b"\n")
     UNREAD[:] = rest
     found = list(map(json.loads, lines))
-    starts = [wish for wish in found if wish["do"] == "start"]
-    return [wish for wish in found if wish not in starts[:-1]]  # while one waits, the last counts
+    starts = [request for request in found if request["do"] == "start"]
+    return [one for one in found if one not in starts[:-1]]  # of several starts the last counts
 
 
-def scan(wish: dict) -> None:
+def scan(request: dict) -> None:
     """Simulate some values of one variable; send the result of each, or its problem."""
-    for index, value in enumerate(wish["values"]):
+    for index, value in enumerate(request["values"]):
         try:
-            lines = told(wish["settings"] | {wish["variable"]: value})
-            mean, error = measured(wish["text"], lines, wish["of"])
+            lines = setting_lines(request["settings"] | {request["variable"]: value})
+            mean, error = measure(request["text"], lines, request["of"])
             found = {"mean": mean, "error": error}
         except (ProgramError, ValueError) as problem:
             found = {"problems": problems(problem)}
-        tell({"is": "scan", "index": index} | found)
+        send_json({"is": "scan", "index": index} | found)
 
 
-def measured(text: str, lines: list[str], name: str) -> tuple[float, float | None]:
-    """Return the mean over time of an observable, or the rate of one that counts, with an error.
+def measure(text: str, lines: list[str], name: str) -> tuple[float, float | None]:
+    """Measure the mean over time of an observable, or the rate of one of `COUNTED`, and its error.
 
-    It is taken from the second half of `LOOKS` samples, about half a collision per disk apart.
+    The second half of `SCAN_SAMPLES` samples is used, which are half a collision per disk apart.
     There is an error only if the run relaxes to equilibrium.
     """
     samples, began = [], time.perf_counter()
     with Simulation._of(text, lines) as simulation:
         count, settles = simulation.n_disks, simulation.nature.in_equilibrium
-        step = max(count, SOME) // 4
-        while len(samples) < LOOKS and time.perf_counter() < began + LONGEST:
+        step = max(count, SCAN_EVENTS) // 4
+        while len(samples) < SCAN_SAMPLES and time.perf_counter() < began + SCAN_SECONDS:
             value = observed(simulation)
             samples.append((*sampled(count, value), value[name]))
-            simulation._go_on((np.inf, NEVER, simulation.events + step), LONGEST / LOOKS)
+            simulation._go_on(
+                (np.inf, NEVER, simulation.events + step), SCAN_SECONDS / SCAN_SAMPLES
+            )
     late = np.array(samples[len(samples) // 2 :]).T
     apart = np.diff(late[0])
     if not apart.any():
         raise ValueError("nothing to measure: no collisions, or all of them at one moment")
-    if name == "virial_pressure":  # a mean since the start
+    if name == "virial_pressure":  # the observable is a mean since the start
         one = pressure_between(late, count)
     else:
         gain = np.diff(late[-1]) if name in COUNTED else late[-1][1:] * apart
@@ -535,25 +538,25 @@ def measured(text: str, lines: list[str], name: str) -> tuple[float, float | Non
     return float(one.mean), float(one.error) if settles and np.isfinite(one.error) else None
 
 
-def work(pictured: Callable[[Run], tuple[dict, dict]]) -> None:
+def work(describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
     """Answer requests until the laboratory ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is the laboratory that ends
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the laboratory handles it and ends its workers
     if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(DEATH, signal.SIGTERM)
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    bench = Bench(pictured)
-    does = {"start": bench.start, "scan": scan, "pace": bench.set_pace}
+    session = Session(describe_scene)
+    handlers = {"start": session.start, "scan": scan, "pace": session.set_pace}
     own = ("change", "heat", "play", "pause", "got", "step", "event", "keep")
-    does |= {name: getattr(bench, name) for name in own}
+    handlers |= {name: getattr(session, name) for name in own}
     while True:
         wait = None
-        if bench.moves():
-            wait = max(0.0, bench.due + INTERVAL - time.perf_counter())
-        for wish in wishes(wait):
+        if session.is_advancing():
+            wait = max(0.0, session.due + INTERVAL - time.perf_counter())
+        for request in requests(wait):
             try:
-                if wish["do"] in ("start", "scan") or bench.simulation:
-                    does[wish["do"]](wish)
+                if request["do"] in ("start", "scan") or session.simulation:
+                    handlers[request["do"]](request)
             except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as problem:
-                tell({"is": "state", "reason": f"not understood: {problem}"})
-        if bench.moves() and time.perf_counter() >= bench.due + INTERVAL:
-            bench.go_on()
+                send_json({"is": "state", "reason": f"not understood: {problem}"})
+        if session.is_advancing() and time.perf_counter() >= session.due + INTERVAL:
+            session.advance()
