@@ -239,6 +239,7 @@ function drawMarks() {
     if (film.events) drawNextEvent();
     if (film.exact) drawNumbers();
   });
+  if (state.arrows) drawArrowKey();
 }
 
 // Draws a radius at the orientation of each disk that is large enough.
@@ -313,17 +314,19 @@ function drawPath(list, colour, width) {
 }
 
 // The arrow of a usual speed is as long as the mean distance of disks.
+const arrowScale = () => Math.sqrt(film.edges[0] * film.edges[1] / Math.max(10, disks)) * view.unit / film.scales.speed[1] / Math.sqrt(camera.zoom);
+
 function drawArrows() {
-  const usual = film.scales.speed[1], apart = Math.sqrt(film.edges[0] * film.edges[1] / Math.max(10, disks));
-  const length = apart * view.unit / usual / Math.sqrt(camera.zoom);
+  const length = arrowScale();
   marks.beginPath();
   for (let i = 0; i < disks; i++) {
     const vx = VX[i] * length, vy = -VY[i] * length, size = Math.hypot(vx, vy);
     if (size < 1) continue;
     const head = Math.min(6 * page.dots, 0.5 * size) / size, reach = size / view.unit;
+    const r = radii[sizeOf[i]], hidden = r < 5 * page.dots ? Math.max(head, 1 - r / size) : 1;  // arrows do not cover small disks
     copies([X[i] - reach, X[i] + reach], [Y[i] - reach, Y[i] + reach], (dx, dy) => {
       const x = across(X[i] + dx) + vx, y = up(Y[i] + dy) + vy;
-      marks.moveTo(x - vx, y - vy);
+      marks.moveTo(x - hidden * vx, y - hidden * vy);
       marks.lineTo(x, y);
       marks.lineTo(x - head * (vx + 0.5 * vy), y - head * (vy - 0.5 * vx));
       marks.moveTo(x, y);
@@ -336,6 +339,18 @@ function drawArrows() {
     marks.lineCap = marks.lineJoin = 'round';
     marks.stroke();
   }
+}
+
+// Draws an arrow of a round speed in the upper left corner, as the scale of all arrows.
+function drawArrowKey() {
+  const speed = +film.scales.speed[1].toPrecision(1), size = speed * arrowScale(), { dots } = page, words = `speed ${short(speed)}`;
+  marks.font = `${12 * dots}px system-ui, sans-serif`;
+  Object.assign(marks, { textAlign: 'left', textBaseline: 'middle', fillStyle: ink.card, globalAlpha: 0.85 });
+  marks.fillRect(6 * dots, 6 * dots, size + marks.measureText(words).width + 22 * dots, 22 * dots);
+  Object.assign(marks, { globalAlpha: 1, fillStyle: ink.ink, strokeStyle: ink.ink, lineWidth: 1.4 * dots });
+  const [x, y, head] = [12 * dots + size, 17 * dots, Math.min(6 * dots, 0.5 * size)];
+  marks.stroke(new Path2D(`M${12 * dots},${y}L${x},${y}M${x - head},${y - head / 2}L${x},${y}L${x - head},${y + head / 2}`));
+  marks.fillText(words, x + 6 * dots, y);
 }
 
 // Draws the ids of disks inside them, or beside them if they are too small.

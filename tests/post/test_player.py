@@ -614,3 +614,27 @@ def test_small_disks_far_apart_are_drawn_large_enough_and_the_page_says_so(playi
         browser = playing(still_run(tmp_path / f"{words}.h5", x, radius=radius))
         least, said = browser.run("return [radii[0] / page.dots, $('between').textContent]")
         assert least >= 3 and ("drawn larger" in said) == words
+
+
+def test_the_arrows_of_a_film_have_a_scale(playing, tmp_path, rng):
+    """An arrow of a round speed, as long as one of that speed on a disk, at any zoom."""
+    v = rng.normal(size=(2, 12, 2))
+    observables = {"collisions": np.zeros(2)}
+    path = write_run(tmp_path / "a.h5", 0 * v + 0.5, v, observables=observables)
+    browser = playing(path)
+    for zoom in (1, 4):
+        words, key, speed = browser.run(
+            """camera.zoom = arguments[0]; state.arrows = true; refresh();
+            const words = [], { fillText } = marks;
+            marks.fillText = (text, x) => {
+              if (`${text}`.startsWith("speed")) words.push([text, x / page.dots]);
+            };
+            drawMarks();
+            marks.fillText = fillText;
+            return [words, arrowScale() / page.dots, film.scales.speed[1]];""",
+            zoom,
+        )
+        ((text, x),) = words
+        shown = float(text.removeprefix("speed "))
+        assert shown == pytest.approx(speed, rel=0.5)
+        assert x - 18 == pytest.approx(shown * key, rel=1e-3)
