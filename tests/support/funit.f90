@@ -1,6 +1,6 @@
-!> Runs `.pf` tests where pFUnit is not installed: its rules of comparison, its words, its exit codes.
-!> `translate_pf.py` turns each `@assert` into a call of what is below. Comparisons that pFUnit refuses do not
-!> compile here either: comparisons exist only for combinations of types that pFUnit accepts.
+!> Runs `.pf` tests where pFUnit is not installed, with the same rules of comparison, words and exit codes. `translate_pf.py`
+!> converts each `@assert` to a call of a procedure of this module. Comparisons that pFUnit refuses do not compile here either:
+!> comparisons exist only for combinations of types that pFUnit accepts.
 module funit
   use, intrinsic :: iso_fortran_env, only: error_unit, int32, int64, output_unit, real64
   implicit none
@@ -8,8 +8,8 @@ module funit
   public :: anyexceptions, pf_real, pf_begin, pf_run, pf_finish, pf_fail, pf_check
   public :: pf_conform, pf_unequal, pf_apart, pf_unordered, pf_holds
 
-  integer, parameter :: pf_real = real64      !! the kind in which numbers are compared
-  integer, parameter :: pair_length = 132     !! enough for two numbers; long texts are cut
+  integer, parameter :: pf_real = real64      !! kind in which numbers are compared
+  integer, parameter :: pair_length = 132     !! enough for two numbers; longer texts are cut
   character(len=*), parameter :: pair_format = "(""expected <"",g0,""> actual <"",g0,"">"")"
 
   !> The first difference by the rules of `@assertEqual`; '' if there is none.
@@ -28,19 +28,19 @@ module funit
     module procedure holds_scalar, holds_vector
   end interface pf_holds
 
-  logical :: failed = .false.                 !! the present test
+  logical :: failed = .false.                 !! the present test has failed
   integer :: tests = 0, failures = 0
-  character(len=:), allocatable :: filter     !! only tests whose suite.name contains it
+  character(len=:), allocatable :: filter     !! only tests whose suite.name contains this text are run
   character(len=:), allocatable :: test_name, report
 
 contains
 
-  !> Whether the present test has failed; a helper that asserts is followed by this question.
+  !> Whether the present test has failed. The call of a procedure with assertions is followed by this test.
   logical function anyexceptions()
     anyexceptions = failed
   end function anyexceptions
 
-  !> Reads the one option: `-f text` runs the tests whose names contain the text.
+  !> Reads the only option: `-f text` runs the tests whose names contain the text.
   subroutine pf_begin()
     integer :: length
     character(len=2) :: option
@@ -58,7 +58,7 @@ contains
     call get_command_argument(2, filter)
   end subroutine pf_begin
 
-  !> One test between the file's `@before` and `@after`; the latter runs also after a failure.
+  !> Runs one test between the `@before` and `@after` of the file; the latter also runs after a failure.
   subroutine pf_run(name, test, before, after)
     character(len=*), intent(in) :: name      !! suite.test
     procedure(test_body) :: test
@@ -80,7 +80,7 @@ contains
     end if
   end subroutine pf_run
 
-  !> The report, and exit status 0 or 2. No test at all is a failure too.
+  !> Prints the report and returns the exit status 0 or 2. A file without tests is a failure as well.
   subroutine pf_finish()
     write (output_unit, "(a)") ""
     if (failures == 0 .and. tests > 0) then
@@ -93,7 +93,7 @@ contains
     stop 2
   end subroutine pf_finish
 
-  !> Marks the present test as failed and notes where and why.
+  !> Marks the present test as failed and records the place and the reason.
   subroutine pf_fail(file, line, what, message)
     character(len=*), intent(in) :: file, what
     integer, intent(in) :: line
@@ -107,11 +107,11 @@ contains
     if (what /= "") report = report//"  "//what//nl
   end subroutine pf_fail
 
-  !> A comparison of elements: it fails at the first that is wrong.
+  !> Asserts a comparison of elements; it fails at the first wrong element.
   subroutine pf_check(file, line, what, pairs, message)
     character(len=*), intent(in) :: file, what
     integer, intent(in) :: line
-    character(len=*), intent(in) :: pairs(:)  !! (n) what is wrong with each, in array element order
+    character(len=*), intent(in) :: pairs(:)  !! (n) description of the failure of each element, in array element order
     character(len=*), intent(in), optional :: message
     character(len=12) :: number
     integer :: k
@@ -121,7 +121,7 @@ contains
     call pf_fail(file, line, what//" failed at element "//trim(number)//": "//trim(pairs(k)), message)
   end subroutine pf_check
 
-  !> Arrays of the same shape, or a scalar expected of every element.
+  !> Whether arrays have the same shape, or the expected value is a scalar.
   pure logical function pf_conform(expected, actual)
     integer, intent(in) :: expected(:), actual(:)  !! shapes
     pf_conform = size(expected) == 0
@@ -147,7 +147,7 @@ contains
     if (expected /= actual) write (pair, pair_format) expected, actual
   end function unequal_int64
 
-  !> Infinite values equal themselves; NaN equals nothing.
+  !> Infinite values are equal to themselves; NaN is equal to nothing.
   elemental character(len=pair_length) function unequal_real64(expected, actual) result(pair)
     real(real64), intent(in) :: expected, actual
     pair = pf_unordered(expected, actual, expected == actual)
@@ -159,7 +159,7 @@ contains
     if (expected .neqv. actual) write (pair, pair_format) expected, actual
   end function unequal_logical
 
-  !> Blanks at both ends do not count.
+  !> Blanks at both ends are ignored.
   elemental character(len=pair_length) function unequal_text(expected, actual) result(pair)
     character(len=*), intent(in) :: expected, actual
     character(len=50) :: shown(2)
@@ -168,14 +168,14 @@ contains
     if (adjustl(expected) /= adjustl(actual)) write (pair, pair_format) trim(shown(1)), trim(shown(2))
   end function unequal_text
 
-  !> The first difference of more than an absolute tolerance.
+  !> The first difference that exceeds an absolute tolerance.
   elemental character(len=pair_length) function pf_apart(expected, actual, tolerance) result(pair)
     real(real64), intent(in) :: expected, actual, tolerance
     pair = ""
     if (expected /= actual) pair = pf_unordered(expected, actual, abs(actual - expected) <= tolerance)
   end function pf_apart
 
-  !> Two numbers that are not in a relation; '' if it holds.
+  !> Two numbers that do not satisfy a relation; '' if they do.
   elemental character(len=pair_length) function pf_unordered(expected, actual, holds) result(pair)
     real(real64), intent(in) :: expected, actual
     logical, intent(in) :: holds

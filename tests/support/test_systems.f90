@@ -1,4 +1,4 @@
-!> Simulations for tests: states built in a line, followed by any method, and compared; and random cases.
+!> Simulations for tests: states built from a line of text, advanced by any method, and compared; and random cases.
 module test_systems
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: dp => real64, int32, int64, never
@@ -26,7 +26,7 @@ module test_systems
   public :: total_energy, momentum, tightest_gap
   public :: draw_between, draw_vector, draw_magnitude, meeting, time_to_contact
 
-  !> Systems in which all general properties must hold, each feature with and without most others.
+  !> Systems in which all general properties must hold, with most combinations of features.
   character(len=*), parameter :: systems(*) = [character(len=40) :: "walls", "walls dilute", &
     "walls dense mixture", "walls few", "walls giant bed inelastic", "walls mixture smooth inelastic", &
     "walls gravity mixture", "walls gravity pegs inelastic contact", "walls round mixture", &
@@ -37,7 +37,7 @@ module test_systems
     "walls slants mixture", "channel gravity slants inelastic contact", "periodic slants pegs dilute", &
     "walls dense sizes", "channel dense sizes gravity", "periodic dense sizes inelastic", "walls sizes pegs", &
     "periodic giant sizes"]
-  !> Those and others whose sides move.
+  !> These systems and others with moving sides.
   character(len=*), parameter :: every_system(*) = [character(len=40) :: systems, "walls shaken", &
     "walls shaken gravity mixture", "channel shaken gravity inelastic contact", "walls shaken bed dilute", &
     "walls shaken pegs inelastic contact", "walls shaken slants gravity", "walls shaken giants gravity", &
@@ -45,8 +45,8 @@ module test_systems
 
 contains
 
-  !> The simulation that an input describes, as the program builds it, and what is wrong with it, '' if nothing; without
-  !> `message` that ends the tests. A text without an end ends at time 1.
+  !> The simulation described by an input, as the program builds it, and the problems of the input, '' if there are none; without
+  !> `message` a problem ends the tests. An input without a stop rule ends at time 1.
   subroutine build(text, sim, message, input, overrides)
     character(len=*), intent(in) :: text
     type(simulation_t), intent(out) :: sim
@@ -69,10 +69,10 @@ contains
     message = error%message
   end subroutine build
 
-  !> Disks one by one, each a species of its own, in the unit box with elastic walls.
+  !> A system of single disks, each a species of its own, in the unit box with elastic walls.
   function few_disks(x, v, radius, mass) result(sim)
     real(dp), intent(in) :: x(:)           !! x1, y1, x2, y2, ... [length]
-    real(dp), intent(in) :: v(:)           !! likewise [length/time]
+    real(dp), intent(in) :: v(:)           !! v1x, v1y, ... likewise [length/time]
     real(dp), intent(in) :: radius(:)      !! (n) [length]
     real(dp), intent(in) :: mass(:)        !! (n) [mass]
     type(simulation_t) :: sim
@@ -94,7 +94,7 @@ contains
     end do
   end function few_disks
 
-  !> Makes room for n disks, with the numbers of what a test may switch on later.
+  !> Allocates n disks, with the data of features that a test may switch on later.
   pure subroutine make_room(sim, n)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: n
@@ -102,14 +102,14 @@ contains
     if (.not. allocated(sim%extra)) allocate (sim%extra(n))
   end subroutine make_room
 
-  !> A gas of about a hundred disks with the features that the words name, in a box of 3 x 2 away from the
-  !> origin: `periodic` or `channel` (periodic in x), else walls; `gravity`; `pegs` and `slants` to bounce off and a
-  !> `round` container; `mixture` of two species; a `giant` or two `giants`; a `bed` at rest that the giant
-  !> hits; many `sizes`; `inelastic`; `smooth` walls; `contact` time; sides that are `shaken`; `few`, `dilute` or `dense`.
+  !> A gas of about a hundred disks with the features that the words name, in a box of 3 x 2 that does not contain the origin:
+  !> `periodic` or `channel` (periodic in x), otherwise walls; `gravity`; `pegs` and `slants` as obstacles and a `round` container;
+  !> a `mixture` of two species; a `giant` or two `giants`; a `bed` at rest that is hit by the giant; many `sizes`; `inelastic`;
+  !> `smooth` walls; `contact` duration; `shaken` sides; `few`, `dilute` or `dense`.
   function system(words, seed, scale) result(sim)
     character(len=*), intent(in) :: words
     integer(int64), intent(in) :: seed
-    integer, intent(in), optional :: scale     !! of the box; there are as many more disks as its square
+    integer, intent(in), optional :: scale     !! scale of the box; the number of disks grows with its square
     type(simulation_t) :: sim
     real(dp) :: upper(2), radius
     integer :: n
@@ -127,20 +127,20 @@ contains
       //given("giant", " &species name = 'giant' mass = 30 radius = 0.35 velocity = 0.7,-1.5" &
       //given("giants", " position = 0.1,1.7,1.3,1.2 /", " position = 0.1,1.7 /")) &
       //gas("small", "1", radius)//gas("other", given("mixture", "5", "1"), merge(0.5_dp, 1.0_dp, has("mixture"))*radius) &
-      ! circles of different size, one of them astride the left side
+      ! circles of different size, one of them across the left side
       //given("pegs", " &obstacle centre = -1,1.1 radius = 0.15 / &obstacle centre = 0.9,1.9 radius = 0.2 /" &
       //" &obstacle centre = 1.2,1.2 radius = 0.3 /") &
       //given("round", " &obstacle centre = 0.5,1.5 radius = 0.98 side = 'inside' /") &
-      ! so far from sides that are shaken that no disk is crushed
+      ! so far from moving sides that no disk is crushed
       //given("slants", " &wall from = -1.0,1.2 to = -0.6,1.6 / &wall from = 0.2,1.9 to = 1.6,1.3 /") &
-      ! far, on the spot, and fast; all from their places
+      ! with large and small amplitudes, and fast; all start at their mean positions
       //given("shaken", " &side name = 'bottom' motion = 'parabolic' amplitude = 0.5 period = 4 /" &
       //" &side name = 'top' motion = 'sawtooth' velocity = 0.5 /" &
       //given("channel", "", " &side name = 'right' motion = 'sine' amplitude = 0.03 period = 0.25 phase = 0.5 /")), sim)
 
   contains
 
-    !> A species of the gas.
+    !> One species of the gas.
     function gas(name, mass, radius) result(text)
       character(len=*), intent(in) :: name, mass
       real(dp), intent(in) :: radius
@@ -155,7 +155,7 @@ contains
       has = index(words, word) > 0
     end function has
 
-    !> A text if the words have this one, else another or ''.
+    !> `text` if the words contain this one, otherwise `otherwise` or ''.
     pure function given(word, text, otherwise) result(this)
       character(len=*), intent(in) :: word, text
       character(len=*), intent(in), optional :: otherwise
@@ -177,8 +177,8 @@ contains
     allocate (box%obstacle(size(box%obstacle))%shape, source=shape)
   end subroutine add_obstacle
 
-  !> The dynamics that a method names: `cells`, with neighbour lists where they pay; `lists` everywhere, which are `short`
-  !> and often full; `pairs` or `rescan`; with `heap`, else a calendar.
+  !> The dynamics for a method: `cells`, with neighbour lists where they pay; `lists` everywhere, which are `short` and often full;
+  !> `pairs` or `rescan`; with `heap`, otherwise a calendar.
   subroutine prepare(dynamics, method, sim)
     type(event_driven_t), intent(out) :: dynamics
     character(len=*), intent(in) :: method
@@ -192,13 +192,13 @@ contains
     call dynamics%start(sim)
   end subroutine prepare
 
-  !> Takes a simulation up, as after a restart, and follows it to a limit.
+  !> Continues a simulation, as after a restart, up to a limit.
   subroutine evolve(sim, method, time, collisions, events, failure)
     type(simulation_t), intent(inout) :: sim
     character(len=*), intent(in) :: method                      !! as for `prepare`
     real(dp), intent(in), optional :: time                      !! since the start of the run [time]
     integer, intent(in), optional :: collisions, events
-    character(len=:), allocatable, intent(out), optional :: failure  !! what broke off, '' if nothing
+    character(len=:), allocatable, intent(out), optional :: failure  !! reason of a failure, '' if there was none
     type(event_driven_t) :: dynamics
     type(limits_t) :: limits
     type(error_t), allocatable :: error
@@ -212,8 +212,8 @@ contains
     if (allocated(error)) failure = error%message
   end subroutine evolve
 
-  !> The first difference between two states, to the last bit; '' if there is none. Data of the search and the
-  !> queue note in the disks does not count.
+  !> The first difference between two states, to the last bit; '' if there is none. Data that search and queue store with the disks
+  !> are ignored.
   pure function difference(a, b) result(text)
     type(simulation_t), intent(in) :: a, b
     character(len=:), allocatable :: text
@@ -244,14 +244,14 @@ contains
     end do
   end function difference
 
-  !> Whether two numbers differ, in any bit.
+  !> Whether two numbers differ in any bit.
   elemental function differ(a, b) result(yes)
     real(dp), intent(in) :: a, b
     logical :: yes
     yes = transfer(a, 0_int64) /= transfer(b, 0_int64)
   end function differ
 
-  !> Kinetic and potential energy now, and what has been dissipated.
+  !> Kinetic and potential energy at the present time, plus the dissipated energy.
   pure function total_energy(sim) result(energy)
     type(simulation_t), intent(in) :: sim
     real(dp) :: energy
@@ -272,8 +272,8 @@ contains
     end do
   end function momentum
 
-  !> The smallest distance between rims now, of disks, sides and obstacles, in diameters of the disks
-  !> concerned; negative if any overlap.
+  !> The smallest gap between disks, sides and obstacles at the present time, in diameters of the disks involved; negative if any of
+  !> them overlap.
   pure function tightest_gap(sim) result(gap)
     type(simulation_t), intent(in) :: sim
     real(dp) :: gap, x(2), dx(2), low(2), high(2)
@@ -295,7 +295,7 @@ contains
     end do
   end function tightest_gap
 
-  !> From a point to the nearest image of another.
+  !> Vector from a point to the nearest image of another one.
   pure function separation(box, a, b) result(dx)
     type(box_t), intent(in) :: box
     real(dp), intent(in) :: a(2), b(2)
@@ -305,7 +305,7 @@ contains
     dx = dx - merge(edges*anint(dx/edges), 0.0_dp, box%periodic)
   end function separation
 
-  !> When two disks touch, by the textbook formula.
+  !> Time until two disks touch, by the textbook formula.
   pure function time_to_contact(dx, dv, sigma) result(s)
     real(dp), intent(in) :: dx(2), dv(2), sigma
     real(dp) :: s, b, disc
@@ -315,7 +315,7 @@ contains
     if (b < 0 .and. disc > 0) s = max(dot_product(dx, dx) - sigma**2, 0.0_dp)/(sqrt(disc) - b)
   end function time_to_contact
 
-  !> When disk i meets the other of two, by the kernel that the searches share, if something else is known to happen at a time.
+  !> Time when disk i collides with the other of two disks, by the kernel of all searches, if another event is known at a time.
   function meeting(disk, i, known) result(t)
     type(disk_t), intent(in) :: disk(2)
     integer, intent(in) :: i
@@ -333,7 +333,7 @@ contains
     t = near%time
   end function meeting
 
-  !> A number uniform between two.
+  !> Draws a uniform number between two limits.
   subroutine draw_between(stream, low, high, u)
     type(random_stream_t), intent(inout) :: stream
     real(dp), intent(in) :: low, high
@@ -342,7 +342,7 @@ contains
     u = low + (high - low)*u
   end subroutine draw_between
 
-  !> A vector with components uniform in (-size, size).
+  !> Draws a vector with components uniform in (-size, size).
   subroutine draw_vector(stream, size, v)
     type(random_stream_t), intent(inout) :: stream
     real(dp), intent(in) :: size
@@ -351,7 +351,7 @@ contains
     call draw_between(stream, -size, size, v(2))
   end subroutine draw_vector
 
-  !> A positive number of random size: 10**u, u uniform in (-decades, decades).
+  !> Draws a positive number of random size: 10**u, u uniform in (-decades, decades).
   subroutine draw_magnitude(stream, decades, u)
     type(random_stream_t), intent(inout) :: stream
     real(dp), intent(in) :: decades
