@@ -96,7 +96,7 @@ def check(run: Run, first: Run) -> None:
     """Refuse runs that are not homogeneous."""
     allow(run, "correlations are those of disks in an empty box", *FLUID, *RESTLESS)
     if run.n_disks < 3:
-        raise RunError(f"{run.path}: needs three disks and more")
+        raise Refused(f"{run.path}: needs three disks and more")
     if ("mixture" in run.nature) != ("mixture" in first.nature):
         raise RunError(f"{run.path}: not equal disks, or not a mixture, as {first.path} is")
     if run.n_frames < 10:

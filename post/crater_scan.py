@@ -16,7 +16,7 @@ runs ended by time, with more energy left than `stop.energy_fraction`.
 from itertools import chain
 from typing import NamedTuple
 
-from ricochet import Run, RunError
+from ricochet import Run
 from ricochet.analysis.crater import (
     bed,
     box_takes_part,
@@ -36,6 +36,7 @@ from ricochet.analysis.statistics import (
 )
 from ricochet.figures.drawing import COLOURS, colours, panel_grid, plt
 from ricochet.reading.reader import span
+from ricochet.reading.nature import Refused
 from ricochet.script import command_line, grouped, launch, measured, report
 
 import numpy as np
@@ -74,7 +75,7 @@ Scans = dict[str, list[list[Point]]]  # by parameter: curves of points in ascend
 def key_of(run: Run) -> tuple[float, ...]:
     """Return mass ratio, speed, radius ratio and restitution."""
     if np.isnan(run.restitution):
-        raise RunError(f"{run.path}: has no single restitution, as a scan needs it")
+        raise Refused(f"{run.path}: has no single restitution, as a scan needs it")
     tip, lying = projectile(run), np.flatnonzero(bed(run))[0]
     ratios = run.mass[tip] / run.mass[lying], run.radius[tip] / run.radius[lying]
     values = ratios[0], run.speed(0)[tip], ratios[1], run.restitution

@@ -28,7 +28,7 @@ from ricochet.analysis.statistics import (
     rounded_to_error,
 )
 from ricochet.figures.drawing import bars, caption, colours, plt
-from ricochet.reading.nature import allow
+from ricochet.reading.nature import Refused, allow
 from ricochet.reading.reader import Species
 from ricochet.script import command_line, launch, measured, report
 
@@ -237,8 +237,10 @@ def main() -> None:
     allow(run, "it follows no exponential laws", *known)
     start, reason = thermodynamics.explained_start(run, args.equilibration)
     frames = thermodynamics.frames_from(run, start)
-    if not run.gravity[1] or not frames:
-        raise RunError(f"{run.path}: needs gravity along y and frames in equilibrium")
+    if not run.gravity[1]:
+        raise Refused(f"{run.path}: has no gravity along y; it follows no law of heights")
+    if not frames:
+        raise RunError(f"{run.path}: needs frames in equilibrium")
     species = [samples(run, kind, frames) for kind in thermodynamics.kinds_of_disks(run)]
     result, notes = table(run, species, thermodynamics.temperature(run, args.equilibration)), []
     for kind, s in zip(run.by_species, species, strict=True):

@@ -10,7 +10,7 @@ is exact where the kinetic energy is kept; where walls or kicks heat, or disks t
 over all disks in equilibrium, with its error.
 """
 
-from ricochet import Run, RunError
+from ricochet import Run
 from ricochet.analysis.speed_laws import speed_test
 from ricochet.analysis.speeds import kt_of_frames, means
 from ricochet.analysis.statistics import (
@@ -22,7 +22,7 @@ from ricochet.analysis.statistics import (
 from ricochet.analysis.thermodynamics import kinds_of_disks, mean_energy
 from ricochet.figures.drawing import COLOURS, bars, caption, plt
 from ricochet.predictions.theory import maxwell_pdf
-from ricochet.reading.nature import SETTLED, allow
+from ricochet.reading.nature import SETTLED, Refused, allow
 from ricochet.script import command_line, late_frames, launch, measured, report
 
 import numpy as np
@@ -118,13 +118,11 @@ def main() -> None:
     for run in runs:
         if run.names != runs[0].names or len(run.names) < 2 or run.n_disks < 3:
             what = "needs a mixture of three disks or more, the same in all runs; see speeds.py"
-            raise RunError(f"{run.path}: {what}")
+            raise Refused(f"{run.path}: {what}")
         allow(run, "its species do not come to one temperature", *SETTLED)
         tracks = [run.observable(f"{name}/kinetic_energy").value for name in run.names]
         if not any(np.ptp(track) > 1e-9 * np.max(track) for track in tracks):
-            raise RunError(
-                f"{run.path}: its species have not met: each has the energy of its start"
-            )
+            raise Refused(f"{run.path}: its species have not met: each has the energy of its start")
     frames = [late_frames(run, args) for run in runs]
     result = table(runs, frames, args.equilibration)
     report(args, draw(runs, frames, result), result)

@@ -9,10 +9,10 @@ last velocity.  Exact for a finite mass ratio M = m1 / m2 and restitution xi, ka
     tan theta = 2 kappa s c / (1 - 2 kappa c^2);   M infinite and xi = 1:  theta = 2 acos(s).
 """
 
-from ricochet import Run, RunError
+from ricochet import Run
 from ricochet.figures.drawing import COLOURS, plt
 from ricochet.predictions.theory import scattering_angle
-from ricochet.reading.nature import allow
+from ricochet.reading.nature import Refused, allow
 from ricochet.script import command_line, launch, report
 
 import numpy as np
@@ -22,7 +22,7 @@ def moving_and_resting(run: Run) -> tuple[int, int]:
     """Return which disk moves at the start, and which does not."""
     moving = np.flatnonzero(run.speed(0))
     if run.n_disks != 2 or len(moving) != 1:
-        raise RunError(f"{run.path}: needs two disks, one of them at rest")
+        raise Refused(f"{run.path}: needs two disks, one of them at rest")
     return moving[0], 1 - moving[0]
 
 

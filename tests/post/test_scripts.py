@@ -723,3 +723,16 @@ def test_other_formats_are_written_too(tmp_path, rng):
     for ending, begin in {"pdf": b"%PDF", "svg": b"<?xml"}.items():
         assert run_script("snapshot", path, "-o", tmp_path / f"a.{ending}") == 0
         assert (tmp_path / f"a.{ending}").read_bytes().startswith(begin)
+
+
+EVERY = " &output frames_every_time = 0.5 observables_every_time = 0.1 /"
+NEEDY = (
+    "correlations crater crater_scan equipartition gravity haff melting mixture rough scattering"
+)
+
+
+@pytest.mark.parametrize("script", [*NEEDY.split(), "speeds", "transport"])
+def test_a_run_for_which_the_law_does_not_hold_is_refused_with_exit_1(simulated, capsys, script):
+    """Two equal disks between walls; what is wrong with a file or an option is exit 2."""
+    run = simulated("&species count = 2 radius = .05 speed = 1 / &stop time = 20 /" + EVERY)
+    assert str(run.path) in refusal(capsys, script, run.path, code=1)

@@ -139,14 +139,65 @@ def outcome(cases: list[dict], seconds: float) -> str:
     return f"{len(cases)} cases in {seconds / 60:.1f} minutes: {result}"
 
 
-def markdown(data: dict) -> str:
-    """The page of a report."""
+BARS = """
+## Error bars and p-values
+
+Written by `python tests/coverage_tables.py`, whose lists of systems and quantities were made before
+the first run. *Held* is how many of 100 error bars of single runs hold the true value, which is
+exact or the mean over all runs: 68 are expected, 61 to 75 allowed. *Error / scatter* is the mean
+error over the standard deviation of the means; Student's t makes it larger than 1. *Three* is the
+same share for means over three runs with Student's t.
+
+| system | quantity | runs | held | error / scatter | three |
+|---|---|---|---|---|---|
+"""
+P_VALUES = """
+p-values of `speeds.py` for valid runs. Of 100 of them 5 should be below .05 and 32 below .32;
+*uniform* is the p-value of their own Kolmogorov-Smirnov test against the uniform distribution.
+
+| system | species | runs | KS: < .05 | < .32 | uniform | χ²: < .05 | < .32 | uniform |
+|---|---|---|---|---|---|---|---|---|
+"""
+
+
+def statistics_tables(base: Path) -> str:
+    """The tables of `tests/coverage_tables.py`, from coverage.json if it is beside the page."""
+    path = base.parent / "coverage.json"
+    if not path.exists():
+        return ""
+    tables = json.loads(path.read_text())
+    bars = [
+        line(
+            row["system"], row["quantity"], str(row["runs"]), number(row["held_%"], 3),
+            number(row["error_over_scatter"], 3), number(row["three_%"], 3),
+        )
+        for row in tables["bars"]
+    ]  # fmt: skip
+    p_values = [
+        line(
+            row["system"], row["species"], str(row["runs"]),
+            *(number(row[f"{test}_{name}"], 2) for test in ("ks", "chi2")
+              for name in ("below_5_%", "below_32_%", "uniform")),
+        )
+        for row in tables["p_values"]
+    ]  # fmt: skip
+    return BARS + "\n".join(bars) + "\n" + P_VALUES + "\n".join(p_values) + "\n"
+
+
+def rewrite(base: Path) -> None:
+    """BASE.md anew from BASE.json and coverage.json."""
+    data = json.loads(base.with_suffix(".json").read_text())
+    base.with_suffix(".md").write_text(markdown(data, statistics_tables(base)))
+
+
+def markdown(data: dict, tables: str = "") -> str:
+    """The page of a report; `tables` follow the cases."""
     cases = data["cases"]
     return (
         f"{HEAD}{outcome(cases, data['seconds'])}. Program: {data['program']}.\n\n"
         "| case | what | reference | measured | verdict |\n|---|---|---|---|---|\n"
         + "\n".join(rows(cases))
-        + f"\n{NOTES}"
+        + f"\n{NOTES}{tables}"
     )
 
 
@@ -176,4 +227,4 @@ def write(base: Path, verdicts: list[Verdict], origin: str, seconds: float) -> N
     base.parent.mkdir(parents=True, exist_ok=True)
     text = json.dumps(data, indent=1, ensure_ascii=False) + "\n"
     base.with_suffix(".json").write_text(text)
-    base.with_suffix(".md").write_text(markdown(data))
+    rewrite(base)

@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 
 from ..reading.files import RunError
-from ..reading.nature import allow
+from ..reading.nature import Refused, allow
 from ..reading.reader import Run
 
 __all__ = [
@@ -185,12 +185,12 @@ def projectile(run: Run) -> int:
     60
     """
     if run.n_disks < 2:
-        raise RunError(f"{run.path}: holds one disk; a crater needs a projectile and a bed")
+        raise Refused(f"{run.path}: holds one disk; a crater needs a projectile and a bed")
     if "projectile" in run.names:
         return int(np.flatnonzero(run.of_species("projectile"))[0])
     moving = np.flatnonzero(run.speed(0) > 0)
     if len(moving) != 1:
-        raise RunError(f"{run.path}: no species 'projectile' and {len(moving)} disks that move")
+        raise Refused(f"{run.path}: no species 'projectile' and {len(moving)} disks that move")
     return int(moving[0])
 
 

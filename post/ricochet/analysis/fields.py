@@ -16,6 +16,7 @@ import scipy
 
 from ..predictions import hard_disks
 from ..reading.files import RunError
+from ..reading.nature import Refused
 from ..reading.reader import SIDES, Run
 from .statistics import Estimate, statistical_inefficiency, student
 from .structure import periods
@@ -111,7 +112,7 @@ def steady_frames(run: Run, skip: float | None) -> list[int]:
     """Return the frames after `skip` collisions per disk, else those of the second half."""
     if any(side.get("motion") in ("constant_velocity", "piston") for side in run.sides):
         why = "has a side that leaves its place (motion), fields are those of cells that stay"
-        raise RunError(f"{run.path}: {why}")
+        raise Refused(f"{run.path}: {why}")
     start = run.time[-1] / 2 if skip is None else after_start(run, skip)
     frames = np.flatnonzero(run.time >= start).tolist()
     if len(frames) < FEWEST_BLOCKS:

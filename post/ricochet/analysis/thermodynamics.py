@@ -478,7 +478,7 @@ def lightest_and_heaviest(run: Run) -> tuple[int, int]:
     """Return the indices of the species with the smallest and the largest mass."""
     masses = [kind.mass for kind in run.by_species]
     if min(masses) == max(masses):
-        raise RunError(f"{run.path}: needs two species of different mass")
+        raise Refused(f"{run.path}: needs two species of different mass")
     return int(np.argmin(masses)), int(np.argmax(masses))
 
 
@@ -509,7 +509,7 @@ def mean_free_time(run: Run, start: float = 0.0) -> float:
     """
     first, last = run.collisions_per_disk_at(np.array([start, run.time[-1]]))
     if not last > first:
-        raise RunError(f"{run.path}: has no collisions of two disks yet")
+        raise Refused(f"{run.path}: has no collisions of two disks yet")
     return float((run.time[-1] - start) / (last - first))
 
 
@@ -531,7 +531,7 @@ def steps(run: Run, skip: float | None = None) -> Steps:
     )
     collisions, virial, hits, impulse = (np.diff(s, axis=0) for s in sums)
     if not collisions.any():
-        raise RunError(f"{run.path}: has no collisions of two disks in equilibrium")
+        raise Refused(f"{run.path}: has no collisions of two disks in equilibrium")
     time = time[first:]
     if run.nature.keeps_kinetic_energy:
         kt = np.full(len(time), kt_at_start(run))
