@@ -5,7 +5,7 @@
 #   runs/figures.sh gas crater      some
 #   runs/figures.sh -j 4 gas        options before the names go to ensemble.sh
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
-known=(scattering gas mixture cooling crater lab cost billiards gravity state stages melting driven)
+known=(scattering gas mixture cooling crater lab cost billiards lorentz gravity state stages melting driven)
 
 options=()
 while [[ ${1:-} == -* ]]; do
@@ -86,6 +86,8 @@ HTML
   section container 'A round container' billiards
   section container_film 'A round container, film' billiards
   section brownian 'Brownian motion' billiards
+  section lorentz 'Random Lorentz gas: diffusion' lorentz
+  section lorentz_path 'Random Lorentz gas: a path' lorentz
   section gravity_energy 'Gravity: energies, time steps and events' gravity
   section gravity_missed 'Gravity: collisions that time steps miss' gravity
   section gravity_equipartition 'Gravity: equipartition' gravity

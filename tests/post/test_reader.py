@@ -221,6 +221,9 @@ OUTPUT = "&stop time = 1e5 / " + BOTH
 SHORT = OUTPUT.format("")
 LONGER = SHORT.replace("1e5", "1e6")  # of few disks
 PAIR = "&species name = 'one' count = 1 radius = 0.1 position = {}, 0.3 velocity = 1, 0.3 /\n"
+LORENTZ = """&box boundary = 'periodic', 'periodic' / &obstacle centre = 0.5, 0.5 radius = 0.35 /
+&species name = 'tracer' count = 1 radius = 0.1 position = 0, 0 velocity = 0.6, 0.8 /
+"""
 FALLING = """&box upper = 4, 4 gravity = 0, -9.81 /
 &species name = 'A' count = 8 mass = 1 radius = 0.05 velocities = 'uniform' speed = 3 /
 &species name = 'B' count = 8 mass = 2 radius = 0.05 velocities = 'uniform' speed = 3 /
@@ -249,6 +252,7 @@ RUNNING = [
     ([BULK + ROUGH + SHORT], {"rough": ()}),
     ([BULK + "&contact restitution = 0.9 /\n" + SHORT], {"haff": ()}),
     ([PAIR.format(x) + LONGER for x in (0.3, 0.300001)], {"lyapunov": ("--largest", "0.1")}),
+    ([LORENTZ + LONGER], {"lorentz": ("--lags", "1", "3")}),
     ([FALLING + SHORT, FALLING + STEPS + SHORT], {"missed": SOON[:2]}),
 ]
 ENDINGS = {"animate": "gif", "export": "xyz", "player": "html"}

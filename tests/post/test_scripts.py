@@ -1,5 +1,7 @@
 """Each script of post/ against what it should find in runs that are made by closed formulas."""
 
+import csv
+
 import h5py
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import equation_of_state
 import equipartition
 import gravity
 import haff
+import lorentz
 import lyapunov
 import missed
 import mixture
@@ -687,6 +690,54 @@ def test_lyapunov_finds_the_rate_of_divergence(tmp_path, rng, capsys):
     with pytest.raises(RunError, match="nothing to fit"):
         lyapunov.divergence(runs[0].time, 0 * apart, largest=0.01, begin=0.2)
     assert "3 runs: not pairs" in refusal(capsys, "lyapunov", *paths[:3])
+
+
+# --- tracers among scatterers ---
+
+
+def tracer(path, rng, radii=(0.4, 0.4), walk=0.3, frames=20001):
+    """A random walk through a box of two scatterers; a frame every 10 mean free times.
+
+    With R = 0.5 and two scatterers in 2 x 2 the density n R^2 is 1/8, the mean free time 2.
+    """
+    step = rng.normal(scale=walk, size=(frames, 1, 2))
+    place = np.cumsum(step, axis=0) + 1
+    image = np.floor(place / 2).astype(np.int32)
+    time = 20.0 * np.arange(frames)
+    held = [((0.5, 0.5), radii[0], False), ((1.5, 1.5), radii[1], False)]
+    return write_run(
+        path,
+        place - 2 * image,
+        np.broadcast_to([0.6, 0.8], place.shape),
+        time=time,
+        radius=0.1,
+        edges=(2.0, 2.0),
+        periodic=(True, True),
+        image=image,
+        obstacles=held,
+        observables={"obstacle_collisions": time / 2},
+    )
+
+
+def test_lorentz_finds_the_diffusion_of_a_random_walk(tmp_path, rng, capsys):
+    paths = [tracer(tmp_path / f"{k}.h5", rng) for k in range(4)]
+    runs = [read_run(path) for path in paths]
+    assert lorentz.density_of(runs[0]) == 0.125
+    found = [lorentz.diffusion(run, (10.0, 30.0)) for run in runs]
+    exact = 0.3**2 / 2 / 20 / (3 / 16 / 0.25)  # <dx^2> / (2 t) over 3 v / (16 n R)
+    mean = np.mean([one["diffusion"] for one in found])
+    assert mean == pytest.approx(exact, rel=0.05)
+    assert [one["free_time"] for one in found] == pytest.approx([1] * 4)
+    assert lorentz.expansion(1e-9) == pytest.approx(1, abs=1e-7)
+    table = tmp_path / "table.csv"
+    assert run_script("lorentz", *paths, "-o", tmp_path / "a.png", "--csv", table) == 0
+    capsys.readouterr()
+    (row,) = csv.DictReader(table.read_text().splitlines())
+    assert float(row["diffusion"]) == pytest.approx(mean) and row["runs"] == "4"
+    uneven = tracer(tmp_path / "uneven.h5", rng, radii=(0.4, 0.3), frames=11)
+    assert "equal circles" in refusal(capsys, "lorentz", uneven)
+    short = tracer(tmp_path / "short.h5", rng, frames=11)
+    assert "needs more frames" in refusal(capsys, "lorentz", short)
 
 
 # --- captions, and every script draws ---

@@ -146,7 +146,10 @@ def over_boltzmann(run: Run) -> float:
 
 
 def boltzmann_over(n: float) -> float:
-    """D_0 / D of scatterers that may overlap, by the expansion in their density."""
+    """D_0 / D of scatterers that may overlap, by the expansion in their density.
+
+    The coefficients are quoted from memory.
+    """
     return 1 - 4 / 3 * n * np.log(n) - 0.8775 * n + 4.519 * (n * np.log(n)) ** 2
 
 
@@ -199,6 +202,6 @@ CASES = [
     Case(
         "P12-06", "random Lorentz gas, n R^2 = .01: diffusion over Boltzmann's",
         LORENTZ, over(over_boltzmann), 1 / boltzmann_over(DENSITY), within(0.015),
-        "Weijland and van Leeuwen 1968",
+        "Weijland and van Leeuwen 1968, quoted from memory",
     ),
 ]  # fmt: skip

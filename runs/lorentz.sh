@@ -1,0 +1,60 @@
+#!/usr/bin/env bash
+# The random Lorentz gas: one tracer among 100 000 scatterers that may overlap, at six densities, and
+# its diffusion coefficient against kinetic theory. Each run has scatterers of its own. N=1000000
+# takes more of them, EVENTS=10000000 longer runs.
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
+scatterers=${N:-100000} events=${EVENTS:-1000000} tracer=0.1 # radii: 0.1 and 0.9, so that R = 1
+
+# scatter SEED DENSITY FILE: a text file of circles, uniform at random, at so many per R^2.
+scatter() {
+  "$python" - "$scatterers" "$@" <<'PY'
+import sys
+
+import numpy as np
+
+number, seed, density, path = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]), sys.argv[4]
+places = np.random.default_rng(seed).uniform(0, np.sqrt(number / density), (number, 2))
+rows = np.column_stack([places, np.full(number, 0.9)])
+np.savetxt(path, rows, fmt="%.12g", header="x y radius", comments="")
+PY
+}
+
+replace "$data/lorentz.nml" <<NML
+! One tracer among random scatterers; each member sets the file, the size of the box and the frames.
+&run
+  title = 'random Lorentz gas'
+/
+&box
+  boundary = 'periodic', 'periodic'
+/
+&obstacle
+  name = 'scatterers'
+  file = 'scatterers.txt'
+/
+&species
+  name = 'tracer'
+  count = 1
+  radius = $tracer
+  speed = 1
+/
+&stop
+  events = $events
+/
+&output
+  frames_every_time = 1
+/
+NML
+
+# A frame every ten mean free times 1/(2 n R v).
+for density in 0.0025 0.005 0.01 0.02 0.04 0.08; do
+  for seed in 1 2 3 4; do
+    file=$data/scatterers_${scatterers}_${density}_$seed.txt
+    [[ -e $file ]] || { scatter "$seed" "$density" "$file.part" && mv -- "$file.part" "$file"; }
+    printf 'n_%s_%s\t--set run.seed=%s --set obstacle.scatterers.file=%s' "$density" "$seed" "$seed" "$file"
+    awk -v n="$density" -v number="$scatterers" 'BEGIN { side = sqrt(number/n)
+      printf " --set box.upper=%.17g,%.17g --set output.frames_every_time=%.17g\n", side, side, 5/n }'
+  done
+done | replace "$data/members.txt"
+runs/ensemble.sh "$data/lorentz.nml" -d "$data/runs" --manifest "$data/members.txt" "$@"
+"$python" post/lorentz.py "$data"/runs/n_*.h5 -o "$figures/lorentz.png" --csv "$figures/lorentz.csv"
+"$python" post/trajectory.py "$data/runs/n_0.01_1.h5" --frames :300 -o "$figures/lorentz_path.png"
