@@ -41,7 +41,7 @@ contains
     call bounds(other%box, sim%now, there(:, 1), there(:, 2))
     if ((other%with%rotation .neqv. sim%with%rotation) .or. (other%with%orientation .neqv. sim%with%orientation) .or. &
       (other%law%contact_time > 0 .neqv. sim%law%contact_time > 0)) then
-      problem = "needs data of the disks that this run does not have: rotation, orientation and contact_time > 0 must be there " &
+      problem = "the change needs data that the disks do not have: rotation, orientation and contact_time > 0 must be there " &
         //"from the start"
     else if (any(abs(there - here) > 1.0e-12_real64*minval(sim%box%edges()))) then
       problem = "a side would jump: at this time the new motion must have the position of the old one"

@@ -144,7 +144,7 @@ def kept(system) -> Simulation:
         (lambda _: kept({"species": {"count": 9, "radius": 0.1}}).advance(), ValueError, "&stop"),
         (lambda gas: gas.change({"species.a.count": 3}), ProgramError, "cannot change"),
         (lambda gas: gas.change({"gravity": 3}), ProgramError, "gravity: cannot change"),
-        (lambda gas: gas.change({"contact.contact_time": 0}), ProgramError, "columns"),
+        (lambda gas: gas.change({"contact.contact_time": 0}), ProgramError, "data that the disks"),
         (lambda gas: gas.change({"contact.restitution": 2}), ProgramError, "from 0 to 1"),
         (lambda gas: setattr(gas, "velocity", np.zeros(3)), ValueError, "(3,)"),
         (lambda gas: setattr(gas, "velocity", gas.velocity * np.nan), ValueError, "below"),
@@ -170,7 +170,7 @@ def kept(system) -> Simulation:
         (lambda gas: gas.save("a\0.h5"), ValueError, "zero"),
         (lambda gas: gas.save("a.h5", input="b\0.nml"), ValueError, "zero"),
         (lambda gas: gas.change({"box.gravity": "0, -2\0\nrun.seed=1"}), ValueError, "zero"),
-        (lambda gas: gas.save("x.h5.part"), ProgramError, "name that is kept"),
+        (lambda gas: gas.save("x.h5.part"), ProgramError, "is reserved for files"),
         (lambda _: Simulation("&species count = 1 radius = .1 /").advance(), ValueError, "&stop"),
     ],
 )
