@@ -171,7 +171,7 @@ contains
         width = box%upper(axis) - box%lower(axis)
         call take_motion(sides(k), box%surface(side)%motion)
         if (.not. box%surface(side)%motion%moves()) cycle
-        ! The sides must not touch each other, at any combination of their phases.
+        ! Opposite sides must never touch each other, whatever their phases are.
         if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%innermost_position()) >= width) call sides(k)%complain( &
           culprit(box%surface(side)%motion), "lets the sides meet, which are "// &
           written(width)//" apart (box.upper)", problems)

@@ -1,5 +1,5 @@
-!> The radii of the disks of a species: one for all, or drawn from a distribution. The largest that can come is ten times the
-!> smallest: what a distribution has beyond is drawn again, and one that has much there is too wide.
+!> The radii of the disks of a species: equal, or drawn from a distribution. The largest possible radius is ten times the smallest
+!> one. Radii beyond these limits are drawn again, and a distribution with many radii beyond them is refused.
 module radii
   use kinds, only: int64, real64
   use random_stream, only: random_stream_t
@@ -8,10 +8,10 @@ module radii
   private
   public :: drawn_radii, largest_radius, widest_spread
 
-  integer, parameter :: purpose = 7                         !! of this module's random streams
-  real(real64), parameter :: part = 9.0_real64/11           !! of the mean, by which radii differ from it at most
-  real(real64), parameter :: powers = 0.5_real64*log(10.0_real64)   !! the same of logarithms
-  real(real64), parameter :: deviations = 3                 !! standard deviations of a Gaussian within these limits, at least
+  integer, parameter :: purpose = 7                         !! identifies the random streams of this module
+  real(real64), parameter :: part = 9.0_real64/11           !! largest deviation from the mean, relative to the mean
+  real(real64), parameter :: powers = 0.5_real64*log(10.0_real64)   !! largest deviation of logarithms
+  real(real64), parameter :: deviations = 3                 !! the limits must be at least this many standard deviations away
 
 contains
 
@@ -19,8 +19,8 @@ contains
   !> and Gaussian radii may depend on the mathematical library.
   pure function drawn_radii(species, s, seed) result(radius)
     class(species_settings_t), intent(in) :: species
-    integer, intent(in) :: s                                !! its number
-    integer(int64), intent(in) :: seed                      !! of the run
+    integer, intent(in) :: s                                !! index of the species
+    integer(int64), intent(in) :: seed                      !! seed of the run
     real(real64) :: radius(species%count)                   !! [length]
     type(random_stream_t) :: stream
     real(real64) :: z(2), difference, deviation
@@ -46,7 +46,7 @@ contains
     end do
   end function drawn_radii
 
-  !> A radius that hardly any disk of a species exceeds, without drawing them.
+  !> An estimate of the largest radius of a species, without drawing the radii.
   pure function largest_radius(species) result(radius)
     class(species_settings_t), intent(in) :: species
     real(real64) :: radius                                  !! [length]
@@ -67,7 +67,7 @@ contains
     end associate
   end function largest_radius
 
-  !> The largest spread of a distribution.
+  !> Largest polydispersity that is allowed for a distribution.
   pure function widest_spread(distribution) result(spread)
     character(len=*), intent(in) :: distribution            !! 'uniform', 'gaussian' or 'lognormal'
     real(real64) :: spread

@@ -186,7 +186,7 @@ contains
     end associate
   end function explanation
 
-  !> The default of a variable, or a description of the case without a value.
+  !> The default of a variable, or a description of the behaviour if it is not given.
   pure function default_of(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text

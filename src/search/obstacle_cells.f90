@@ -1,5 +1,5 @@
-!> Which obstacles may keep a disk away from a point: lists by cells of the box, so that a question about one point costs
-!> the same however many obstacles there are, and making the lists is linear in their number.
+!> Lists of the obstacles that may exclude a disk from a point, for each cell of the box. The cost of a test of one point does not
+!> depend on the number of obstacles, and the cost of making the lists is proportional to it.
 module obstacle_cells
   use box_geometry, only: box_t
   use kinds, only: int32, real64
@@ -10,15 +10,15 @@ module obstacle_cells
 
   !> An obstacle in the list of a cell.
   type :: entry_t
-    integer(int32) :: obstacle = 0                  !! its number in the box
-    integer(int32) :: next = 0                      !! entry in the same list, of a larger number; 0: none
+    integer(int32) :: obstacle = 0                  !! index in the box
+    integer(int32) :: next = 0                      !! next entry in the same list, with a larger index; 0: none
   end type entry_t
 
   type :: obstacle_cells_t
-    real(real64), private :: radius = -1.0_real64   !! of the largest disk that the lists are made for [length]
-    real(real64), private :: lower(2) = 0.0_real64  !! corner of the box [length]
-    real(real64), private :: side(2) = 0.0_real64   !! of a cell [length]
-    integer(int32), allocatable, private :: head(:, :)  !! (columns,rows) first entry of a cell, 0: none; not there without obstacles
+    real(real64), private :: radius = -1.0_real64   !! largest radius for which the lists are made [length]
+    real(real64), private :: lower(2) = 0.0_real64  !! lower left corner of the box [length]
+    real(real64), private :: side(2) = 0.0_real64   !! edges of a cell [length]
+    integer(int32), allocatable, private :: head(:, :)  !! (columns,rows) first entry of each cell; 0: none
     integer(int32), private :: n_entries = 0
     type(entry_t), allocatable :: entry(:)
   contains
@@ -28,7 +28,7 @@ module obstacle_cells
 
 contains
 
-  !> Makes the lists for disks of up to some radius, unless they serve these already.
+  !> Makes the lists for disks up to some radius, unless they are already made for these.
   subroutine serve(self, box, radius)
     class(obstacle_cells_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -53,12 +53,12 @@ contains
     allocate (self%head(n(1), n(2)), source=0_int32)
     if (.not. allocated(self%entry)) allocate (self%entry(2*box%n_obstacles()))
     self%n_entries = 0
-    do k = box%n_obstacles(), 1, -1                 ! so that lists begin with the smallest number
+    do k = box%n_obstacles(), 1, -1                 ! lists then begin with the smallest index
       call enter(self, k, box%obstacle(k)%shape, box%periodic)
     end do
   end subroutine serve
 
-  !> The first entry of the list for a point; 0 if no obstacle is near it.
+  !> First entry of the list for a point; 0 if no obstacle is near it.
   pure function first_near(self, p) result(e)
     class(obstacle_cells_t), intent(in) :: self
     real(real64), intent(in) :: p(2)                !! [length]
@@ -70,7 +70,7 @@ contains
     e = self%head(c(1), c(2))
   end function first_near
 
-  !> Enters an obstacle into the lists of all cells with a point that it keeps the centre of a disk from.
+  !> Adds an obstacle to the lists of all cells with a point from which it excludes the centre of a disk.
   subroutine enter(self, number, shape, periodic)
     type(obstacle_cells_t), intent(inout) :: self
     integer(int32), intent(in) :: number
@@ -94,10 +94,10 @@ contains
 
   contains
 
-    !> Does so in a block of cells. It is halved until it is one cell, or the outline does not pass through it: then all its
-    !> points are alike.
+    !> Adds the obstacle to the lists in a block of cells. The block is halved until it is a single cell, or until the outline
+    !> does not pass through it, so that all its points are equivalent.
     recursive subroutine enter_block(low, high)
-      integer(int32), intent(in) :: low(2), high(2) !! first and last column and row, from 0, beyond periodic sides too
+      integer(int32), intent(in) :: low(2), high(2) !! first and last column and row, counted from 0; also beyond periodic sides
       real(real64) :: d(2), half(2)
       integer(int32) :: last(2), first(2), axis, i, j
 
@@ -122,9 +122,9 @@ contains
       end do
     end subroutine enter_block
 
-    !> Does so in one cell, where it may have been entered by another of its images.
+    !> Adds the obstacle to the list of one cell, unless another of its images has done so.
     subroutine enter_cell(cell)
-      integer(int32), intent(in) :: cell(2)         !! column and row, from 1
+      integer(int32), intent(in) :: cell(2)         !! column and row, counted from 1
       type(entry_t), allocatable :: more(:)
       integer(int32) :: e
 

@@ -236,7 +236,7 @@ contains
     end subroutine grow
   end subroutine grow_disks
 
-  !> Distance from a point to the nearest side or obstacle; `never`, or more than a radius, if none is nearer than a radius.
+  !> Distance from a point to the nearest side or obstacle. Obstacles farther away than the largest radius may be ignored.
   pure function wall_distance(packing, x) result(distance)
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: x(2)                    !! [length]

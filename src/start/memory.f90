@@ -13,19 +13,19 @@ module memory
   private
   public :: check_memory, free_memory, memory_needed, peak, room_for_domains
 
-  !> Bytes per disk, obstacle or process, as `runs/memory.sh` measures them: the peak of the resident memory. They hold within
-  !> 5 %; those of time steps are an upper bound, as their lists depend on the step.
+  !> Bytes per disk, obstacle or process: the peak of the resident memory, as measured by `runs/memory.sh`, accurate to 5 %. For
+  !> time-stepped dynamics they are upper bounds, because the length of its lists depends on the step.
   integer(int64), parameter :: per_process = 10000000, per_obstacle = 580
-  real(real64), parameter :: record = 110, cell = 32         !! state and queue of a disk; a cell of the search
-  real(real64), parameter :: extra = 40, own_size = 8        !! images, times of contact, rotation; mass
-  real(real64), parameter :: sampled = 8.8_real64            !! each number of a disk in a frame
-  real(real64), parameter :: listed = 264                    !! list of neighbours
-  real(real64), parameter :: kicked = 16, stepped = 100      !! by a drive; lists of time steps
-  real(real64), parameter :: divided(2) = [143, 205]         !! more with domains: between walls, in a periodic box
-  real(real64), parameter :: listed_twice = 80               !! more of them for lists
-  ! While disks are placed, everything included: at known or random places, from a file, by growth.
+  real(real64), parameter :: record = 110, cell = 32         !! state and event of a disk; cell of the search
+  real(real64), parameter :: extra = 40, own_size = 8        !! images, contact times, rotation; individual mass
+  real(real64), parameter :: sampled = 8.8_real64            !! number in a frame
+  real(real64), parameter :: listed = 264                    !! neighbour list
+  real(real64), parameter :: kicked = 16, stepped = 100      !! driving; lists of time-stepped dynamics
+  real(real64), parameter :: divided(2) = [143, 205]         !! in addition with domains: between walls, in a periodic box
+  real(real64), parameter :: listed_twice = 80               !! in addition with domains and neighbour lists
+  ! Total during the placement of disks: at given positions, at random positions, from a file, by compression.
   real(real64), parameter :: placed = 150, inserted = 166, read_in = 226, grown = 310
-  real(real64), parameter :: cells_per_disk = 1.67_real64    !! at most: see `cell_layout`
+  real(real64), parameter :: cells_per_disk = 1.67_real64    !! upper bound: see `cell_layout`
 
 contains
 
@@ -44,7 +44,8 @@ contains
       //size_text(needed)//" of memory, and "//size_text(free)//" are free; use fewer disks")
   end subroutine check_memory
 
-  !> Whether the memory suffices for dividing the box into domains, with a reserve, as the run would not notice that it does not.
+  !> Whether the memory suffices for dividing the box into domains. A reserve is included, because a run does not notice the lack
+  !> of memory before it is killed.
   function room_for_domains(settings) result(yes)
     type(settings_t), intent(in) :: settings
     logical :: yes
@@ -52,7 +53,7 @@ contains
     yes = 1.15_real64*real(peak(settings, domains=.true.), real64) <= real(free_memory(""), real64)
   end function room_for_domains
 
-  !> The same, with domains where the run will have them.
+  !> Memory that a run needs, with domains if the run will use them. [bytes]
   function memory_needed(settings) result(bytes)
     type(settings_t), intent(in) :: settings
     integer(int64) :: bytes
@@ -63,7 +64,7 @@ contains
     bytes = peak(settings, domains)
   end function memory_needed
 
-  !> Largest amount of memory that a run occupies at a time, with domains or without. [bytes]
+  !> Peak memory of a run, with domains or without. [bytes]
   pure function peak(settings, domains) result(bytes)
     type(settings_t), intent(in) :: settings
     logical, intent(in) :: domains                        !! the box is divided
@@ -86,7 +87,7 @@ contains
     bytes = int(settings%n_disks()*max(running, starting), int64) + per_process + settings%box%n_obstacles()*per_obstacle
   end function peak
 
-  !> Bytes per disk while the disks are placed, without what some of them have extra.
+  !> Bytes per disk during the placement, without optional data of disks.
   pure function starting_bytes(settings) result(bytes)
     type(settings_t), intent(in) :: settings
     real(real64) :: bytes
@@ -105,7 +106,7 @@ contains
     end do
   end function starting_bytes
 
-  !> How many numbers of each disk a frame has; 0 where only the first and the last one are written.
+  !> Number of values per disk in a frame; 0 if only the first and the last frame are written.
   pure function numbers_in_frame(settings) result(n)
     type(settings_t), intent(in) :: settings
     integer :: n, k
@@ -122,7 +123,7 @@ contains
     end do
   end function numbers_in_frame
 
-  !> How many cells the search has for each disk.
+  !> Number of cells of the search per disk.
   pure function cells(settings) result(n)
     type(settings_t), intent(in) :: settings
     real(real64) :: n
@@ -132,7 +133,7 @@ contains
     n = min(cells_per_disk, 0.25_real64*pi/max(crowding(settings), tiny(n)))
   end function cells
 
-  !> Whether the disks have so many different sizes that neighbour lists are used: the condition of `neighbour_lists`.
+  !> Whether neighbour lists are used, by the condition of `neighbour_lists`.
   pure function are_listed(settings) result(yes)
     type(settings_t), intent(in) :: settings
     logical :: yes
@@ -147,7 +148,7 @@ contains
     yes = candidates > candidates_that_pay - 27*packing
   end function are_listed
 
-  !> The packing fraction if all disks were as large as the largest ones, apart from a few: the cells are made for these.
+  !> The packing fraction if all disks had the largest radius for which cells are made, which excludes a few big disks.
   pure function crowding(settings) result(fraction)
     type(settings_t), intent(in) :: settings
     real(real64) :: fraction, radius

@@ -18,8 +18,8 @@ module packing
     real(real64) :: lower(2) = 0.0_real64           !! corners of a rectangle that contains all centres [length]
     real(real64) :: upper(2) = 0.0_real64
     real(real64) :: density(2) = 0.0_real64         !! cells per length [1/length]
-    integer :: n(2) = 0                             !! columns, rows
-    real(real64) :: width = 0.0_real64              !! of a cell, the smaller side [length]
+    integer :: n(2) = 0                             !! numbers of columns and rows
+    real(real64) :: width = 0.0_real64              !! smaller edge of a cell [length]
     integer(int32), allocatable :: head(:, :)       !! first disk in each cell; 0: none
   end type layer_t
 
@@ -33,10 +33,10 @@ module packing
 
   type :: packing_t
     type(box_t) :: box
-    type(images_t), private :: images               !! of the box
+    type(images_t), private :: images               !! images of the box
     type(placed_t), allocatable :: disk(:)          !! (n)
     type(layer_t), allocatable :: layer(:)          !! (number of species)
-    type(obstacle_cells_t) :: near                  !! obstacles, for the largest radius of an opened species
+    type(obstacle_cells_t) :: near                  !! lists of obstacles, for the largest radius of an opened species
   contains
     procedure :: open_species
     procedure :: add
@@ -116,7 +116,7 @@ contains
   pure subroutine find_blocker(self, centre, half, radius, blocker)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: centre(2), half(2)  !! [length]
-    real(real64), intent(in) :: radius              !! at most that of a species that has been opened [length]
+    real(real64), intent(in) :: radius              !! at most the largest radius of an opened species [length]
     integer(int32), intent(out) :: blocker
     real(real64) :: rho
     integer(int32) :: e
@@ -142,7 +142,7 @@ contains
     end do
   end subroutine find_blocker
 
-  !> Loads the cells of a species around a point into the cache.
+  !> Prefetches the cells of a species around a point.
   subroutine load_cells(self, s, p)
     class(packing_t), intent(in) :: self
     integer(int32), intent(in) :: s
@@ -157,7 +157,7 @@ contains
     end associate
   end subroutine load_cells
 
-  !> Loads the last disk of each of these cells.
+  !> Prefetches the last disk of each of these cells.
   subroutine load_disks(self, s, p)
     class(packing_t), intent(in) :: self
     integer(int32), intent(in) :: s
@@ -191,7 +191,7 @@ contains
       middle = cell(layer, p)
       blocker = blocker_in(packing, layer%head(middle(1), middle(2)), p, half, radius)
       if (blocker > 0) return
-      if (rho <= layer%width) then                  ! often; beyond the neighbours of the cell there is none then
+      if (rho <= layer%width) then                  ! often; only the neighbouring cells contain such disks then
         low = max(middle - 1, 1)
         high = min(middle + 1, layer%n)
       else

@@ -29,8 +29,8 @@ module random_insertion
 
   !> The random numbers of an attempt, and the stream after them.
   type :: attempt_t
-    real(real64) :: voxel = 0.0_real64              !! which, as a share of them all
-    real(real64) :: place(2) = 0.0_real64           !! where in the voxel
+    real(real64) :: voxel = 0.0_real64              !! selects the voxel, as a fraction of their number
+    real(real64) :: place(2) = 0.0_real64           !! position in the voxel, as fractions of its edges
     type(random_stream_t) :: after
   end type attempt_t
 
