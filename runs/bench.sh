@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What a collision costs, and what everything around it costs. docs/performance.md says more.
+# Cost of a collision, and of everything around it. docs/performance.md explains the results.
 #
 #   runs/bench.sh            1e3 to 1e5 disks at four packings; gravity, restitution, sizes, samples
 #   runs/bench.sh --full     1e6 disks as well: rates, random start, memory; runs and threads on two cores
@@ -90,7 +90,7 @@ table() {
     "$(repeated rate gas_1000_0.5 20000 --set run.search=pairs | median)"
 }
 
-# --- Rates with something more, by turns with rates without -----------------------------------------
+# --- Rates with something more, interleaved with rates without -----------------------------------------
 
 # beside WHAT LEAST NAME OTHER COLLISIONS [OPTION...]: the rate from state OTHER with options,
 # relative to the one from state NAME without.
@@ -202,7 +202,7 @@ threads() {
   faster 'gravity, 100000 disks, packing 0.5' 1.6 gas_100000_0.5 6000000 --set box.gravity=0,-1
 }
 
-# ensemble JOBS: four runs of some seconds, so many at a time.
+# ensemble JOBS: four runs of several seconds, so many at a time.
 ensemble() {
   RICOCHET=$program runs/ensemble.sh "$work/gas_10000_0.5.nml" -d "$work/ensemble$1" --seeds 1-4 -j "$1" \
     --set stop.collisions=20000000

@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# What the scripts of the systems share; the first line of each reads it. It sets python, data (the
+# Common part of the scripts of the systems; the first line of each reads it. It sets python, data (the
 # folder of the runs), figures (that of the figures) and `replace`. Options of ensemble.sh, such as
 # -j 4, go through.
 set -euo pipefail

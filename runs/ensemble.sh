@@ -169,7 +169,7 @@ put() {
   fi
 }
 
-# What member NAME has said last.
+# The last line in the log of member NAME.
 last_words() { ! may_be_ours "$folder/$1.log" || tail -n 1 -- "$folder/$1.log" 2>/dev/null || true; }
 
 goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line of a member that has not failed
@@ -179,7 +179,7 @@ has_data() { [[ -e $folder/$1.h5 || -e $folder/$1.h5.part && $(last_words "$1") 
 
 has_failed() { [[ ! -e $folder/$1.h5 && ! $(last_words "$1") =~ $goes_on ]]; }
 
-# What member NAME has said of an attempt before says nothing of the next.
+# The log of an earlier attempt of member NAME says nothing about the next: an empty line ends it.
 forget_failure() {
   local lock
   has_failed "$1" && open_log "$folder/$1.log" || return 0
@@ -434,7 +434,7 @@ prepare_shares() {
     --manifest "$here/left.txt" -j 1 --share)
 }
 
-# What became of the members shows in their files.
+# The results of the members follow from their files.
 judge_by_files() {
   local name said=''
   for name in "${names[@]}"; do
@@ -462,7 +462,8 @@ run_parallel() {
   judge_by_files
 }
 
-# What no member could begin with fails before any waits in the queue; of those that differ by their seed one is tried.
+# An input with which no member could begin fails before any member waits in the queue. Of members that differ only in their
+# seed one is tried.
 check_inputs() {
   local k kind reason arguments
   local -A seen=()

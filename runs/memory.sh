@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What each kind of run takes of memory per disk, beside what the program assumes (src/start/memory.f90).
+# Memory per disk of each kind of run, beside the memory that the program assumes (src/start/memory.f90).
 #
 #   runs/memory.sh             490 000 disks, on one core without domains, and 10^6 with domains
 #   runs/memory.sh 10000000    so many disks, of the kinds that have domains

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# How much faster a run is on the cores of this machine: some five minutes, in which nothing else should
+# How much faster a run is on the cores of this machine: about five minutes, in which nothing else should
 # run. Not part of `make figures`. Gases at packing fraction 0.5 in a box with walls, 6 million collisions
-# (15 million of a million disks), three runs by turns with 1, 2, 4, ... threads, up to the cores there are.
+# (15 million of a million disks), three runs alternately with 1, 2, 4, ... threads, up to the cores there are.
 #
 #   runs/scaling.sh
 #   SIZES="10000 100000" THREADS="1 2 3" RUNS=5 runs/scaling.sh

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What `make install`, `make uninstall` and `make dist` do.
+# The actions of `make install`, `make uninstall` and `make dist`.
 # usage: src/install.sh install|uninstall|dist    environment: PREFIX, DESTDIR, BUILD
 set -euo pipefail
 ((BASH_VERSINFO[0]*100 + BASH_VERSINFO[1] >= 404)) || { echo "bash 4.4 or newer is needed, this is $BASH_VERSION" >&2; exit 2; }
@@ -17,7 +17,7 @@ module=share/modulefiles/ricochet/$version
 package=$shared/post/ricochet
 completions=share/bash-completion/completions
 
-# What stands behind each name: a file, or "-> PLACE" for a link; nothing where it is made here.
+# Source of each installed name: a file, or "-> PLACE" for a link; nothing where it is made here.
 declare -A behind
 plan() {
   local text command

@@ -254,11 +254,12 @@ def comments_of(path: Path) -> Iterator[tuple[int, str]]:
             if token.type == tokenize.COMMENT
         ]
     else:
+        mark = r"^\s*(#)" if path.suffix == ".sh" else r"(!)"
         lines = (re.sub(r"'[^']*'|\"[^\"]*\"", "''", line) for line in text.splitlines())
         found = [
-            (number, line.split("!", 1)[1].lstrip("!> "))
+            (number, line[start.start(1) :].lstrip("#!> "))
             for number, line in enumerate(lines, start=1)
-            if "!" in line
+            if (start := re.search(mark, line))
         ]
     previous, start, words = 0, 0, ""
     for number, line in found:
@@ -282,9 +283,10 @@ def language_problems(root: Path) -> Iterator[Problem]:
                 line = text.count("\n", 0, row.start()) + 1
                 what = f"the help of {row[1]}.{row[2]} begins with no capital noun"
                 yield Problem(path.relative_to(root), line, f"{what}: {row[3]}")
-    sources = [path for name in ("src", "post", "tests") for path in (root / name).rglob("*.*")]
+    folders = ("src", "post", "runs", "tests")
+    sources = [path for name in folders for path in (root / name).rglob("*.*")]
     for path in sorted(sources):
-        if path.suffix not in (".f90", ".py"):
+        if path.suffix not in (".f90", ".pf", ".py", ".sh"):
             continue
         for line, comment in comments_of(path):
             words = " ".join(comment.split())
