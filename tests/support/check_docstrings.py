@@ -1,8 +1,9 @@
-"""Holds the docstrings of the public Python functions to the numpydoc standard.
+"""Checks the docstrings of public Python functions against the numpydoc standard.
 
     python tests/support/check_docstrings.py
 
-One line for each problem.  Public are the names in `__all__` of the package and of `MODULES`.
+Prints one line for each problem.  The public names are those in `__all__` of the package and of
+`MODULES`.
 """
 
 import sys
@@ -37,7 +38,7 @@ IGNORED = {
     "RT05": "likewise",
     "YD01": "generators have Yields only where a caller uses them",
 }
-#: Classes whose public methods and properties are held to the standard, too.
+#: Classes whose public methods and properties are checked as well.
 CLASSES = ("Run", "Simulation")
 METHODS = (FunctionType, classmethod, staticmethod)
 #: A named tuple needs no example: functions return it.

@@ -2,8 +2,8 @@
 
     python tests/support/check_examples.py FOLDER
 
-One file for each section of README.md and of the pages in docs/ that has an example; a section that
-imports nothing continues the one before.  The cells of the tour are one file, too.
+Each section of README.md and of the pages in docs/ that has an example becomes one file; a section
+that imports nothing continues the previous one.  The cells of the tour form one file as well.
 """
 
 import ast

@@ -1,4 +1,4 @@
-"""Holds the sources against the rules of the design that no other tool knows. One line per problem.
+"""Checks the sources against rules of the design that no other tool knows. One line per problem.
 
     python tests/support/check_style.py [FOLDER]
 
@@ -81,7 +81,7 @@ def arrows_of(page: str) -> dict[str, set[str]]:
 def arrow_problems(
     path: Path, lines: list[str], homes: dict[str, str], arrows: dict[str, set[str]]
 ) -> Iterator[Problem]:
-    """Uses that name no entities, or have no arrow in the picture."""
+    """Problems of `use` statements: without `only`, or without an arrow in the picture."""
     own = path.parent.name
     for number, line in enumerate(lines, start=1):
         use = USE.match(line)
@@ -98,7 +98,7 @@ def arrow_problems(
 def import_problems(root: Path, package: Path) -> Iterator[Problem]:
     """Imports between the folders of a Python package that have no arrow in its picture.
 
-    A module that stands in the package itself counts as a folder; `__init__.py` may use all.
+    A module at the top of the package counts as a folder; `__init__.py` may use all folders.
     """
     page = package / "README.md"
     arrows = arrows_of(page.read_text())
@@ -117,7 +117,7 @@ def import_problems(root: Path, package: Path) -> Iterator[Problem]:
 
 
 def imports_of(path: Path, package: Path) -> Iterator[tuple[int, str]]:
-    """Line and first name below the package of each import, wherever it stands in the file."""
+    """Line, and first name below the package, of each import anywhere in the file."""
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ImportFrom) and node.level > 0:
             start = path.parents[node.level - 1].relative_to(package).parts
@@ -179,7 +179,7 @@ def statements_of(text: str) -> list[tuple[int, str]]:
 def heading_problems(path: Path, text: str) -> Iterator[Problem]:
     """Procedures without `!>`, with long argument lists, or whose body follows without a gap.
 
-    Interfaces of C functions need no comment: their manual pages have it.
+    Interfaces of C functions need no comment, because they have manual pages.
     """
     statements = statements_of(text)
     foreign = declared = inside = False
@@ -228,7 +228,7 @@ def name_problems(root: Path, paths: list[Path]) -> Iterator[Problem]:
 
 
 def path_problems(root: Path) -> Iterator[Problem]:
-    """Paths of one machine, in any file that is or could be committed."""
+    """Paths that exist on one machine only, in any file that is or could be committed."""
     command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
     for name in subprocess.check_output(command, cwd=root, text=True).splitlines():
         try:

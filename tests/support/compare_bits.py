@@ -75,7 +75,7 @@ OLD_VALUES = {
 
 
 def for_old(text: str) -> str:
-    """An input with the names of before."""
+    """The input with the names of the old program."""
 
     def group(match: re.Match) -> str:
         text = match[0]
@@ -98,7 +98,7 @@ def of_old(found: dict) -> dict:
 
 
 def random_inputs(folder: Path) -> list[Path]:
-    """Each in a folder of its own, with the file that it names."""
+    """Random inputs, each in a folder of its own, with its starting file."""
     inputs = []
     for k in range(SYSTEMS):
         system, place = random_system(random.Random(k)), folder / f"random_{k}"
@@ -116,7 +116,7 @@ SUMS = re.compile(
 
 
 def is_near(name: str, old: dict, new: dict, share: float) -> bool:
-    """Whether a sum is the same but for a share of its largest value, or of the energy."""
+    """Whether two sums agree up to a fraction of their largest value, or of the energy."""
     if not (SUMS.fullmatch(name) and name in old and name in new):
         return False
     a, b = old[name], new[name]

@@ -1,8 +1,9 @@
-"""Random systems over every group of the input, to look for what nobody has named.
+"""Random systems with all groups of the input, to find failures for which there is no test yet.
 
-Each draws its scale, shape, boundaries, disks, obstacles, law, cadence and end on its own, with a
-liking for what breaks programs: restitution of exactly 0, aligned velocities and lattices,
-clusters, strips, great ratios of size and mass. A system is a text and the file that it names.
+Scale, shape, boundaries, disks, obstacles, contact laws, sampling and stop rules are drawn
+independently, with a preference for difficult cases: restitution of exactly 0, aligned velocities
+and lattices, clusters, strips, large ratios of size and mass. A system consists of an input text
+and its starting file.
 """
 
 import math
@@ -20,7 +21,7 @@ KINDS = r"(dynamics|motion|rule|law|placement|velocities|kind|side|precision) = 
 
 
 class System(NamedTuple):
-    """An input file, the table of its starting file (empty: none), and what it says of itself."""
+    """An input file, the table of its starting file (empty: none), and a description."""
 
     text: str
     columns: list[str]
@@ -47,15 +48,15 @@ def starting_file(columns: list[str], table: np.ndarray) -> str:
 
 
 def numbers(*values: float) -> str:
-    """Values as a namelist has them, with all digits."""
+    """Values in namelist format, with all digits."""
     return ", ".join(repr(float(value)) for value in values)
 
 
 class Draw:
-    """One system in the making: what earlier choices mean for later ones."""
+    """One system under construction: earlier choices restrict later ones."""
 
     def __init__(self, rng: random.Random, most: int):
-        """The scales, and what others depend on."""
+        """Draw the scales, on which other quantities depend."""
         self.rng = rng
         self.disks = rng.choice([rng.randint(1, 12), rng.randint(20, 400), rng.randint(2600, 6000)])
         self.disks = 1 + (self.disks - 1) % most
@@ -123,7 +124,7 @@ class Draw:
     # --- walls ---
 
     def law(self) -> str:
-        """Collision rule of one side, wall or obstacle: often none of its own."""
+        """Contact law of one side, wall or obstacle; often the default law."""
         rng = self.rng
         if self.chance(0.5):
             return ""
@@ -188,7 +189,7 @@ class Draw:
         return words + self.maybe(0.7, f"phase = {rng.choice([0, 0.5, rng.random()])}")
 
     def obstacles(self) -> list[str]:
-        """Circles and straight walls; disks find room among them if they are placed at random."""
+        """Circles and straight walls, with space between them for randomly placed disks."""
         rng, groups, small = self.rng, [], min(self.edges)
         if self.sheared:
             return groups
@@ -234,7 +235,7 @@ class Draw:
         return high[0] - low[0], high[1] - low[1]
 
     def motion(self, count: int) -> str:
-        """How the disks of a species start."""
+        """Initial velocities of a species."""
         v, rng = self.speed, self.rng
         words = rng.choice(
             [
@@ -387,7 +388,7 @@ class Draw:
         return words + " /"
 
     def drive(self) -> str:
-        """Kicks, from many in a free flight to one in many."""
+        """Driving, from many kicks in a free flight to one in many flights."""
         if not self.driven:
             return ""
         rng = self.rng
@@ -445,7 +446,7 @@ class Draw:
         return words + " /"
 
     def cadence(self, kind: str) -> float:
-        """How often a track has a sample."""
+        """Sampling interval of a track."""
         every = max(self.events // self.rng.randint(2, 5 if self.disks > 1000 else 40), 1)
         if kind == "time":
             return self.rng.uniform(0.02, 0.3) * min(self.edges) / self.speed
@@ -455,7 +456,7 @@ class Draw:
 
 
 def random_system(rng: random.Random, most: int = 10**6) -> System:
-    """A system of about `most` disks at most, that may be refused, break off, or run."""
+    """A system of at most about `most` disks, which may be refused, break off, or run."""
     draw = Draw(rng, most)
     walls = draw.sides()
     obstacles = draw.obstacles()

@@ -37,7 +37,7 @@ def make(*arguments, **more) -> subprocess.CompletedProcess:
 
 @pytest.fixture
 def small(tmp_path) -> list[str]:
-    """Arguments of `make unit-tests` for a program with one test and no module of ours."""
+    """Arguments of `make unit-tests` for a program with one test and no module of the project."""
     suites = tmp_path / "suites"
     suites.mkdir()
     (suites / "test_it.pf").write_text(SUITE.format(1))
@@ -76,7 +76,7 @@ esac"""
 
 @pytest.mark.skipif(not PFUNIT_DIR, reason="PFUNIT_DIR names no pFUnit")
 def test_runners_take_turns_in_one_folder(small, tmp_path):
-    """Each runs what is there now, not what the other has left."""
+    """Each runs its own program, not the one that the other has left."""
     real = [*[word for word in small if not word.startswith(("shared", "PFUNIT"))]]
     real += ["shared=", f"PFUNIT_DIR={PFUNIT_DIR}"]
     for value, status in ((1, 0), (2, 2), (1, 0)):
@@ -87,7 +87,7 @@ def test_runners_take_turns_in_one_folder(small, tmp_path):
 
 
 def test_a_linker_that_cannot_redirect_gets_no_hints(small, tmp_path):
-    """A stand-in for one: it refuses the option as others do."""
+    """A stand-in for such a linker refuses the option as others do."""
     refusal = 'case "$*" in *--wrap*) echo unknown option: --wrap >&2; exit 1;; esac'
     compiler = executable(tmp_path / "gfortran", f'{refusal}\nexec gfortran "$@"')
     run = make(*small, f"FC={compiler}")
@@ -130,7 +130,7 @@ def test_a_film_takes_one_command(program, tmp_path):
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
-    """A folder with all that an install brings, and an uninstall takes away again."""
+    """A folder with all installed files, which an uninstall removes again."""
     root = tmp_path_factory.mktemp("root")
     place = [f"DESTDIR={root}", "PREFIX=/usr"]
     assert make("install", *place).returncode == 0
@@ -180,7 +180,7 @@ def test_who_installs_for_others_is_told_that_the_program_is_for_this_processor(
 
 
 def test_only_what_was_installed_goes(tmp_path):
-    """Another program stays; so do runs, notes and folders of users, from install to uninstall."""
+    """Other programs, and runs, notes and folders of users, remain after install and uninstall."""
     prefix = tmp_path / "it's a folder"
     shared, place, program = prefix / "share/ricochet", f"PREFIX={prefix}", prefix / "bin/ricochet"
     program.parent.mkdir(parents=True)
@@ -301,7 +301,7 @@ def test_pip_brings_program_library_package_commands_and_inputs(tmp_path):
 
 @pytest.mark.parametrize("script", [".ci/set-up", "src/install.sh", "runs/ensemble.sh"])
 def test_scripts_that_need_a_later_bash_say_so(tmp_path, script):
-    """As if this bash were an old one: they do nothing before they have looked."""
+    """With a pretended old bash version they stop before they do anything."""
     text = (ROOT / script).read_text()
     limit = re.search(r"BASH_VERSINFO.*>= (404)\b", text).span(1)
     copy = tmp_path / "script"

@@ -1,4 +1,4 @@
-"""No public name of before is left in the tree, but in the table that answers them."""
+"""No old public name is left in the tree, except in the table of old names."""
 
 import re
 import subprocess

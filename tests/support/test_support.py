@@ -1,4 +1,4 @@
-"""The tools behind the tests: the substitute for pFUnit, the judge of its runs, the style rules."""
+"""Tools of the tests: the substitute for pFUnit, the check of its runs, the style rules."""
 
 import os
 import re
@@ -330,7 +330,7 @@ def test_folders_and_what_they_use_are_those_of_the_picture(tmp_path):
     ],
 )
 def test_imports_of_the_package_are_those_of_its_picture(tmp_path, line, used):
-    """Absolute or relative, at the top of a module or in a function; its own folder is free."""
+    """Absolute or relative, at the top or in a function; those from the same folder are allowed."""
     package = tmp_path / "post" / "ricochet"
     ran("git", "init", "-q", tmp_path, check=True)
     for name in ("__init__", "commands", "reading/reader", "pages/live", "pages/lab"):

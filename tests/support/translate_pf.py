@@ -2,7 +2,7 @@
 
 It accepts the part of pFUnit's language that the tests need and refuses everything else, also what
 pFUnit itself would accept or silently ignore: a file that runs here runs under pFUnit with the same
-verdict. One line stays one line, so compilers and failures speak of lines of the .pf file.
+result. Each line stays one line, so that messages refer to lines of the .pf file.
 
     python translate_pf.py tests/unit/test_errors.pf build/tests/test_errors.F90
 """
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 
 class Refused(Exception):
-    """A line that is not in the common language."""
+    """A line outside of the supported part of the language."""
 
 
 class Suite(NamedTuple):
