@@ -63,7 +63,7 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
     alike, fluid, solid = likeness(runs), np.linspace(0, 0.72, 200), np.linspace(0.715, 0.86, 100)
     laws = (hard_disks.henderson(fluid), hard_disks.simulated(fluid))
     henderson, published = (hard_disks.of_sizes(z, fluid, alike) for z in laws)
-    label = "Kolafa and Rottner 2006; above 0.5 Erpenbeck and Luban 1985"
+    label = "Kolafa and Rottner 2006; to 0.65 Erpenbeck and Luban 1985; then this program"
     if alike < 1:
         label = "Santos, Yuste and López de Haro 1999, from those of equal disks"
     above.plot(fluid, henderson, color="0.6", label="Henderson 1975")

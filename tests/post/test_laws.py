@@ -17,6 +17,11 @@ def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_poin
         series = np.polyval(virial[::-1], eta)
         assert float(hd.simulated(eta)) == pytest.approx(series, rel=2e-5)
     np.testing.assert_allclose(hd.simulated(hd.FLUID[:, 0]), hd.FLUID[:, 1])
+    np.testing.assert_allclose(hd.simulated(hd.FREEZING[:, 0]), hd.FREEZING[:, 1])
+    dense = np.linspace(0.6, 0.698, 99)  # one curve up to freezing, which bends where it begins
+    slope = np.gradient(dense * hd.simulated(dense), dense)
+    assert np.all(slope > 0) and np.abs(np.diff(slope)).max() < 0.1 * slope.max()
+    assert np.isnan(hd.published(0.69, 1000, True))
     assert hd.crystal(0.8) - hd.crystal(0.8, 100) == pytest.approx((hd.crystal(0.8) - 1) / 100)
     assert np.isnan(hd.simulated(0.7)) and hd.simulated_finite(0.1, 100) < hd.simulated(0.1)
 

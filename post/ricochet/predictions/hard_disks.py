@@ -40,6 +40,13 @@ FLUID = np.array([
     (0.30, 2.06326), (0.35, 2.40150), (0.40, 2.82933), (0.45, 3.38054), (0.50, 4.10636),
     (CLOSE_PACKING / 1.6, 5.4963), (CLOSE_PACKING / 1.5, 6.6074), (CLOSE_PACKING / 1.4, 8.306),
 ])  # fmt: skip
+# Up to freezing, where we know of no published values: by this program, two runs of 8000 disks and
+# 1000 collisions per disk at each packing fraction, with errors below 0.1 %; the last value is that
+# of 1024^2 disks in `MELTING`.
+FREEZING = np.array([
+    (0.66, 8.875), (0.67, 9.350), (0.68, 9.839), (0.69, 10.234),
+    (0.698, 9.16934 * math.pi / 4 / 0.698),
+])  # fmt: skip
 # Z_N = Z + c / N in a periodic box, at the first ten packing fractions.
 SHIFT = np.array(
     [-0.1036, -0.2152, -0.3361, -0.4680, -0.6131, -0.7741, -0.9549, -1.1605, -1.3981, -1.6776]
@@ -67,9 +74,11 @@ MELTING = {
 @cache
 def splines() -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
     """Z (1 - eta)^2, which is close to 1 and smooth and so safe to interpolate, and c."""
-    eta, z = FLUID.T
+    eta, z = np.concatenate([FLUID, FREEZING]).T
     smooth = scipy.interpolate.CubicSpline(np.append(0, eta), np.append(1, z * (1 - eta) ** 2))
-    return smooth, scipy.interpolate.CubicSpline(np.append(0, eta[:10]), np.append(0, SHIFT))
+    return smooth, scipy.interpolate.CubicSpline(
+        np.append(0, eta[: len(SHIFT)]), np.append(0, SHIFT)
+    )
 
 
 def henderson(eta: Number) -> Number:
@@ -96,7 +105,9 @@ def henderson(eta: Number) -> Number:
 
 
 def simulated(eta: ArrayLike) -> np.ndarray:
-    """Return Z = P / (n kT) of the fluid, interpolated between published simulations.
+    """Return Z = P / (n kT) of the fluid, interpolated between simulations.
+
+    They are published ones, except between the packing fractions 0.648 and 0.698.
 
     Parameters
     ----------
@@ -106,7 +117,7 @@ def simulated(eta: ArrayLike) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        (...) Z; NaN beyond the last point of `FLUID`
+        (...) Z; NaN beyond 0.698, where the disks freeze
 
     Examples
     --------
@@ -114,7 +125,7 @@ def simulated(eta: ArrayLike) -> np.ndarray:
     True
     """
     eta = np.asarray(eta, dtype=float)
-    return np.where(eta <= FLUID[-1, 0], splines()[0](eta) / (1 - eta) ** 2, np.nan)
+    return np.where(eta <= FREEZING[-1, 0], splines()[0](eta) / (1 - eta) ** 2, np.nan)
 
 
 def simulated_finite(eta: ArrayLike, count: int) -> np.ndarray:
@@ -179,7 +190,7 @@ def adiabat(
     Frisch and Lebowitz, J. Chem. Phys. 34, 1037 (1961).  P as `simulated`.
     """
     area = count * math.pi * radius**2
-    eta = np.geomspace(1e-12, FLUID[-1, 0], 50001)  # far from the walls
+    eta = np.geomspace(1e-12, FREEZING[-1, 0], 50001)  # far from the walls
     layer = 2 * radius * (1 - eta) / (1 + eta)  # of the two walls together
     width = area / eta / (height - walled * layer) + layer
     force = eta / area * (simulated(eta) * height - walled * 2 * radius / (1 - eta))  # over N kT
@@ -204,7 +215,7 @@ def published(eta: float, count: int, periodic: bool) -> float:
     Returns
     -------
     float
-        Z of the fluid up to 0.65 and of the crystal from 0.72 on; NaN between
+        Z of the fluid up to 0.648 and of the crystal from 0.72 on; NaN between
 
     Examples
     --------
@@ -213,6 +224,8 @@ def published(eta: float, count: int, periodic: bool) -> float:
     """
     if eta <= 0.5:
         return float(simulated_finite(eta, count) if periodic else simulated(eta))
+    if FLUID[-1, 0] < eta < 0.72:
+        return math.nan
     return float(crystal(eta, count) if eta >= 0.72 else simulated(eta))
 
 
