@@ -250,7 +250,7 @@ contains
         eol//"obstacle_collisions = "//written(sum(sim%tally%surface_collisions(n_sides + 1:)))// &
         eol//"time = "//written(sim%time())// &
         eol//"kinetic_energy = "//written(energy(1))
-      if (sim%with%rotation) text = text//eol//"rotational_energy = "//written(energy(2))
+      if (sim%features%rotation) text = text//eol//"rotational_energy = "//written(energy(2))
       text = text//eol//"total_energy = "//written(energy(3))// &
         eol//"dissipated_energy = "//written(sim%tally%total(dissipated))// &
         eol//"wall_time = "//written(seconds() - run%started)// &

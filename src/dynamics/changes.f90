@@ -27,9 +27,9 @@ contains
     integer :: k
 
     problem = ""
-    other%given_t = sim%given_t
+    other%specification_t = sim%specification_t
     other%system_t = system
-    other%with%own_sizes = sim%with%own_sizes
+    other%features%own_sizes = sim%features%own_sizes
     other%box%epoch = sim%box%epoch
     do k = 1, n_sides                                        ! a piston starts at the position and with the velocity of the side
       if (other%box%surface(k)%motion%kind /= piston) cycle
@@ -39,7 +39,8 @@ contains
     end do
     call bounds(sim%box, sim%now, here(:, 1), here(:, 2))
     call bounds(other%box, sim%now, there(:, 1), there(:, 2))
-    if ((other%with%rotation .neqv. sim%with%rotation) .or. (other%with%orientation .neqv. sim%with%orientation) .or. &
+    if ((other%features%rotation .neqv. sim%features%rotation) .or. &
+      (other%features%orientation .neqv. sim%features%orientation) .or. &
       (other%law%contact_time > 0 .neqv. sim%law%contact_time > 0)) then
       problem = "the change needs data that the disks do not have: rotation, orientation and contact_time > 0 must be there " &
         //"from the start"

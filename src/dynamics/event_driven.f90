@@ -123,7 +123,7 @@ contains
 
     iterations = limits%iterations
     self%iterations_left = iterations
-    self%general = present(log) .or. sim%with%need_general_collision() .or. sim%law%by_speed%speed > 0
+    self%general = present(log) .or. sim%features%need_general_collision() .or. sim%law%by_speed%speed > 0
     self%arrived = .false.
     do while (iterations > 0)
       if (limits%reached(sim%tally) .or. is_full(log)) return

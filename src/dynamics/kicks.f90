@@ -92,7 +92,7 @@ contains
       v = sim%box%shear_profile(sim%disk(i)%x) + sqrt(drive%temperature/sim%mass_of(i))*z
       if (drive%kind == active) call add_self_propulsion()
       call change_velocity(sim, i, v)
-      if (.not. sim%with%rotation) return
+      if (.not. sim%features%rotation) return
       call stream%draw_normals(spin)
       call change_spin(sim, i, sqrt(drive%temperature/sim%inertia_of(i))*spin(1))
     end associate

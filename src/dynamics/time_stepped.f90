@@ -5,7 +5,7 @@
 !> As in event-driven dynamics the state of a disk changes only in its own collisions, so that errors of steps do not accumulate.
 module time_stepped
   use images, only: images_t
-  use kinds, only: int32, int64, most_exact, never, real64
+  use kinds, only: int32, int64, largest_exact, never, real64
   use box_geometry, only: normal_surface_velocity, wall_normal
   use box_sides, only: bounds
   use encounters, only: collide, encounter_text, is_periodic_side, pass_side
@@ -65,7 +65,7 @@ contains
     real(real64) :: t                              !! since the start of the run
 
     t = time
-    if (time > most_exact*self%dt) return
+    if (time > largest_exact*self%dt) return
     t = steps_taken(time, self%dt)*self%dt
     if (t < time) t = (steps_taken(time, self%dt) + 1)*self%dt
   end function pause_at

@@ -33,7 +33,7 @@ module hdf5_series
     procedure :: copy
     procedure :: width
     procedure :: holds
-    procedure :: room
+    procedure :: bytes_per_sample
     procedure, private :: extents, storage_type
   end type series_t
 
@@ -58,12 +58,12 @@ contains
   end function holds
 
   !> Size of one sample in the file [bytes].
-  elemental function room(self) result(bytes)
+  elemental function bytes_per_sample(self) result(bytes)
     class(series_t), intent(in) :: self
     integer(int64) :: bytes
 
     bytes = int(bytes_of(self%storage), int64)*self%width()
-  end function room
+  end function bytes_per_sample
 
   !> The HDF5 type of the values in the file.
   function storage_type(self) result(type)
@@ -171,8 +171,8 @@ contains
     integer(int8), allocatable, target :: buffer(:)
     integer(int64) :: first, n, step
 
-    step = max(1_int64, copied_at_once/self%room())
-    allocate (buffer(min(step, count)*self%room()))
+    step = max(1_int64, copied_at_once/self%bytes_per_sample())
+    allocate (buffer(min(step, count)*self%bytes_per_sample()))
     do first = 1, count, step
       n = min(step, count - first + 1)
       call source%transfer(trim(self%name), first, self%extents(n), self%storage_type(), c_loc(buffer), writing=.false.)

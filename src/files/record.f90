@@ -17,7 +17,7 @@ module record
   !> A sequence of numbers, each a word of 64 bits.
   type :: record_t
     character(len=:), allocatable :: name         !! path of the dataset
-    integer :: way = counting
+    integer :: mode = counting
     integer(int64) :: words = 0                   !! number of words so far
     integer(int64), private :: crc = 0            !! checksum of these words
   contains
@@ -61,11 +61,11 @@ contains
   end subroutine make
 
   !> Restarts the record, in order to count, write or read it.
-  subroutine begin(self, way)
+  subroutine begin(self, mode)
     class(record_t), intent(inout) :: self
-    integer, intent(in) :: way
+    integer, intent(in) :: mode
 
-    self%way = way
+    self%mode = mode
     self%words = 0
     self%crc = 0
   end subroutine begin
@@ -127,9 +127,9 @@ contains
     integer(int8), pointer :: bytes(:)
 
     if (n == 0) return
-    if (self%way /= counting) then
+    if (self%mode /= counting) then
       call file%transfer(self%name, self%words + 1, [int(n, int64)], h5kind_to_type(int64, h5_integer_kind), &
-        address, self%way == writing)
+        address, self%mode == writing)
       call c_f_pointer(address, bytes, [bytes_of_word*n])
       self%crc = crc32(int(self%crc, c_long), bytes, size(bytes, kind=c_int))
     end if

@@ -30,7 +30,7 @@ module sample_track
     real(real64), allocatable, private :: buffer(:, :)  !! (width,batch)
   contains
     procedure :: appended
-    procedure :: room
+    procedure :: bytes_per_sample
     procedure :: first_capacity
     procedure :: enlarged
     procedure :: widen
@@ -55,19 +55,19 @@ contains
   end function appended
 
   !> Size of one sample in the file [bytes].
-  elemental function room(self) result(bytes)
+  elemental function bytes_per_sample(self) result(bytes)
     class(track_t), intent(in) :: self
     integer(int64) :: bytes
 
-    bytes = sum(self%series%room())
-  end function room
+    bytes = sum(self%series%bytes_per_sample())
+  end function bytes_per_sample
 
   !> Number of samples that are written together.
   pure function batch(self) result(n)
     class(track_t), intent(in) :: self
     integer(int64) :: n
 
-    n = max(1_int64, min(most_in_batch, batch_bytes/self%room()))
+    n = max(1_int64, min(most_in_batch, batch_bytes/self%bytes_per_sample()))
   end function batch
 
   !> Initial capacity in samples.
@@ -76,7 +76,7 @@ contains
     integer(int64) :: n
 
     n = self%planned
-    if (n == 0) n = max(fewest, first_bytes/self%room())
+    if (n == 0) n = max(fewest, first_bytes/self%bytes_per_sample())
   end function first_capacity
 
   !> Capacity required for `count` more samples. If it has to grow, it grows by a factor, to leave space for later samples.

@@ -134,14 +134,14 @@ contains
   pure subroutine choose_features(self)
     class(settings_t), intent(inout) :: self
 
-    associate (with => self%with, species => self%species)
-      with%own_sizes = any(species%mass_in_file .or. species%radius_in_file .or. species%polydispersity > 0)
-      with%rotation = self%law%tangential%is_rough() .or. self%box%has_rough_walls() .or. any(abs(species%angular_velocity) > 0 &
-        .or. species%rotational_temperature >= 0 .or. species%spin_in_file)
-      with%orientation = with%rotation .or. self%drive%kind == active .or. any(species%angle_in_file)
-      with%helfand = self%output%helfand
-      with%stress = with%rotation .or. self%box%gives_energy() .or. self%drive%is_on() .or. self%output%virial_tensor &
-        .or. with%helfand
+    associate (features => self%features, species => self%species)
+      features%own_sizes = any(species%mass_in_file .or. species%radius_in_file .or. species%polydispersity > 0)
+      features%rotation = self%law%tangential%is_rough() .or. self%box%has_rough_walls() &
+        .or. any(abs(species%angular_velocity) > 0 .or. species%rotational_temperature >= 0 .or. species%spin_in_file)
+      features%orientation = features%rotation .or. self%drive%kind == active .or. any(species%angle_in_file)
+      features%helfand = self%output%helfand
+      features%stress = features%rotation .or. self%box%gives_energy() .or. self%drive%is_on() .or. self%output%virial_tensor &
+        .or. features%helfand
     end associate
   end subroutine choose_features
 

@@ -325,7 +325,7 @@ contains
     if (.not. allocated(error)) call read_slot(file, sim, progress, error)
     call file%close()
     if (allocated(error)) return
-    if (.not. sim%with%own_sizes) sim%disk%radius = input%settings%species(sim%tag%species)%radius
+    if (.not. sim%features%own_sizes) sim%disk%radius = input%settings%species(sim%tag%species)%radius
     call sim%simplify_masses()
     call sim%choose_units()
     call progress%schedule%look_ahead(sim)
@@ -487,18 +487,18 @@ contains
         call exchange_short(tag%id)
         call record%exchange(file, tag%collisions)
         call exchange_short(tag%last_partner)
-        if (sim%with%own_sizes) call record%exchange(file, disk%radius)      ! otherwise the radii follow from the input
+        if (sim%features%own_sizes) call record%exchange(file, disk%radius)  ! otherwise the radii follow from the input
       end associate
       settled = merge(1, 0, sim%events_done)
-      do k = 1, merge(1, 0, sim%with%rotation) + merge(2, 0, sim%with%orientation)
+      do k = 1, merge(1, 0, sim%features%rotation) + merge(2, 0, sim%features%orientation)
         call record%exchange(file, settled)  ! padding words: the length of the record shows whether disks have rotation and
                                              ! orientation
       end do
       if (allocated(sim%extra)) call record%pass(file, c_loc(sim%extra(1)), size(sim%extra)*storage_size(sim%extra)/64)
-      if (.not. sim%with%own_sizes) return
+      if (.not. sim%features%own_sizes) return
       mass = sim%masses()                       ! may all be equal to the masses of the species
       call record%exchange(file, mass)
-      if (record%way == reading) sim%own_mass = mass
+      if (record%mode == reading) sim%own_mass = mass
     end subroutine exchange_disks
 
     !> 32-bit integers, stored as words of 64 bits.

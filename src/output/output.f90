@@ -223,7 +223,7 @@ contains
     output%progress = progress_t(input%settings)
     call output%plan(input, sim)
     bytes = int(min(9.0e18_real64, constants*sim%n_disks() + 2*checkpoint_bytes(sim) &
-      + sum(real(max(output%track%planned, 2_int64), real64)*real(output%track%room(), real64))), int64)
+      + sum(real(max(output%track%planned, 2_int64), real64)*real(output%track%bytes_per_sample(), real64))), int64)
   end function planned_bytes
 
   !> Creates a file under a temporary name and writes everything except tracks and checkpoints.
@@ -329,7 +329,7 @@ contains
     integer :: k
 
     call self%flush_buffers()
-    needed = sum(self%track%appended()*self%track%room())
+    needed = sum(self%track%appended()*self%track%bytes_per_sample())
     if (needed > free_bytes(self%path)) call self%file%check(-1, "be copied to a file of the right size", &
       needed=needed)
     if (allocated(self%file%failure)) return

@@ -1,7 +1,7 @@
 !> The series in a frame, in a sample of the observables and in a sample of the event log. The order is the same
 !> as that of the values in `sample_values`.
 module samples
-  use kinds, only: int32, int64, most_exact
+  use kinds, only: int32, int64, largest_exact
   use errors, only: error_t, exit_broken, fail
   use h5md_layout, only: disks_group, events_group, observables_group, position, step_of, time_of, value_of
   use hdf5_series, only: double_precision, long_integer, series_t, short_integer, single_precision
@@ -66,9 +66,9 @@ contains
 
     too_far = .false.
     do i = 1, merge(sim%n_disks(), 0, any(sim%box%periodic))
-      too_far = too_far .or. any(abs(sim%extra(i)%image) >= most_exact)         ! a frame may have to count one more period
+      too_far = too_far .or. any(abs(sim%extra(i)%image) >= largest_exact)      ! a frame may have to count one more period
     end do
-    if (sim%tally%events > int(most_exact, int64) .or. too_far) &
+    if (sim%tally%events > int(largest_exact, int64) .or. too_far) &
       call fail(error, exit_broken, "more than 2**53 collisions or periods: the output cannot count further")
   end subroutine check_counts
 

@@ -88,7 +88,7 @@ contains
       integer(int32) :: slots
 
       if (.not. allocated(self%sim%species)) then
-        self%sim%given_t = sim%given_t
+        self%sim%specification_t = sim%specification_t
         self%sim%epoch_end = forever
         allocate (self%engine%search, self%engine%histories)
         self%engine%is_part = .true.

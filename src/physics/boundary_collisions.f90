@@ -114,7 +114,7 @@ contains
     call stream%draw_normals(normals)
     thermal = sqrt(temperature/sim%mass_of(i))
     sim%disk(i)%v = u + thermal*(sqrt(-2*log(1 - uniform))*normal + normals(1)*[-normal(2), normal(1)])
-    if (sim%with%rotation) sim%extra(i)%spin = sqrt(temperature/sim%inertia_of(i))*normals(2)
+    if (sim%features%rotation) sim%extra(i)%spin = sqrt(temperature/sim%inertia_of(i))*normals(2)
   end subroutine draw_thermal_velocity
 
   !> Separates disk i from a surface on which it rests. With restitution 0 the TC model cannot conserve a normal velocity,
@@ -172,7 +172,7 @@ contains
 
     mass = sim%mass_of(i)
     gained = 0.5_real64*mass*(dot_product(sim%disk(i)%v, sim%disk(i)%v) - dot_product(v, v))
-    if (sim%with%rotation) gained = gained + 0.5_real64*sim%inertia_of(i)*(sim%spin(i)**2 - omega**2)
+    if (sim%features%rotation) gained = gained + 0.5_real64*sim%inertia_of(i)*(sim%spin(i)**2 - omega**2)
     done = mass*dot_product(u, sim%disk(i)%v - v)
     sim%tally%events = sim%tally%events + 1
     if (heats) then

@@ -73,7 +73,8 @@ contains
     end if
     if (.not. counts) return
     change = momentum_change(sim, first, second, v, w)
-    if (code > 0 .and. sim%with%stress) call add_pair_sums(sim, first, second, change, transferred_energy(sim, first, second, v, w))
+    if (code > 0 .and. sim%features%stress) &
+      call add_pair_sums(sim, first, second, change, transferred_energy(sim, first, second, v, w))
     call sim%record_velocity_change(first, v, t)
     if (code > 0) call sim%record_velocity_change(second, w, t)
     if (.not. present(log)) return
@@ -289,7 +290,7 @@ contains
         call sim%tally%sum(stress + 2*(a - 1) + b - 1)%add(change(a)*r(b))
       end do
     end do
-    if (sim%with%helfand) call sim%tally%sum(heat_virial:heat_virial + 1)%add(transferred_energy*r)
+    if (sim%features%helfand) call sim%tally%sum(heat_virial:heat_virial + 1)%add(transferred_energy*r)
     if (.not. sim%box%is_sheared()) return
     call sim%tally%sum(work)%add(-image_velocity(1)*change(1))
     call remove_residual_approach(sim, i, j)

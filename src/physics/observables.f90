@@ -52,9 +52,9 @@ contains
     integer :: s, k
 
     call add_up(sim, sums)
-    call add_means(list, "all", sums(:, 0), sim%with%rotation)
+    call add_means(list, "all", sums(:, 0), sim%features%rotation)
     do s = 1, size(sim%species)
-      call add_means(list, sim%species(s)%name, sums(:, s), sim%with%rotation)
+      call add_means(list, sim%species(s)%name, sums(:, s), sim%features%rotation)
     end do
     call list%add("total_energy", [total(sim, sums(:, 0))])
     call list%add("momentum", sums(momentum:momentum + 1, 0))
@@ -70,11 +70,11 @@ contains
     end associate
     if (sim%box%highest_temperature() > 0 .or. sim%changes > 0) call list%add("heat", [sim%tally%total(heat)])
     if (sim%box%does_work() .or. sim%changes > 0) call list%add("work", [sim%tally%total(work)])
-    if (sim%with%stress) then
+    if (sim%features%stress) then
       call list%add("virial_tensor", sim%tally%total([stress, stress + 1, stress + 2, stress + 3]))
       call list%add("kinetic_tensor", sums(tensor, 0))
     end if
-    if (sim%with%helfand) then
+    if (sim%features%helfand) then
       flux_integral = sums(flux:flux + 4, 0)*sim%time() - sim%tally%total([(flux_changes + k, k=0, 4)])
       call list%add("helfand_stress", flux_integral(tensor - flux + 1))
       call list%add("helfand_heat", flux_integral(4:))
@@ -172,8 +172,8 @@ contains
     empty%box = box_t()
     empty%box%surface%law%temperature = 1         ! enables all observables
     empty%box%surface%law%speed = 1
-    empty%with%stress = .true.
-    empty%with%helfand = .true.
+    empty%features%stress = .true.
+    empty%features%helfand = .true.
     list = observed(empty)
     allocate (names(list%n + 1))
     names(list%n + 1) = "obstacles"                 ! the empty box has no obstacles
@@ -245,10 +245,10 @@ contains
       term(momentum:momentum + 1) = term(mass)*v
       term(kinetic) = 0.5_real64*term(mass)*dot_product(v, v)
       if (falling) term(potential) = -term(mass)*dot_product(sim%box%gravity, sim%position(i))
-      if (sim%with%rotation) term(rotational) = 0.5_real64*sim%inertia_of(i)*sim%spin(i)**2
+      if (sim%features%rotation) term(rotational) = 0.5_real64*sim%inertia_of(i)*sim%spin(i)**2
       term(own_kinetic) = 0.5_real64*term(mass)*dot_product(own_v, own_v)
       term(own_momentum:own_momentum + 1) = term(mass)*own_v
-      if (sim%with%stress) term(flux:) = kinetic_flux(term(mass), own_v)
+      if (sim%features%stress) term(flux:) = kinetic_flux(term(mass), own_v)
       sums(:size(term), s) = sums(:size(term), s) + term
       if (.not. driven) cycle
       do k = kinetic, rotational

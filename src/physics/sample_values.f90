@@ -29,7 +29,7 @@ contains
     type(frame_column_t), allocatable :: list(:)
     integer :: k
 
-    list = pack(columns, [.true., .true., .true., any(sim%box%periodic), sim%with%rotation, sim%with%orientation])
+    list = pack(columns, [.true., .true., .true., any(sim%box%periodic), sim%features%rotation, sim%features%orientation])
     if (present(wanted)) list = pack(list, [.true., (any(wanted == list(k)%name), k=2, size(list))])
   end function frame_columns
 

@@ -12,7 +12,7 @@ module simulation_state
   use tally, only: kinetic_flux, flux_changes, tally_t
   implicit none
   private
-  public :: given_t, simulation_t, system_t
+  public :: specification_t, simulation_t, system_t
 
   !> Largest factor by which terms of sums usually exceed the typical terms of the heaviest disks, and largest factor for the
   !> typical terms of the lightest disks.
@@ -26,17 +26,17 @@ module simulation_state
     type(box_t) :: box
     type(contact_law_t) :: law
     type(drive_t) :: drive
-    type(features_t) :: with                      !! optional features
+    type(features_t) :: features                  !! optional features
   end type system_t
 
   !> Values given by the input, which are the same in all domains of a simulation.
-  type, extends(system_t) :: given_t
+  type, extends(system_t) :: specification_t
     type(species_t), allocatable :: species(:)
     integer(int64) :: seed = 1                    !! seed of random numbers drawn during the run
-  end type given_t
+  end type specification_t
 
   !> The values given by the input and the state that a checkpoint stores.
-  type, extends(given_t) :: simulation_t
+  type, extends(specification_t) :: simulation_t
     type(disk_t), allocatable :: disk(:)          !! (n) sorted by cells; `tag%id` is the number in the input
     type(tag_t), allocatable :: tag(:)            !! (n)
     real(real64), allocatable :: own_mass(:)      !! (n) individual masses, allocated if those of a species differ [mass]
@@ -131,7 +131,7 @@ contains
     class(simulation_t), intent(in) :: self
     logical :: yes
 
-    yes = any(self%box%periodic) .or. self%law%contact_time > 0 .or. self%with%rotation .or. self%with%orientation
+    yes = any(self%box%periodic) .or. self%law%contact_time > 0 .or. self%features%rotation .or. self%features%orientation
   end function has_extra
 
   !> Allocates the arrays for n disks.
@@ -141,7 +141,7 @@ contains
     class(simulation_t), intent(in), optional :: like   !! whole simulation, if this one is a domain of it
     logical :: own_masses
 
-    own_masses = self%with%own_sizes
+    own_masses = self%features%own_sizes
     if (present(like)) own_masses = allocated(like%own_mass)
     allocate (self%disk(n), self%tag(n))
     if (self%has_extra()) allocate (self%extra(n))
@@ -249,7 +249,7 @@ contains
     real(real64) :: omega                         !! [1/time]
 
     omega = 0
-    if (self%with%rotation) omega = self%extra(i)%spin
+    if (self%features%rotation) omega = self%extra(i)%spin
   end function spin
 
   !> Changes the angular momentum of disk i.
@@ -267,7 +267,7 @@ contains
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: t
 
-    if (self%with%rotation) self%extra(i)%angle = self%extra(i)%angle + self%extra(i)%spin*(t - self%disk(i)%clock)
+    if (self%features%rotation) self%extra(i)%angle = self%extra(i)%angle + self%extra(i)%spin*(t - self%disk(i)%clock)
   end subroutine rotate_to
 
   !> Registers a contact of disk i at the time t. `elastic` becomes .true. if its previous contact is not over yet (TC model).
@@ -291,7 +291,7 @@ contains
     real(real64), intent(in) :: before(2)         !! velocity before the change [length/time]
     real(real64), intent(in) :: t                 !! since the epoch [time]
 
-    if (.not. self%with%helfand) return
+    if (.not. self%features%helfand) return
     associate (mass => self%mass_of(i), sums => self%tally%sum(flux_changes:flux_changes + 4))
       call sums%add((kinetic_flux(mass, self%disk(i)%v) - kinetic_flux(mass, before))*(self%box%epoch + t))
     end associate
@@ -317,7 +317,7 @@ contains
       v = self%velocity(i)
       energy = energy + 0.5_real64*self%mass_of(i)*dot_product(v, v)
     end do
-    if (.not. self%with%rotation) return
+    if (.not. self%features%rotation) return
     do i = 1, self%n_disks()
       energy = energy + 0.5_real64*self%inertia_of(i)*self%spin(i)**2
     end do

@@ -74,10 +74,10 @@ contains
 
     lists = are_listed(settings)
     more = 0
-    if (any(settings%box%periodic) .or. settings%law%contact_time > 0 .or. settings%with%rotation &
-      .or. settings%with%orientation) more = extra
+    if (any(settings%box%periodic) .or. settings%law%contact_time > 0 .or. settings%features%rotation &
+      .or. settings%features%orientation) more = extra
     starting = more + starting_bytes(settings)
-    if (settings%with%own_sizes) more = more + own_size
+    if (settings%features%own_sizes) more = more + own_size
     running = record + cell*cells(settings) + more + sampled*numbers_in_frame(settings)
     if (lists) running = running + listed
     if (settings%drive%is_on()) running = running + kicked
@@ -97,7 +97,7 @@ contains
     do k = 1, size(settings%species)
       select case (settings%species(k)%placement)
       case ("random")
-        if (.not. settings%with%own_sizes) bytes = max(bytes, inserted)
+        if (.not. settings%features%own_sizes) bytes = max(bytes, inserted)
       case ("file")
         bytes = max(bytes, read_in)
       case ("dense", "grown")
@@ -112,9 +112,9 @@ contains
     integer :: n, k
 
     n = 0
-    associate (frames => settings%output%sampling(1), with => settings%with)
+    associate (frames => settings%output%sampling(1), features => settings%features)
       if (.not. (any(frames%every < never) .or. allocated(frames%at) .or. frames%per_decade > 0)) return
-      n = 5 + merge(2, 0, any(settings%box%periodic)) + merge(1, 0, with%rotation) + merge(1, 0, with%orientation)
+      n = 5 + merge(2, 0, any(settings%box%periodic)) + merge(1, 0, features%rotation) + merge(1, 0, features%orientation)
     end associate
     if (.not. allocated(settings%output%frame_columns)) return
     n = 2

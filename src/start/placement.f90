@@ -121,7 +121,7 @@ contains
               sim%disk(k)%v = file%table(3:4, k - first + 1)
             end do
           end if
-          if (sim%with%own_sizes) sim%own_mass(first:last) = file%table(mass_row, :)
+          if (sim%features%own_sizes) sim%own_mass(first:last) = file%table(mass_row, :)
           if (species(s)%spin_in_file) sim%extra(first:last)%spin = file%table(spin_row, :)
           if (species(s)%angle_in_file) sim%extra(first:last)%angle = file%table(angle_row, :)
           deallocate (file%table)

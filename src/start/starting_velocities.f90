@@ -38,7 +38,7 @@ contains
     if (balanced) call remove_drift()
     do s = 1, size(settings%species)
       call find_disks()
-      if (sim%with%rotation) call draw_spins()
+      if (sim%features%rotation) call draw_spins()
       associate (species => settings%species(s))
         given = species%velocities == "explicit" .or. species%velocities == "file"
         if (species%exact_temperature >= 0) then
