@@ -5,20 +5,6 @@
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 scatterers=${N:-100000} events=${EVENTS:-1000000} tracer=0.1 # radii: 0.1 and 0.9, so that R = 1
 
-# scatter SEED DENSITY FILE: a text file of circles, uniform at random, at so many per R^2.
-scatter() {
-  "$python" - "$scatterers" "$@" <<'PY'
-import sys
-
-import numpy as np
-
-number, seed, density, path = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]), sys.argv[4]
-places = np.random.default_rng(seed).uniform(0, np.sqrt(number / density), (number, 2))
-rows = np.column_stack([places, np.full(number, 0.9)])
-np.savetxt(path, rows, fmt="%.12g", header="x y radius", comments="")
-PY
-}
-
 replace "$data/lorentz.nml" <<NML
 ! One tracer among random scatterers; each member sets the file, the size of the box and the frames.
 &run
@@ -49,7 +35,7 @@ NML
 for density in 0.0025 0.005 0.01 0.02 0.04 0.08; do
   for seed in 1 2 3 4; do
     file=$data/scatterers_${scatterers}_${density}_$seed.txt
-    [[ -e $file ]] || { scatter "$seed" "$density" "$file.part" && mv -- "$file.part" "$file"; }
+    [[ -e $file ]] || "$python" post/scatterers.py "$scatterers" "$density" --seed "$seed" -o "$file" >&2
     printf 'n_%s_%s\t--set run.seed=%s --set obstacle.scatterers.file=%s' "$density" "$seed" "$seed" "$file"
     awk -v n="$density" -v number="$scatterers" 'BEGIN { side = sqrt(number/n)
       printf " --set box.upper=%.17g,%.17g --set output.frames_every_time=%.17g\n", side, side, 5/n }'

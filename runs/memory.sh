@@ -9,8 +9,8 @@
 # 250 bytes per disk (700 with lists of neighbours) and no quiet machine. RICOCHET=build/ricochet is measured.
 set -euo pipefail
 export LC_ALL=C # so that awk reads and writes 0.5, whatever the language
-cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 case ${1:-} in -h | --help) sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 program=$(realpath "${RICOCHET:-build/ricochet}")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

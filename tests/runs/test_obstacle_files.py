@@ -1,6 +1,8 @@
 """Many obstacles as one group: circles and straight walls from files, and polylines."""
 
+import sys
 from itertools import pairwise
+from pathlib import Path
 
 import h5py
 import matplotlib.pyplot as plt
@@ -12,6 +14,7 @@ from ricochet.drawing import draw_box
 
 from whole_runs import FINISHED, USAGE, ran, write_input
 
+ROOT = Path(__file__).resolve().parents[2]
 SIDE = 9
 BOX = f"&box upper = {SIDE}, {SIDE} boundary = 'periodic', 'periodic' /"
 END = """&obstacle name = 'last' centre = 3, 3 radius = 0.2 /
@@ -141,6 +144,23 @@ def test_mistakes_in_a_file_are_named_with_their_line(program, folder, text, mes
     done = ran(program, "many.nml", "-o", "many.h5")
     assert done.returncode == USAGE
     assert "obstacle.file: " + message in done.stderr
+
+
+def test_a_script_makes_random_scatterers(program, tmp_path, monkeypatch):
+    """They fill the box that it names, and any seed gives other places."""
+    monkeypatch.chdir(tmp_path)
+    script, many = str(ROOT / "post/scatterers.py"), ["400", "0.01", "--radius", "0.9"]
+    for seed in ("1", "2"):
+        made = ran(sys.executable, script, *many, "--seed", seed, "-o", f"{seed}.txt")
+        assert made.returncode == 0 and made.stdout == f"{seed}.txt: 400 circles, L = 200\n"
+    one, two = (np.loadtxt(f"{seed}.txt", skiprows=1) for seed in (1, 2))
+    assert one.shape == (400, 3) and (one[:, 2] == 0.9).all() and not np.any(one[:, 0] == two[:, 0])
+    assert one[:, :2].min() > 0 and one[:, :2].max() < 200
+    assert np.abs(one[:, :2].mean(axis=0) - 100).max() < 4 * 200 / np.sqrt(12 * 400)
+    text = BOX.replace(f"{SIDE}, {SIDE}", "200, 200") + "&obstacle file = '1.txt' /"
+    text += "&species count = 5 radius = 0.1 speed = 1 / &stop events = 200 /"
+    assert ran(program, write_input(tmp_path, text)).returncode == FINISHED
+    assert ran(sys.executable, script, "0", "0.01", "-o", "none.txt").returncode == 2
 
 
 def test_a_run_does_not_go_on_among_other_obstacles(program, folder):

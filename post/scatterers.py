@@ -1,0 +1,42 @@
+"""A file of circles at random places, for `file` of an &obstacle: a random Lorentz gas.
+
+    python post/scatterers.py 100000 0.01 --radius 0.9 --seed 1 -o scatterers.txt
+
+The centres are uniform in a square from (0, 0) to (L, L) and independent, so that circles overlap.
+The density is their number per unit of area, L = sqrt(number / density) is printed: it belongs into
+`box.upper`, with periodic sides.  For a tracer of radius r the density n R^2 of the theory has
+R = r + radius.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+
+def scatterers(number: int, density: float, radius: float, seed: int) -> np.ndarray:
+    """Return the circles (number, 3): x, y and radius."""
+    side = np.sqrt(number / density)
+    centres = np.random.default_rng(seed).uniform(0, side, (number, 2))
+    return np.column_stack([centres, np.full(number, radius)])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("number", type=int, help="number of circles")
+    parser.add_argument("density", type=float, help="their number per unit of area")
+    parser.add_argument("--radius", type=float, default=0.9, help="radius of each circle [0.9]")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the random numbers [1]")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="text file to be written")
+    args = parser.parse_args()
+    if args.number < 1 or not args.density > 0 or not args.radius > 0:
+        parser.error("number, density and radius must be positive")
+    rows = scatterers(args.number, args.density, args.radius, args.seed)
+    np.savetxt(args.output, rows, fmt="%.12g", header="x y radius", comments="")
+    print(f"{args.output}: {args.number} circles, L = {np.sqrt(args.number / args.density):.17g}")
+
+
+if __name__ == "__main__":
+    main()
