@@ -1,8 +1,7 @@
 !> Signals that stop a run or request a checkpoint. The signal handler and the variables that it sets are in `system_calls.c`.
 !>
-!> While the files of a run are open, data could be lost: a stop signal is then only recorded. The main loop answers it with a
-!> checkpoint. A stop signal that arrives after the main loop has ended has no effect: the file is completed, and the run counts as
-!> finished.
+!> While the files of a run are open, data could be lost: a stop signal is then only recorded, and the main loop answers it with a
+!> checkpoint. If the signal arrives after the main loop, the file is still completed, and the run counts as finished.
 module signals
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_int, c_null_char
   use system, only: talks_to_terminal

@@ -61,9 +61,9 @@ module calendar
 
 contains
 
-  !> Empties buckets and spans and chooses their numbers such that they cover twice the usual time until the events of n disks.
-  !> For many disks the buckets must leave space in the cache for the disks; equal numbers of buckets and spans minimise the
-  !> number of cache lines written.
+  !> Empties buckets and spans and chooses their numbers. At the mean number of events per window they cover 2n events, so that
+  !> most events of n disks fit. For many disks the buckets must leave space in the cache for the disks; equal numbers of buckets
+  !> and spans minimise the number of cache lines written.
   subroutine empty(self, n)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: n                !! number of disks

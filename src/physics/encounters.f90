@@ -168,7 +168,7 @@ contains
     restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(j)%species)
     if (sim%law%contact_time > 0 .or. .not. restitution < 1) return
     last_partner = sim%tag([i, j])%last_partner
-    ! If one of the disks has hit a wall in between, the count of the other one is used.
+    ! If one of the disks has collided with a wall in between, the count of the other one is used.
     n = minval(merge(repeats(last_partner), most_repeats, last_partner > 0)) + 1
     fastest = max(magnitude(sim%disk(i)%v), magnitude(sim%disk(j)%v))
     if (impact_velocity(sim, i, j, t) > max(rounded*(1 - restitution)*fastest, slowest)) n = min(n, most_visible)
