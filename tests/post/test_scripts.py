@@ -1,10 +1,12 @@
 """Each script of post/ against what it should find in runs that are made by closed formulas."""
 
 import csv
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import cost
 import crater as crater_figure
@@ -530,6 +532,25 @@ def test_thermalisation_time_ignores_a_passing_agreement():
     assert found(gap, 0.005) == pytest.approx((3 + 0.1 / 0.11, 0.005 / 0.11))  # of a steep line
     for unknown in (found(gap + 1, 0.04), found(gap, 0.06), found(gap, np.nan)):
         assert np.isnan(unknown.mean)
+
+
+def test_one_run_of_many_disks_has_a_thermalisation_time_with_an_error(rng):
+    """Its error is from the fluctuations in equilibrium, which hold the truth in 68 % of cases."""
+    time, found = np.arange(0, 40, 0.25) + 0.25, []
+    kinds = [SimpleNamespace(mass=mass) for mass in (1.0, 2.0)]
+    for _ in range(200):
+        noise = lfilter([0.015], [1, -0.7], rng.normal(size=len(time)))
+        energy = {"A": np.ones(len(time)), "B": 1 + np.exp(-time / 3) + noise}
+        run = SimpleNamespace(
+            names=("A", "B"),
+            by_species=kinds,
+            observable=lambda name, of=energy: (time, of[name[0]]),
+        )
+        found.append(equipartition.approach([run], 0.5, 0.1).thermalisation)
+    mean, error = np.transpose(found)
+    truth = 3 * np.log(10)
+    assert 0.55 < np.mean(np.abs(mean - truth) < error) < 0.85
+    assert np.abs(np.median(mean) - truth) < 0.3 * truth and np.isfinite(mean).mean() > 0.9
 
 
 def test_one_run_does_not_say_that_energies_agree(tmp_path, rng, capsys):
