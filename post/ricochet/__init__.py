@@ -19,7 +19,8 @@ from . import packages as packages  # first: it reports packages that are missin
 from .aliases import Aliases
 from .reading.bridges import mdanalysis_universe
 from .reading.files import RunError
-from .reading.reader import EventLog, Obstacle, Run, Series, read_run
+from .reading.frames import Frames, Series
+from .reading.reader import EventLog, Obstacle, Run, read_run
 from .running.ensembles import ensemble, sweep
 from .running.program import ProgramError, run
 from .running.simulation import Simulation
@@ -27,6 +28,7 @@ from .running.starting import write_start
 
 __all__ = [
     "EventLog",
+    "Frames",
     "Obstacle",
     "ProgramError",
     "Run",
@@ -64,6 +66,7 @@ if TYPE_CHECKING:  # the modules that `__getattr__` loads, for type checkers
     from .reading import arrays as arrays
     from .reading import bridges as bridges
     from .reading import files as files
+    from .reading import frames as frames
     from .reading import nature as nature
     from .reading import reader as reader
     from .reading import units as units

@@ -48,6 +48,34 @@ def test_constants_are_those_of_the_input_and_energies_those_of_the_observables(
     assert repr(run) == f"<Run {run.path}: 8 A, 8 B; {run.n_frames} frames, t = 0 to 1>"
 
 
+def test_frames_and_observables_are_values_in_expressions(small):
+    """Of any operator and function, from the left and from the right, beside arrays."""
+    run = read_run(small)
+    time, value = energy = run.observable("all/kinetic_energy")
+    for values, array in ((run.position, run.position[:]), (energy, value)):
+        assert values.shape == array.shape and len(values) == len(array)
+        pairs = [(values * 2, array * 2), (2 - values, 2 - array), (-values, -array)]
+        pairs += [
+            (values**2 / 3, array**2 / 3),
+            (array + values, 2 * array),
+            (values < 1, array < 1),
+        ]
+        pairs += [(values - values, 0 * array), (np.exp(values), np.exp(array))]
+        for name in ("mean", "std", "sum", "min", "max"):
+            pairs += [(getattr(values, name)(), getattr(array, name)())]
+            pairs += [(getattr(values, name)(axis=0), getattr(array, name)(axis=0))]
+            pairs += [(getattr(np, name)(values, axis=0), getattr(array, name)(axis=0))]
+        for found, expected in pairs:
+            assert type(found) is type(expected)
+            np.testing.assert_array_equal(found, expected)
+        with pytest.raises(TypeError):
+            np.add(array, 1, out=values)
+    assert energy[-1] == value[-1] and energy.time is time and energy.value is value
+    np.testing.assert_array_equal(energy[:2], value[:2])
+    assert repr(energy) == f"<Series of {len(value)} values, t = {time[0]:g} to {time[-1]:g}>"
+    assert [frame.tolist() for frame in run.position] == run.position[:].tolist()
+
+
 def test_frames_are_indexed_like_an_array_and_are_one_for_numpy(small):
     run = read_run(small)
     whole = run.position[:]

@@ -9,6 +9,7 @@ import ctypes
 import gc
 import json
 import os
+import pickle
 import random
 import re
 import signal
@@ -63,6 +64,31 @@ def test_a_simulation_shows_what_the_file_of_its_run_has(whole):
         assert {*gas.observables} == {*whole.observables}
         assert (gas.time, gas.collisions, gas.n_disks) == (whole.time[-1], 400, 80)
         assert gas.events == len(log.time)
+
+
+def test_arrays_are_read_only_and_are_assigned_whole():
+    """Writing into a copy would have no effect; in-place operators return a new array."""
+    with Simulation(GAS) as gas:
+        for name in {*COLUMNS} & {*dir(gas)}:
+            array = getattr(gas, name)
+            with pytest.raises(ValueError, match=r"read-only.*box.velocity = v"):
+                array[0] = 99
+            with pytest.raises(ValueError, match="read-only"):
+                array[array > 0] += 1
+            with pytest.raises(ValueError, match="read-only"):
+                array.sort()
+        before = gas.velocity
+        gas.velocity *= 2
+        gas.velocity -= [1, 0]
+        assert np.array_equal(gas.velocity, 2 * before - [1, 0])
+        twin = own = gas.velocity.copy()
+        own[0] = 3, 4
+        own += 1
+        assert own is twin and own[0].tolist() == [4, 5]
+        for array in (before * 2, np.sqrt(gas.radius), before @ np.eye(2)):
+            assert type(array) is np.ndarray and array.flags.writeable
+        assert type(before.sum()) is np.float64
+        assert np.array_equal(pickle.loads(pickle.dumps(before)), before)
 
 
 def test_a_moment_where_a_slice_has_ended_is_reached_again():
@@ -305,7 +331,7 @@ def test_numbers_that_c_may_give_are_refused_or_count_as_none():
     message = ctypes.create_string_buffer(room)
     with gas._open() as handle:
         for bad in (np.nan, np.inf, -np.inf):
-            velocity = gas.velocity
+            velocity = gas.velocity.copy()
             velocity[7, 1] = bad
             code = engine.ricochet_set_velocities(handle, velocity.ctypes.data, message, room)
             assert code == 2 and b"velocity" in message.value
@@ -343,7 +369,7 @@ def test_random_calls_in_c_have_an_answer(seed):
             say = message, min(chance.choice(COUNTS), 500)
             time, count = chance.choice(NUMBERS), chance.choice(COUNTS)
             if chance.random() < 0.5:
-                velocity = gas.velocity
+                velocity = gas.velocity.copy()
                 velocity[chance.randrange(80), chance.randrange(2)] = chance.choice(NUMBERS)
             else:
                 velocity = 2 * gas.velocity

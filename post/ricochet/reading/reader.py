@@ -23,6 +23,7 @@ import numpy as np
 
 from .arrays import Index, as_index
 from .files import RunError, Unsound, did_you_mean, open_file, tree
+from .frames import DISKS, Frames, Series
 from .nature import TRAITS, Nature, allow, nature_of
 from .units import UNNAMED, Units
 
@@ -30,25 +31,12 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-DISKS = "particles/disks"
 SIDES = ("left", "right", "bottom", "top")
 TENSORS = ("virial_tensor", "kinetic_tensor", "helfand_stress")
 DRIFTING = (
     "constant_velocity",
     "piston",
 )  # motions of a side that change the area of the box for good
-WHOLE = (type(None), type(...), bool, np.bool_)  # as first index they do not choose frames
-
-
-class NoSuchFrame(RunError, IndexError):
-    """Error for an index beyond the frames of a run."""
-
-
-class Series(NamedTuple):
-    """An observable: values (T, ...) at times (T,), which are not those of the frames."""
-
-    time: np.ndarray
-    value: np.ndarray
 
 
 class EventLog(NamedTuple):
@@ -101,64 +89,6 @@ class Species(NamedTuple):
     def label(self) -> str:
         """Name and mass, for a legend."""
         return f"{self.name}, m = {span(self.masses)}"
-
-
-@dataclass(frozen=True)
-class Frames:
-    """A quantity of each disk in time, read from the file when it is indexed; [:] reads all."""
-
-    path: Path
-    name: str
-    shape: tuple[int, ...]  # (T, N), or (T, N, 2)
-
-    def __len__(self) -> int:
-        return self.shape[0]
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        """Return all frames, for functions of NumPy."""
-        if copy is False:
-            raise ValueError(f"{self.path}: {self.name} is read from the file, that is copied")
-        return self[:] if dtype is None else self[:].astype(dtype)
-
-    @property
-    def ndim(self) -> int:
-        """The number of axes."""
-        return len(self.shape)
-
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        """The type of the numbers that indexing returns."""
-        return self.read(np.arange(0)).dtype
-
-    def __getitem__(self, index: Any) -> np.ndarray:
-        """Index as in NumPy; only the chosen frames are read from the file."""
-        first, *rest = index if isinstance(index, tuple) and index else (index,)
-        try:
-            if type(first) in WHOLE or np.ndim(first) > 1:
-                return self.read(np.arange(len(self)))[index]
-            chosen = np.arange(len(self))[first]
-            if chosen.ndim == 0:
-                return self.read(chosen[None])[(0, *rest)]
-            whole = slice(None) if isinstance(first, slice) else np.arange(len(chosen))
-            return self.read(chosen)[(whole, *rest)]
-        except IndexError as problem:
-            shape = " x ".join(map(str, self.shape))
-            raise NoSuchFrame(f"{self.path}: {self.name} ({shape}): {problem}") from None
-
-    def read(self, chosen: np.ndarray) -> np.ndarray:
-        """Read these frames, in this order."""
-        steps = np.unique(np.diff(chosen))
-        with open_file(self.path) as file:
-            if self.name not in file[DISKS]:
-                raise Unsound(f"has no {self.name} in its frames, see output.frame_columns")
-            data = file[f"{DISKS}/{self.name}/value"]
-            if len(chosen) == 0:
-                values = data[:0]
-            elif len(steps) == 1 and steps[0] > 0:
-                values = data[chosen[0] : chosen[-1] + 1 : steps[0]]
-            else:  # far faster than a list as index in h5py
-                values = np.stack([data[k] for k in chosen])
-        return values.astype(float if values.dtype.kind == "f" else np.int64)
 
 
 class Restitution(NamedTuple):

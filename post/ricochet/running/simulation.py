@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..commands import HERE
+from ..reading.arrays import snapshot
 from ..reading.files import RunError, did_you_mean
 from ..reading.nature import Nature, nature_of
 from .program import ProgramError, named, settings_of, unseen, whole_threads
@@ -417,23 +418,23 @@ class Simulation:
         return self._counts()[2]
 
     def _column(self, name: str) -> np.ndarray:
-        """Return a copy of an array of `COLUMNS`, disks in the order of the input."""
+        """Return a read-only copy of an array of `COLUMNS`, disks in the order of the input."""
         values = np.empty((self.n_disks, 2))
         with self._open() as handle:
             width = library().ricochet_column(handle, name.encode(), values.ctypes.data)
         if width == 0:
             raise AttributeError(f"these disks have no {name}")
         values = values.reshape(-1)[: width * len(values)].astype(COLUMNS[name])
-        return values.reshape(-1, 2) if width == 2 else values
+        return snapshot(values.reshape(-1, 2) if width == 2 else values)
 
     @property
     def position(self) -> np.ndarray:
-        """(N, 2) positions [length], wrapped into the box along a periodic axis; a copy."""
+        """(N, 2) positions [length] within the box where an axis is periodic; a read-only copy."""
         return self._column("position")
 
     @property
     def velocity(self) -> np.ndarray:
-        """(N, 2) velocities [length/time]; a copy.  All of them can be set at once."""
+        """(N, 2) velocities [length/time]; a read-only copy.  All can be set at once."""
         return self._column("velocity")
 
     @velocity.setter

@@ -1,0 +1,182 @@
+"""Values that a run contains: quantities of each disk in the frames, and observables in time.
+
+Both behave as arrays in expressions and in functions of NumPy: `run.velocity * 2`,
+`run.observable("all/temperature").mean()`.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
+
+from .files import RunError, Unsound, open_file
+
+DISKS = "particles/disks"
+WHOLE = (type(None), type(...), bool, np.bool_)  # as first index they do not choose frames
+
+
+class NoSuchFrame(RunError, IndexError):
+    """Error for an index beyond the frames of a run."""
+
+
+class Values(NDArrayOperatorsMixin):
+    """Arithmetic of objects that NumPy can convert to an array; results are arrays."""
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        """Return the values as an array."""
+        raise NotImplementedError
+
+    def __array_ufunc__(self, function: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        """Evaluate a function of NumPy for the arrays in place of these objects."""
+        if any(isinstance(item, Values) for item in options.get("out", ())):
+            return NotImplemented
+        arrays = [np.asarray(item) if isinstance(item, Values) else item for item in inputs]
+        return getattr(function, method)(*arrays, **options)
+
+    def mean(self, axis: Any = None, **options: Any) -> Any:
+        """Return the mean along an axis, or of all values, as `numpy.mean` does."""
+        return np.asarray(self).mean(axis, **options)
+
+    def std(self, axis: Any = None, **options: Any) -> Any:
+        """Return the standard deviation along an axis, or of all values, as `numpy.std` does."""
+        return np.asarray(self).std(axis, **options)
+
+    def sum(self, axis: Any = None, **options: Any) -> Any:
+        """Return the sum along an axis, or of all values, as `numpy.sum` does."""
+        return np.asarray(self).sum(axis, **options)
+
+    def min(self, axis: Any = None, **options: Any) -> Any:
+        """Return the minimum along an axis, or of all values, as `numpy.min` does."""
+        return np.asarray(self).min(axis, **options)
+
+    def max(self, axis: Any = None, **options: Any) -> Any:
+        """Return the maximum along an axis, or of all values, as `numpy.max` does."""
+        return np.asarray(self).max(axis, **options)
+
+
+class Series(Values):
+    """An observable: values (T, ...) at times (T,), which are not those of the frames.
+
+    An index, a function of NumPy and an expression concern the values: `series[-1]` is the last
+    value.  `time, value = series` assigns both arrays.
+
+    Parameters
+    ----------
+    time : numpy.ndarray
+        (T,) times
+    value : numpy.ndarray
+        (T, ...) values
+
+    Examples
+    --------
+    >>> energy = run.observable("total_energy")
+    >>> bool(energy[-1] == energy.value[-1]), len(energy) == len(energy.time)
+    (True, True)
+    """
+
+    def __init__(self, time: np.ndarray, value: np.ndarray):
+        """Combine times and values; the class describes the arguments."""
+        self.time, self.value = time, value
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        """Yield the times and the values, for `time, value = series`."""
+        return iter((self.time, self.value))
+
+    def __getitem__(self, index: Any) -> Any:
+        """Return the values that an index of NumPy selects."""
+        return self.value[index]
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        """Return the values."""
+        return np.array(self.value, dtype=dtype, copy=copy)
+
+    def __repr__(self) -> str:
+        shape = " x ".join(map(str, self.value.shape))
+        when = f", t = {self.time[0]:g} to {self.time[-1]:g}" if len(self) else ""
+        return f"<Series of {shape} values{when}>"
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of the values."""
+        return self.value.shape
+
+    @property
+    def ndim(self) -> int:
+        """The number of axes of the values."""
+        return self.value.ndim
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """The type of the values."""
+        return self.value.dtype
+
+
+@dataclass(frozen=True, eq=False)
+class Frames(Values):
+    """A quantity of each disk in time, read from the file when it is indexed; [:] reads all.
+
+    In an expression or a function of NumPy all frames are read.
+    """
+
+    path: Path
+    name: str
+    shape: tuple[int, ...]  # (T, N), or (T, N, 2)
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        """Yield the frames, which are read one at a time."""
+        return (self[k] for k in range(len(self)))
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        """Return all frames, for functions of NumPy."""
+        if copy is False:
+            raise ValueError(f"{self.path}: {self.name} is read from the file, that is copied")
+        return self[:] if dtype is None else self[:].astype(dtype)
+
+    @property
+    def ndim(self) -> int:
+        """The number of axes."""
+        return len(self.shape)
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """The type of the numbers that indexing returns."""
+        return self.read(np.arange(0)).dtype
+
+    def __getitem__(self, index: Any) -> np.ndarray:
+        """Index as in NumPy; only the chosen frames are read from the file."""
+        first, *rest = index if isinstance(index, tuple) and index else (index,)
+        try:
+            if type(first) in WHOLE or np.ndim(first) > 1:
+                return self.read(np.arange(len(self)))[index]
+            chosen = np.arange(len(self))[first]
+            if chosen.ndim == 0:
+                return self.read(chosen[None])[(0, *rest)]
+            whole = slice(None) if isinstance(first, slice) else np.arange(len(chosen))
+            return self.read(chosen)[(whole, *rest)]
+        except IndexError as problem:
+            shape = " x ".join(map(str, self.shape))
+            raise NoSuchFrame(f"{self.path}: {self.name} ({shape}): {problem}") from None
+
+    def read(self, chosen: np.ndarray) -> np.ndarray:
+        """Read these frames, in this order."""
+        steps = np.unique(np.diff(chosen))
+        with open_file(self.path) as file:
+            if self.name not in file[DISKS]:
+                raise Unsound(f"has no {self.name} in its frames, see output.frame_columns")
+            data = file[f"{DISKS}/{self.name}/value"]
+            if len(chosen) == 0:
+                values = data[:0]
+            elif len(steps) == 1 and steps[0] > 0:
+                values = data[chosen[0] : chosen[-1] + 1 : steps[0]]
+            else:  # far faster than a list as index in h5py
+                values = np.stack([data[k] for k in chosen])
+        return values.astype(float if values.dtype.kind == "f" else np.int64)
