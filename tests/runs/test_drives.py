@@ -273,7 +273,7 @@ def test_a_side_that_crushes_disks_ends_the_run(ricochet, tmp_path):
         &species count = 40 packing_fraction = 0.45 temperature = 1 /""",
     )
     run = ricochet("gas.nml", "-o", "gas.h5")
-    assert run.returncode == BROKEN and "a side crushes the disks" in one_line(run)
+    assert run.returncode == BROKEN and "the side crushes the disks" in one_line(run)
 
 
 def test_a_stroke_goes_from_begin_to_end_and_stays(observed):
