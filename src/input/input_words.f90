@@ -68,7 +68,7 @@ contains
       problem = ""
       if (assignment%element > 0) then
         if (.not. slot%is_set()) then
-          problem = "has no value yet, so that no element can be set; set it as a whole: name = "//trim(row%value)
+          problem = "has no value yet, so that no element can be set; give all: "//trim(row%name)//" = "//trim(row%value)
         else if (assignment%element > slot%length()) then
           problem = "has "//counted(int(slot%length(), int64), "value")//"; there is no element "//written(assignment%element)
         else if (total /= 1) then
