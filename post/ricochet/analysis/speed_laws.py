@@ -27,6 +27,7 @@ WIDE = 5  # of these in a bin whose counts vary as slowly as the distance of two
 DRAWN = 4000  # drawn samples
 MOST = 1000  # speeds of a drawn sample; more have the same distribution of the scaled statistics
 MANY = 2000  # disks, among whom the motion of the centre of mass does not matter
+SIGNIFICANT = 2.0  # standard deviations
 TAIL = 0.05  # share of the drawn samples whose exponential tail continues their distribution
 
 
@@ -129,8 +130,15 @@ def chance(found: float, drawn: np.ndarray) -> float:
 
 
 def per_frame(counts: np.ndarray) -> float:
-    """Return the statistical inefficiency of counts in bins (F, B) of a run, at least 1."""
-    return max(1.0, statistical_inefficiency(counts)) if len(counts) > 2 else 1.0
+    """Return the statistical inefficiency of counts in bins (F, B) of a run.
+
+    It is 1 unless it is larger than that of independent frames is by chance: chi^2 of many bins is
+    so sharp that the noise of a single estimate would spoil its p-value.
+    """
+    frames, bins = counts.shape
+    noise = 2 / np.sqrt(frames * (bins - 1))
+    found = statistical_inefficiency(counts) if frames > 2 else 1.0
+    return found if found > 1 + SIGNIFICANT * noise else 1.0
 
 
 def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> SpeedTest:
