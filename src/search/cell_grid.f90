@@ -2,12 +2,12 @@
 !> which is an event, it can only touch disks in its own cell and the eight cells around it. Wide cells overlap (see `cell_faces`).
 module cell_grid
   use kinds, only: int16, int32, never, real64
-  use box_geometry, only: box_t, find_image_contact, next_obstacle
+  use box_geometry, only: box_t, next_obstacle
   use box_sides, only: next_side
   use cell_contents, only: cell_contents_t, gather
   use cell_faces, only: cell_faces_t, patch_t
   use cell_layout, only: whole_box
-  use cell_scans, only: scan_around_seam, scan_cells, scan_chains_around, scan_disks, scan_list
+  use cell_scans, only: add_chains_around, scan_around_seam, scan_disks, scan_list, scan_reach, scan_rim, test_list
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
   use images, only: images_t
@@ -49,7 +49,7 @@ module cell_grid
     procedure, private :: cross_with_care
     procedure, private :: follow_big
     procedure, private :: list
-    procedure, private :: predict_listed
+    procedure, private :: predict_both_with_care
   end type cell_grid_t
 
 contains
@@ -316,7 +316,7 @@ contains
     integer(int32), intent(in) :: i
 
     if (self%cells%cell(self%cells%number(sim%tag(i)%cell))%needs_care()) then
-      call self%predict_with_care(sim, i)
+      call self%predict_with_care(sim, i, .false.)
     else if (self%faces%falling) then              ! literals let the compiler specialise the kernel
       call predict_one(self, sim%box, sim%disk, sim%tag, sim%now, 0, i)
     else
@@ -336,21 +336,44 @@ contains
     end if
     if (self%cells%cell(self%cells%number(sim%tag(i)%cell))%needs_care() .or. &
       self%cells%cell(self%cells%number(sim%tag(j)%cell))%needs_care()) then
-      if (self%lists%used) then
-        if (is_plainly_listed(self, sim%tag(i)%cell, i) .and. is_plainly_listed(self, sim%tag(j)%cell, j) .and. &
-          .not. (self%reach%has_any(sim%tag(i)%cell) .or. self%reach%has_any(sim%tag(j)%cell))) then
-          call self%predict_listed(sim, i, j)
-          return
-        end if
-      end if
-      call self%predict(sim, i)
-      call self%predict(sim, j)
+      call self%predict_both_with_care(sim, i, j)
     else if (self%faces%falling) then
       call predict_two(self, sim%box, sim%disk, sim%tag, sim%now, latest_clock, [i, j])
     else
       call predict_two(self, sim%box, sim%disk, sim%tag, sim%now, latest_clock + no_gravity, [i, j])
     end if
   end subroutine predict_both
+
+  !> Predicts two disks that have just collided and are not both in plain cells. Usually both have neighbour lists.
+  subroutine predict_both_with_care(self, sim, i, j)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+
+    associate (cell_i => sim%tag(i)%cell, cell_j => sim%tag(j)%cell)
+      if (self%lists%used) then
+        if (is_plainly_listed(self, cell_i, i) .and. is_plainly_listed(self, cell_j, j) .and. &
+          .not. (self%reach%has_any(cell_i) .or. self%reach%has_any(cell_j))) then
+          call predict_listed(self, sim, i, j)
+          return
+        end if
+      end if
+    end associate
+    call predict_collided(i)
+    call predict_collided(j)
+  contains
+
+    !> Predicts one of them.
+    subroutine predict_collided(k)
+      integer(int32), intent(in) :: k
+
+      if (self%cells%cell(self%cells%number(sim%tag(k)%cell))%needs_care()) then
+        call self%predict_with_care(sim, k, .true.)
+      else
+        call self%predict(sim, k)
+      end if
+    end subroutine predict_collided
+  end subroutine predict_both_with_care
 
   !> Whether a small disk has a complete list that includes no disks across a periodic side.
   pure function is_plainly_listed(self, cell, i) result(yes)
@@ -477,13 +500,16 @@ contains
 
   !> Predicts the next event of a disk in the general case. A disk that has left the patch is removed from the search; no other disk
   !> is tested against it any more.
-  subroutine predict_with_care(self, sim, i)
+  subroutine predict_with_care(self, sim, i, has_collided)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
+    logical, intent(in) :: has_collided            !! at this moment, so that no clock is later than its own
     type(prospect_t) :: near
+    integer(int32) :: known                        ! as in `earliest_contact`
 
     near%disk = i
+    known = merge(latest_clock, 0, has_collided) + merge(0, no_gravity, self%faces%falling)
     if (sim%disk(i)%radius > self%patch%small) then
       call find_event_of_big()
     else if (.not. self%patch%holds(sim%tag(i)%cell)) then
@@ -491,84 +517,19 @@ contains
       sim%disk(i)%collision_counter = sim%disk(i)%collision_counter + 1
       near%time = 2*never
       near%partner = nothing
-    else if (self%lists%used) then
-      call find_event_of_listed()
     else
-      call find_event_of_small()
+      call find_event_of_small(self, sim, known, near)
     end if
     sim%disk(i)%event_time = near%time
     sim%disk(i)%partner = near%partner
     sim%tag(i)%partner_counter = sim%disk(max(near%partner, 1))%collision_counter
   contains
 
-    !> Finds the earliest event of a small disk.
-    subroutine find_event_of_small()
-      associate (cell => sim%tag(i)%cell)
-        call self%faces%next(sim%box, sim%disk(i), cell, sim%now, self%faces%falling, near)
-        if (self%reach%has_any(cell)) call scan_reach(self%reach%first(cell(1), cell(2)))
-      end associate
-      call scan_cells_around()
-    end subroutine find_event_of_small
-
-    !> Finds the earliest event of a small disk where there are neighbour lists.
-    subroutine find_event_of_listed()
-      associate (cell => sim%tag(i)%cell, region => self%lists%neighbourhood(i))
-        call self%faces%next_within(sim%box, region%column, region%row, sim%disk(i), sim%now, near)
-        if (self%reach%has_any(cell)) call scan_reach(self%reach%first(cell(1), cell(2)))
-        if (is_plainly_listed(self, cell, i)) then
-          call self%lists%copy_list(near)
-          call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))
-        else if (self%lists%is_complete(i)) then
-          call scan_list(self%lists, sim, self%images, self%faces%falling, near)
-        else
-          call scan_cells_around()
-        end if
-      end associate
-    end subroutine find_event_of_listed
-
-    !> Finds contacts of a small disk with disks in the nine cells around it.
-    subroutine scan_cells_around()
-      real(real64) :: t
-
-      near%cell = self%cells%number(sim%tag(i)%cell)
-      if (self%patch%at_seam(sim%tag(i)%cell)) then
-        t = self%images%valid_until(sim%now, self%patch%width(1))
-        if (t < near%time) near%partner = looks_again
-        near%time = min(t, near%time)
-        call scan_around_seam(self%cells, self%patch, sim, self%images, near)
-      else
-        call gather(self%cells%cell, near%cell, self%cells%stride, i, near%list, near%n)
-        call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))
-        if (self%cells%is_crowded_around(near%cell)) call scan_chains_around(self%cells, sim, near)
-      end if
-    end subroutine scan_cells_around
-
-    !> Finds contacts of a small disk with obstacles and big disks that reach into its cell.
-    subroutine scan_reach(first)
-      integer(int32), intent(in) :: first            !! first entry in the list of the cell
-      integer(int32) :: e
-      real(real64) :: number(2), shift(2)            ! index of the image of an obstacle; shift to it [length]
-
-      e = first
-      do while (e > 0)
-        associate (entry => self%reach%entry(e))
-          if (entry%code > 0) then
-            call scan_disks(sim, [entry%code], self%images%image(real(entry%image, real64)), near)
-          else
-            number = entry%image
-            shift = self%images%shift(number)
-            call find_image_contact(sim%box, sim%disk(i), sim%tag(i)%last_partner, entry%code, shift, near%time, near%partner)
-          end if
-          e = entry%next
-        end associate
-      end do
-    end subroutine scan_reach
-
     !> Finds the earliest event of a big disk: a side, an obstacle, the end of its margin, another big disk, or a small disk in
     !> the cells along its boundary.
     subroutine find_event_of_big()
       real(real64) :: t_margin
-      integer(int32) :: number, m, image, n, c(9)
+      integer(int32) :: number, m, image
 
       number = self%reach%number_of(i)
       call next_side(sim%box, sim%disk(i), near%time, near%partner)
@@ -579,21 +540,62 @@ contains
       if (t_margin < near%time) near%partner = looks_again
       near%time = min(near%time, t_margin)
       do image = 1, self%images%count()
-        call scan_disks(sim, self%reach%big%disk, self%images%image(self%images%around(image)), near)
+        call scan_disks(sim, self%reach%big%disk, self%images%image(self%images%around(image)), known, near)
       end do
-      associate (rim => self%reach%big(number)%rim)
-        n = 0
-        do m = 1, size(rim, kind=int32)            ! cells seen through the same image are treated together
-          n = n + 1
-          c(n) = rim(m)%cell(1) + self%cells%stride*rim(m)%cell(2)
-          if (m < size(rim) .and. n < size(c)) then
-            if (all(rim(m + 1)%image == rim(m)%image)) cycle
-          end if
-          call scan_cells(self%cells, sim, c(:n), near, self%images%image(real(-rim(m)%image, real64)))
-          n = 0
-        end do
-      end associate
+      call scan_rim(self%cells, sim, self%reach%big(number)%rim, self%images, known, near)
     end subroutine find_event_of_big
   end subroutine predict_with_care
+
+  !> Finds the earliest event of a small disk.
+  subroutine find_event_of_small(self, sim, known, near)
+    class(cell_grid_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: known            !! as in `earliest_contact`
+    type(prospect_t), intent(inout) :: near
+
+    associate (i => near%disk, cell => sim%tag(near%disk)%cell)
+      if (self%lists%used) then
+        call self%faces%next_within(sim%box, self%lists%neighbourhood(i)%column, self%lists%neighbourhood(i)%row, &
+          sim%disk(i), sim%now, near)
+      else
+        call self%faces%next(sim%box, sim%disk(i), cell, sim%now, self%faces%falling, near)
+      end if
+      if (self%reach%has_any(cell)) call scan_reach(self%reach, cell, sim, self%images, known, near)
+      if (self%lists%used) then
+        if (is_plainly_listed(self, cell, i)) then
+          call self%lists%copy_list(near)
+          call test_list(sim, known, near)
+          return
+        else if (self%lists%is_complete(i)) then
+          call scan_list(self%lists, sim, self%images, known, near)
+          return
+        end if
+      end if
+      call scan_cells_around(self, sim, known, near)
+    end associate
+  end subroutine find_event_of_small
+
+  !> Finds contacts of a small disk with disks in the nine cells around it.
+  subroutine scan_cells_around(self, sim, known, near)
+    class(cell_grid_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: known            !! as in `earliest_contact`
+    type(prospect_t), intent(inout) :: near
+    real(real64) :: t
+
+    associate (cell => sim%tag(near%disk)%cell)
+      near%cell = self%cells%number(cell)
+      if (self%patch%at_seam(cell)) then
+        t = self%images%valid_until(sim%now, self%patch%width(1))
+        if (t < near%time) near%partner = looks_again
+        near%time = min(t, near%time)
+        call scan_around_seam(self%cells, self%patch, sim, self%images, known, near)
+      else
+        call gather(self%cells%cell, near%cell, self%cells%stride, near%disk, near%list, near%n)
+        if (self%cells%is_crowded_around(near%cell)) call add_chains_around(self%cells, sim, known, near)
+        call test_list(sim, known, near)
+      end if
+    end associate
+  end subroutine scan_cells_around
 
 end module cell_grid

@@ -1,40 +1,123 @@
 !> Contacts that the simple scan of nine cells does not include: with disks of crowded cells, across
 !> a periodic side, and with single disks.
 module cell_scans
-  use kinds, only: int32, int64, real64
+  use kinds, only: int16, int32, int64, real64
+  use box_geometry, only: find_image_contact
   use cell_contents, only: append, cell_contents_t
   use cell_faces, only: patch_t
   use images, only: image_t, images_t
   use neighbour_lists, only: neighbour_lists_t
-  use neighbour_search, only: earliest_contact, list_capacity, no_gravity, prospect_t
+  use neighbour_search, only: earliest_contact, latest_clock, list_capacity, no_gravity, prospect_t
+  use reach_lists, only: place_t, reach_lists_t
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: scan_around_seam, scan_cells, scan_chains_around, scan_disks, scan_list
+  public :: add_chains_around, scan_around_seam, scan_disks, scan_list, scan_reach, scan_rim, test_list
 
 contains
 
+  !> Tests the listed candidates and empties the list. The literals let the compiler specialise the kernel.
+  subroutine test_list(sim, known, near)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: known            !! as in `earliest_contact`
+    type(prospect_t), intent(inout) :: near
+
+    if (near%n == 0) return
+    select case (known)
+    case (latest_clock + no_gravity)
+      call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, latest_clock + no_gravity)
+    case (no_gravity)
+      call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, no_gravity)
+    case (latest_clock)
+      call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, latest_clock)
+    case default
+      call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0)
+    end select
+    near%n = 0
+  end subroutine test_list
+
+  !> Tests the listed candidates, which are seen through an image, and empties the list.
+  subroutine test_through_image(sim, known, image, near)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: known
+    type(image_t), intent(in) :: image
+    type(prospect_t), intent(inout) :: near
+
+    select case (known)
+    case (latest_clock + no_gravity)
+      call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, latest_clock + no_gravity, image)
+    case (no_gravity)
+      call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, no_gravity, image)
+    case default
+      call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image)
+    end select
+    near%n = 0
+  end subroutine test_through_image
+
   !> Finds contacts with given disks, seen through an image.
-  pure subroutine scan_disks(sim, disks, image, near)
+  subroutine scan_disks(sim, disks, image, known, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: disks(:)
     type(image_t), intent(in) :: image             !! image through which they are seen
+    integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prospect_t), intent(inout) :: near
     integer(int32) :: first
 
     do first = 1, size(disks, kind=int32), list_capacity
       near%n = min(size(disks, kind=int32) - first + 1, list_capacity)
       near%list(:near%n) = disks(first:first + near%n - 1) - 1
-      call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image)
+      call test_through_image(sim, known, image, near)
     end do
   end subroutine scan_disks
 
+  !> Finds contacts of a small disk with obstacles and big disks that reach into its cell.
+  subroutine scan_reach(reach, cell, sim, images, known, near)
+    type(reach_lists_t), intent(in) :: reach
+    integer(int16), intent(in) :: cell(2)          !! cell into which at least one of them reaches
+    type(simulation_t), intent(in) :: sim
+    type(images_t), intent(in) :: images
+    integer(int32), intent(in) :: known            !! as in `earliest_contact`
+    type(prospect_t), intent(inout) :: near
+    integer(int32) :: e, last(2)                   ! entry; image of the listed disks
+    real(real64) :: number(2), shift(2)            ! index of the image of an obstacle; shift to it [length]
+
+    near%n = 0
+    last = 0
+    e = reach%first(cell(1), cell(2))
+    do while (e > 0)
+      associate (entry => reach%entry(e), disk => sim%disk(near%disk), tag => sim%tag(near%disk))
+        if (entry%code <= 0) then
+          number = entry%image
+          shift = images%shift(number)
+          call find_image_contact(sim%box, disk, tag%last_partner, entry%code, shift, near%time, near%partner)
+        else
+          if (near%n > 0 .and. (near%n == list_capacity .or. any(entry%image /= last))) call test_disks()
+          last = entry%image
+          near%n = near%n + 1
+          near%list(near%n) = entry%code - 1
+        end if
+        e = entry%next
+      end associate
+    end do
+    call test_disks()
+  contains
+
+    !> Tests the listed big disks, which are seen through one image.
+    subroutine test_disks()
+      if (all(last == 0)) then
+        call test_list(sim, known, near)
+      else
+        call test_through_image(sim, known, images%image(real(last, real64)), near)
+      end if
+    end subroutine test_disks
+  end subroutine scan_reach
+
   !> Finds contacts with the disks in the neighbour list of a disk.
-  subroutine scan_list(lists, sim, images, falling, near)
+  subroutine scan_list(lists, sim, images, known, near)
     type(neighbour_lists_t), intent(in) :: lists
     type(simulation_t), intent(in) :: sim
     type(images_t), intent(in) :: images
-    logical, intent(in) :: falling
+    integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prospect_t), intent(inout) :: near
     integer(int32) :: j, k
     real(real64) :: image(2)
@@ -43,37 +126,28 @@ contains
     do k = 1, lists%n_entries(near%disk)
       call lists%neighbour(near%disk, k, j, image)
       if (any(abs(image) > 0)) cycle
-      if (near%n == list_capacity) call test_list()
+      if (near%n == list_capacity) call test_list(sim, known, near)
       near%n = near%n + 1
       near%list(near%n) = j
     end do
-    call test_list()
+    call test_list(sim, known, near)
     do k = 1, lists%n_entries(near%disk)
       call lists%neighbour(near%disk, k, j, image)
-      if (any(abs(image) > 0)) call scan_disks(sim, [j + 1], images%image(image), near)
+      if (any(abs(image) > 0)) call scan_disks(sim, [j + 1], images%image(image), known, near)
     end do
-  contains
-
-    !> Tests the candidates. The literals let the compiler specialise the kernel.
-    subroutine test_list()
-      if (falling) then
-        call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0)
-      else
-        call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, no_gravity)
-      end if
-      near%n = 0
-    end subroutine test_list
   end subroutine scan_list
 
   !> Finds contacts with the disks of some cells, seen through an image.
-  pure subroutine scan_cells(cells, sim, c, near, image)
+  subroutine scan_cells(cells, sim, c, images, number, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: c(:)             !! numbers of up to nine cells
+    type(images_t), intent(in) :: images
+    real(real64), intent(in) :: number(2)          !! index of the image through which they are seen
+    integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prospect_t), intent(inout) :: near
-    type(image_t), intent(in) :: image             !! image through which they are seen
     integer(int64) :: n
-    integer(int32) :: k, crowded
+    integer(int32) :: k, j, crowded
 
     n = 0
     crowded = 0
@@ -82,56 +156,75 @@ contains
       crowded = max(crowded, cells%chain(c(k)))
     end do
     near%n = int(n, int32)
-    if (n > 0) call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image)
-    if (crowded == 0) return
-    do k = 1, size(c, kind=int32)
-      call scan_chain(cells, sim, c(k), near, image)
-    end do
+    if (crowded > 0) then
+      do k = 1, size(c, kind=int32)
+        j = cells%chain(c(k))                      ! it is in a slot as well
+        if (j > 0) j = cells%next(j)
+        do while (j > 0)
+          if (near%n == list_capacity) call test_through_image(sim, known, images%image(number), near)
+          near%n = near%n + 1
+          near%list(near%n) = j - 1
+          j = cells%next(j)
+        end do
+      end do
+    end if
+    if (near%n > 0) call test_through_image(sim, known, images%image(number), near)
   end subroutine scan_cells
 
-  !> Finds contacts with disks in the list of a crowded cell.
-  pure subroutine scan_chain(cells, sim, c, near, image)
+  !> Finds contacts of a big disk with small disks in the cells along its boundary. Cells seen through the same image are treated
+  !> together.
+  subroutine scan_rim(cells, sim, rim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: c
+    type(place_t), intent(in) :: rim(:)
+    type(images_t), intent(in) :: images
+    integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prospect_t), intent(inout) :: near
-    type(image_t), intent(in), optional :: image   !! image through which the cell is seen
-    integer(int32) :: j
+    integer(int32) :: m, n, c(9)
 
-    j = cells%chain(c)
-    do while (j > 0)
-      near%n = 0
-      do while (j > 0 .and. near%n < list_capacity)
-        near%n = near%n + 1
-        near%list(near%n) = j - 1
-        j = cells%next(j)
-      end do
-      call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image)
+    n = 0
+    do m = 1, size(rim, kind=int32)
+      n = n + 1
+      c(n) = rim(m)%cell(1) + cells%stride*rim(m)%cell(2)
+      if (m < size(rim) .and. n < size(c)) then
+        if (all(rim(m + 1)%image == rim(m)%image)) cycle
+      end if
+      call scan_cells(cells, sim, c(:n), images, real(-rim(m)%image, real64), known, near)
+      n = 0
     end do
-  end subroutine scan_chain
+  end subroutine scan_rim
 
-  !> Finds contacts with disks in the lists of the nine cells around a disk.
-  pure subroutine scan_chains_around(cells, sim, near)
+  !> Adds the disks in the lists of crowded cells among the nine around a disk to the candidates from `gather`.
+  subroutine add_chains_around(cells, sim, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prospect_t), intent(inout) :: near
-    integer(int32) :: row, c
+    integer(int32) :: row, c, j
 
     do row = near%cell - cells%stride, near%cell + cells%stride, cells%stride
       do c = row - 1, row + 1
-        call scan_chain(cells, sim, c, near)
+        j = cells%chain(c)                         ! in a slot as well, unless `gather` omitted it
+        if (j > 0 .and. c /= near%cell) j = cells%next(j)
+        do while (j > 0)
+          if (near%n == list_capacity) call test_list(sim, known, near)
+          near%n = near%n + 1
+          near%list(near%n) = j - 1
+          j = cells%next(j)
+        end do
       end do
     end do
-  end subroutine scan_chains_around
+  end subroutine add_chains_around
 
   !> Finds contacts where some of the nine cells are images across a periodic side; cells of one image are treated together. If
   !> the images above and below move along x, more columns are included: all that can be reached before the images have moved by one
   !> column. Disks two columns apart cannot touch.
-  pure subroutine scan_around_seam(cells, patch, sim, images, near)
+  subroutine scan_around_seam(cells, patch, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
     type(simulation_t), intent(in) :: sim
     type(images_t), intent(in) :: images
+    integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prospect_t), intent(inout) :: near
     real(real64) :: displacement, periods
     integer(int32) :: own(2), row(-1:1), above(-1:1), column(6), beside(6), columns, first, x, y, k, m, c(9), n
@@ -163,7 +256,7 @@ contains
             c(n) = column(m) + cells%stride*row(k)
           end do
         end do
-        call scan_cells(cells, sim, c(:n), near, images%image([x - periods, real(y, real64)]))
+        call scan_cells(cells, sim, c(:n), images, [x - periods, real(y, real64)], known, near)
       end do
     end do
   end subroutine scan_around_seam

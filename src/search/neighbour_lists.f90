@@ -378,7 +378,9 @@ contains
     integer(int32), intent(in) :: i
     logical :: yes
 
-    yes = self%is_complete(i) .and. self%entry(self%first(i)) <= list_capacity
+    associate (n => self%entry(self%first(i)))
+      yes = n >= 0 .and. n <= list_capacity
+    end associate
   end function is_short
 
   !> Copies the list of a disk whose neighbours are not seen through images.
