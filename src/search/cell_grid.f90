@@ -13,7 +13,7 @@ module cell_grid
   use images, only: images_t
   use neighbour_lists, only: neighbour_lists_t
   use neighbour_search, only: earliest_contact, latest_clock, no_gravity, prospect_t
-  use partners, only: axis_of, is_wall, looks_again, nothing, obstacle_code, sense_of, side_crossed
+  use partners, only: axis_of, is_wall, looks_again, nothing, sense_of, side_crossed
   use reach_lists, only: place_t, reach_lists_t
   use simulation_state, only: simulation_t
   implicit none
@@ -529,12 +529,11 @@ contains
     !> the cells along its boundary.
     subroutine find_event_of_big()
       real(real64) :: t_margin
-      integer(int32) :: number, m, image
+      integer(int32) :: number, image
 
       number = self%reach%number_of(i)
       call next_side(sim%box, sim%disk(i), near%time, near%partner)
-      call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%last_partner, [(obstacle_code(m), m=1, sim%box%n_obstacles())], &
-        near%time, near%partner)
+      call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%last_partner, self%reach%big(number)%obstacles, near%time, near%partner)
       t_margin = sim%now + time_to_circle(sim%position(i) - self%reach%big(number)%centre, sim%velocity(i), &
         sim%box%gravity, self%reach%margin, inside=.true.)
       if (t_margin < near%time) near%partner = looks_again

@@ -33,7 +33,8 @@ module reach_lists
   type :: big_disk_t
     integer(int32) :: disk = 0                   !! index of the disk
     real(real64) :: centre(2) = 0.0_real64       !! listed position [length]
-    type(place_t), allocatable :: rim(:)
+    type(place_t), allocatable :: rim(:)         !! cells in which small disks may touch it
+    integer(int32), allocatable :: obstacles(:)  !! codes of the obstacles that it may touch, in descending order
   end type big_disk_t
 
   type :: reach_lists_t
@@ -185,9 +186,29 @@ contains
       call leave(self, big%disk, big%rim)
       big%centre = sim%position(big%disk)
       call find_places(new_circle(big%centre, sim%disk(big%disk)%radius, .false.), self%margin, patch, faces, big%rim)
+      big%obstacles = obstacles_along(self, big%rim)
       call enter(self, big%disk, big%rim)
     end associate
   end subroutine follow
+
+  !> Codes of the obstacles that reach into the given cells, in descending order. A point in which a big disk touches an obstacle
+  !> lies in a cell that both of them reach into.
+  pure function obstacles_along(self, places) result(codes)
+    class(reach_lists_t), intent(in) :: self
+    type(place_t), intent(in) :: places(:)
+    integer(int32), allocatable :: codes(:)
+    integer(int32) :: e, m, code
+
+    allocate (codes(0))
+    do m = 1, size(places, kind=int32)
+      e = self%first(places(m)%cell(1), places(m)%cell(2))
+      do while (e > 0)
+        code = self%entry(e)%code
+        if (code <= 0 .and. all(codes /= code)) codes = [pack(codes, codes > code), code, pack(codes, codes < code)]
+        e = self%entry(e)%next
+      end do
+    end do
+  end function obstacles_along
 
   !> Finds the cells in which a small disk may touch an outline that has moved by up to a margin.
   subroutine find_places(shape, margin, patch, faces, places)
