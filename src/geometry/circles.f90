@@ -45,12 +45,13 @@ contains
   end function distance_at_contact
 
   !> Time until a disk touches the circle.
-  pure function contact_time(self, d, v, g, radius) result(s)
+  pure function contact_time(self, d, v, g, radius, within) result(s)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2), v(2), g(2), radius
+    real(real64), intent(in), optional :: within
     real(real64) :: s
 
-    s = time_to_circle(d, v, g, self%distance_at_contact(radius), self%encloses)
+    s = time_to_circle(d, v, g, self%distance_at_contact(radius), self%encloses, within)
   end function contact_time
 
   !> Distance between the circle and the boundary of a disk.

@@ -9,6 +9,10 @@ module free_flight
   !> Speeds below this value count as rest, because times would overflow. [length/time]
   real(real64), parameter :: slowest = 1/never
 
+  !> Relative margin above all rounding errors, for a test that may only err in one direction.
+  real(real64), parameter :: spare = 1.0e-6_real64
+  integer, parameter :: most_halvings = 3   !! how often a time interval is halved, to bound the distance in each part
+
 contains
 
   !> Position after the time s on the parabola x + v s + g s**2/2, for one coordinate.
@@ -58,19 +62,23 @@ contains
 
   !> Time until the centre of a disk reaches a circle of radius rho around the origin, from outside or, with `inside`, from
   !> inside. Zero if the disk is already on the circle (or beyond it, by rounding) and moves further.
-  pure function time_to_circle(d, v, g, rho, inside) result(s)
+  pure function time_to_circle(d, v, g, rho, inside, within) result(s)
     real(real64), intent(in) :: d(2)      !! centre of the disk relative to that of the circle [length]
     real(real64), intent(in) :: v(2)      !! [length/time]
     real(real64), intent(in) :: g(2)      !! [length/time**2]
     real(real64), intent(in) :: rho       !! [length]
     logical, intent(in) :: inside
+    real(real64), intent(in), optional :: within      !! contacts later than this may come out as `never` [time]
     real(real64) :: s, b, c, speed2, disc
 
+    s = never
     if (any(abs(g) > 0)) then
+      if (present(within) .and. .not. inside) then
+        if (misses_circle(d, v, g, rho, within)) return
+      end if
       s = time_to_circle_falling(d, v, g, rho, inside)
       return
     end if
-    s = never
     b = d(1)*v(1) + d(2)*v(2)
     c = d(1)*d(1) + d(2)*d(2) - rho*rho
     speed2 = v(1)*v(1) + v(2)*v(2)
@@ -88,6 +96,49 @@ contains
     end if
   end function time_to_circle
 
+  !> Whether a falling point certainly does not enter a circle around the origin for some time. The point may start on the
+  !> circle. Its squared distance minus the squared radius is a quartic in time. A polynomial is never below the smallest of
+  !> its Bernstein coefficients, and the coefficients approach its values as the interval is halved.
+  pure function misses_circle(d, v, g, rho, within) result(yes)
+    real(real64), intent(in) :: d(2), v(2), g(2), rho, within
+    logical :: yes
+    real(real64) :: c(0:4), step(4), slack
+
+    yes = .false.
+    if (within > sqrt(never)) return                   ! the path may be too long for a number
+    step(1) = 0.5_real64*within*(d(1)*v(1) + d(2)*v(2))
+    step(2) = within**2*((v(1)*v(1) + v(2)*v(2)) + (d(1)*g(1) + d(2)*g(2)))/6
+    step(3) = 0.25_real64*within**3*(v(1)*g(1) + v(2)*g(2))
+    step(4) = 0.25_real64*within**4*(g(1)*g(1) + g(2)*g(2))
+    c(0) = d(1)*d(1) + d(2)*d(2) - rho*rho
+    c(1) = c(0) + step(1)
+    c(2) = c(1) + step(1) + step(2)
+    c(3) = c(2) + step(1) + 2*step(2) + step(3)
+    c(4) = c(3) + step(1) + 3*step(2) + 3*step(3) + step(4)
+    slack = spare*((abs(d(1)) + abs(d(2)) + within*(abs(v(1)) + abs(v(2)) + within*(abs(g(1)) + abs(g(2)))))**2 + rho*rho)
+    yes = is_positive(c, .true., 0)
+
+  contains
+
+    !> Whether the quartic with these Bernstein coefficients is positive; `from_start`: except at its start.
+    pure recursive function is_positive(c, from_start, halvings) result(yes)
+      real(real64), intent(in) :: c(0:4)
+      logical, intent(in) :: from_start
+      integer, intent(in) :: halvings
+      logical :: yes
+      real(real64) :: two(3), three(2), middle
+
+      yes = min(c(1), c(2), c(3), c(4)) > slack .and. (from_start .or. c(0) > slack)
+      if (yes .or. c(4) <= slack .or. halvings == most_halvings) return
+      two = 0.25_real64*(c(:2) + 2*c(1:3) + c(2:))
+      three = 0.5_real64*(two(:2) + two(2:))
+      middle = 0.5_real64*(three(1) + three(2))
+      if (middle <= slack) return
+      yes = is_positive([c(0), 0.5_real64*(c(0) + c(1)), two(1), three(1), middle], from_start, halvings + 1)
+      if (yes) yes = is_positive([middle, three(2), two(3), 0.5_real64*(c(3) + c(4)), c(4)], .false., halvings + 1)
+    end function is_positive
+  end function misses_circle
+
   !> The same on a parabola. F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic. It is monotonic between the roots of F', which in
   !> turn are bracketed by the roots of the quadratic F''. Each root is therefore found by bisection in an interval that contains
   !> exactly one root, and the first contact cannot be missed. F itself is evaluated from the actual position, so that a small
@@ -95,8 +146,8 @@ contains
   pure function time_to_circle_falling(d, v, g, rho, inside) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside
-    real(real64) :: s, cubic(0:3), edge(0:4), a, b, c, disc, bend(2), bound, ends(4)
-    integer :: k, n
+    real(real64) :: s, cubic(0:3), from, to, a, b, c, disc, bend(2), bound, ends(5)
+    integer :: k
 
     cubic = [2*dot_product(d, v), 2*(dot_product(v, v) + dot_product(d, g)), 3*dot_product(v, g), dot_product(g, g)]
     bound = root_bound(cubic, rho/sqrt(cubic(3)))
@@ -104,24 +155,24 @@ contains
     disc = max(b*b - a*c, 0.0_real64)
     bend = [(-b - sign(sqrt(disc), a))/a, (-b + sign(sqrt(disc), a))/a]
 
-    ends = [0.0_real64, min(max(bend, 0.0_real64), bound), bound]
-    edge(0) = 0                                        ! edges of the intervals in which F is monotonic
-    n = 0
-    do k = 1, 3
-      if ((value(cubic, ends(k)) > 0) .eqv. (value(cubic, ends(k + 1)) > 0)) cycle
-      n = n + 1
-      edge(n) = root_between(cubic, ends(k), ends(k + 1))
-    end do
-    n = n + 1
-    edge(n) = edge(n - 1) + bound
-    do while (inside .and. apart(edge(n)) > 0)
-      edge(n) = 2*edge(n)
-    end do
+    ends = [0.0_real64, min(max(bend, 0.0_real64), bound), bound, bound]
     s = never
-    do k = 1, n
-      if (apart(edge(k)) > 0 .or. apart(edge(k)) >= apart(edge(k - 1))) cycle
-      s = last_apart(edge(k - 1), edge(k))
-      return
+    from = 0                                           ! ends of an interval in which F is monotonic
+    do k = 1, 4
+      if (k < 4) then
+        if ((value(cubic, ends(k)) > 0) .eqv. (value(cubic, ends(k + 1)) > 0)) cycle
+        to = root_between(cubic, ends(k), ends(k + 1))
+      else
+        to = from + bound
+        do while (inside .and. apart(to) > 0)
+          to = 2*to
+        end do
+      end if
+      if (.not. (apart(to) > 0 .or. apart(to) >= apart(from))) then
+        s = last_apart(from, to)
+        return
+      end if
+      from = to
     end do
 
   contains
@@ -171,19 +222,19 @@ contains
     bound = scale(2.0_real64, power)
   end function root_bound
 
-  !> The root of `poly` between lo and hi, where it has one change of sign. Found by bisection to the last bit.
-  pure function root_between(poly, lo, hi) result(s)
-    real(real64), intent(in) :: poly(0:), lo, hi
+  !> The root of a cubic between lo and hi, where it has one change of sign. Found by bisection to the last bit.
+  pure function root_between(cubic, lo, hi) result(s)
+    real(real64), intent(in) :: cubic(0:3), lo, hi
     real(real64) :: s, left, right
     logical :: sign_left
 
     left = lo
     right = hi
-    sign_left = value(poly, left) > 0
+    sign_left = value(cubic, left) > 0
     do
       s = 0.5_real64*(left + right)
       if (s <= left .or. s >= right) exit
-      if ((value(poly, s) > 0) .eqv. sign_left) then
+      if ((value(cubic, s) > 0) .eqv. sign_left) then
         left = s
       else
         right = s
@@ -192,17 +243,13 @@ contains
     s = left                                           ! the end of the interval before contact
   end function root_between
 
-  !> Value of a polynomial by Horner's rule.
-  pure function value(poly, s) result(p)
-    real(real64), intent(in) :: poly(0:)
+  !> Value of a cubic by Horner's rule.
+  pure function value(cubic, s) result(p)
+    real(real64), intent(in) :: cubic(0:3)
     real(real64), intent(in) :: s
     real(real64) :: p
-    integer :: k
 
-    p = 0
-    do k = ubound(poly, 1), 0, -1
-      p = p*s + poly(k)
-    end do
+    p = ((cubic(3)*s + cubic(2))*s + cubic(1))*s + cubic(0)
   end function value
 
 end module free_flight

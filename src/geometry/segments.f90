@@ -78,13 +78,15 @@ contains
   end function from_nearest
 
   !> Time until a disk touches the wall.
-  pure function contact_time(self, d, v, g, radius) result(s)
+  pure function contact_time(self, d, v, g, radius, within) result(s)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), v(2), g(2), radius
+    real(real64), intent(in), optional :: within
     real(real64) :: s, across(2)
     integer :: side
 
-    s = min(time_to_circle(d - self%half, v, g, radius, .false.), time_to_circle(d + self%half, v, g, radius, .false.))
+    s = min(time_to_circle(d - self%half, v, g, radius, .false., within), &
+      time_to_circle(d + self%half, v, g, radius, .false., within))
     do side = -1, 1, 2
       across = side*[-self%along(2), self%along(1)]
       s = min(s, time_to_side())

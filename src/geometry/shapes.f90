@@ -30,13 +30,14 @@ module shapes
   abstract interface
     !> Time until the boundary of a disk touches the outline. Zero if they touch already (or overlap by rounding)
     !> and approach; `never` if there is no contact.
-    pure function contact_time(self, d, v, g, radius) result(s)
+    pure function contact_time(self, d, v, g, radius, within) result(s)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
       real(real64), intent(in) :: d(2)          !! vector from the middle to the centre of the disk [length]
       real(real64), intent(in) :: v(2)          !! [length/time]
       real(real64), intent(in) :: g(2)          !! [length/time**2]
       real(real64), intent(in) :: radius        !! radius of the disk [length]
+      real(real64), intent(in), optional :: within   !! contacts later than this may come out as `never` [time]
       real(real64) :: s
     end function contact_time
 

@@ -322,13 +322,12 @@ contains
 
     associate (shape => box%obstacle(obstacle_number(obstacle))%shape)
       d = disk%x - (shape%middle + shift)
-      if (last == obstacle .and. .not. (shape%encloses .or. box%has_gravity())) then
-        if (all(abs(d - shape%from_nearest(disk%x, box%images(), heading=disk%v)) < 0.5_real64*box%edges())) return
-      end if
       if (box%has_gravity()) then
         if (stays_outside(d, disk%v, box%gravity, t - disk%clock, shape%extent + disk%radius)) return
+      else if (last == obstacle .and. .not. shape%encloses) then
+        if (all(abs(d - shape%from_nearest(disk%x, box%images(), heading=disk%v)) < 0.5_real64*box%edges())) return
       end if
-      t_image = disk%clock + shape%contact_time(d, disk%v, box%gravity, disk%radius)
+      t_image = disk%clock + shape%contact_time(d, disk%v, box%gravity, disk%radius, t - disk%clock)
     end associate
     if (.not. t_image < t) return
     t = t_image
