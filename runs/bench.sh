@@ -285,16 +285,16 @@ check() {
 equal 0.5 2087
 equal 0.7 2114
 equal 0.1 3173
-equal 0.5 2432 --set box.boundary=periodic,periodic
-equal 0.1 3607 --set box.boundary=periodic,periodic
-equal 0.5 2509 --set box.gravity=0,-1
-equal 0.1 3717 --set box.gravity=0,-1
+equal 0.5 2385 --set box.boundary=periodic,periodic
+equal 0.1 3575 --set box.boundary=periodic,periodic
+equal 0.5 2500 --set box.gravity=0,-1
+equal 0.1 3705 --set box.gravity=0,-1
 lognormal 0.7 2888
 lognormal 0.5 4503
 lognormal 0.3 6720
-lognormal 0.1 5154
+lognormal 0.1 5110
 uniform 0.7 2735
-uniform 0.5 3996
+uniform 0.5 3730
 LIMITS
   while read -r name limit; do
     obstacles "$name"
@@ -304,8 +304,8 @@ LIMITS
   done <<'LIMITS'
 scatterers_35 4000
 lorentz 6200
-board_1 3300
-board_36 11800
+board_1 2950
+board_36 7100
 LIMITS
   while read -r disks limit; do
     piston "$disks"
