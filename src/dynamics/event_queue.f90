@@ -51,7 +51,7 @@ module event_queue
 
 contains
 
-  !> Files the events of all disks.
+  !> Enters the events of all disks into the queue.
   subroutine fill(self, disk, tag, now, windowed)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -109,7 +109,7 @@ contains
     end function window_width
   end subroutine fill
 
-  !> Files the event of disk i. A previous entry of the disk becomes invalid by itself.
+  !> Enters the event of disk i into the queue. A previous entry of the disk becomes invalid by itself.
   subroutine schedule(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -367,8 +367,8 @@ contains
     call hand_over(self, disk, tag)
   end subroutine take_from_heap
 
-  !> Files the events of the next span into their buckets. If windows have proved far too narrow or too wide, all events
-  !> are filed again.
+  !> Moves the events of the next span into their buckets. If windows have proved far too narrow or too wide, all events
+  !> are entered again.
   subroutine open_next_span(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)

@@ -44,7 +44,7 @@ module time_stepped
 
 contains
 
-  !> Allocates the positions and deletes the lists of near pairs.
+  !> Allocates the positions and deletes the Verlet lists.
   subroutine start(self, sim)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -70,7 +70,7 @@ contains
     if (t < time) t = (steps_taken(time, self%dt) + 1)*self%dt
   end function pause_at
 
-  !> Continues after disks were changed. Lists of near pairs remain valid for any velocities; only the test for rest is reset.
+  !> Continues after disks were changed. Verlet lists remain valid for any velocities; only the test for rest is reset.
   subroutine renew(self, sim, changed)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -35,7 +35,7 @@ contains
     end do
   end function defaults_text
 
-  !> Margin of a group in the reference file, in which groups of boundaries are comments.
+  !> Characters with which each line of a group begins in the reference file, where groups of boundaries are commented out.
   pure function margin(group)
     character(len=*), intent(in) :: group
     character(len=:), allocatable :: margin

@@ -168,15 +168,15 @@ contains
       if (all(self%parts%domain%engine%idle)) call use_serial_engine(brief)
     end subroutine run_domains
 
-    !> Number of windows in a call, all of which an invalid one discards. It decreases with the number of recent failures.
+    !> Number of windows in a call. It decreases with the number of recent failures, because an invalid window discards them all.
     pure function most_windows_now() result(n)
       integer :: n
 
       n = max(1, int(most_windows*self%parts%shortening**4))
     end function most_windows_now
 
-    !> Makes windows longer after a call in which all were valid. Within a call their length is constant. Otherwise windows that
-    !> are later discarded could compensate each halving, and the run would make no progress.
+    !> Makes windows longer after a call in which all were valid. Within a call their length is constant. If it increased after
+    !> each window, windows that are discarded later could make up for each halving, and the run would make no progress.
     subroutine lengthen_windows(windows)
       integer, intent(in) :: windows               !! number of windows in the call
 

@@ -202,7 +202,7 @@ contains
       associate (me => species(s))
         call stream%seed(seed, [s, stream_number])
         call centre_range(me%region, packing%box, me%radius, lower, upper)
-        ! The number of disks that fit varies between attempts, the more the fewer disks there are.
+        ! The number of disks that fit varies between attempts. It varies more if there are few disks.
         do trial = 1, merge(1, max(1, many_trials/me%count), me%polydispersity > 0)
           call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
           call insert_at_random(packing, int(s, int32), 1 + disks_before(species, s), radius, stream, line, placed)

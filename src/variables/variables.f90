@@ -105,7 +105,7 @@ contains
     sentence = help(:index(trim(help)//" ", ". "))
   end function first_sentence
 
-  !> Whose samples a variable times: `frames` of frames_every_time; empty if it is no cadence.
+  !> Kind of samples whose times a variable sets: `frames` for frames_every_time; empty for variables that set no times.
   pure function track_of(name) result(track)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: track
