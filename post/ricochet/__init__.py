@@ -20,14 +20,17 @@ from .aliases import Aliases
 from .reading.bridges import mdanalysis_universe
 from .reading.files import RunError
 from .reading.frames import Frames, Series
-from .reading.reader import EventLog, Obstacle, Run, read_run
+from .reading.reader import EventLog, Frame, Obstacle, Run, read_run
 from .running.ensembles import ensemble, sweep
-from .running.program import ProgramError, run
+from .running.program import ProgramError, example, run
 from .running.simulation import Simulation
 from .running.starting import write_start
 
+__version__ = "0.2.0"
+
 __all__ = [
     "EventLog",
+    "Frame",
     "Frames",
     "Obstacle",
     "ProgramError",
@@ -36,6 +39,7 @@ __all__ = [
     "Series",
     "Simulation",
     "ensemble",
+    "example",
     "mdanalysis_universe",
     "read_run",
     "run",

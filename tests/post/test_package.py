@@ -4,12 +4,14 @@ import ast
 import importlib
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
 import ricochet
 from ricochet.aliases import modules
+from whole_runs import ran
 
 INIT = Path(ricochet.__file__)
 
@@ -50,6 +52,29 @@ def test_a_name_that_is_not_there_is_an_error():
         _ = ricochet.structur
     with pytest.raises(ModuleNotFoundError):
         importlib.import_module("ricochet.structur")
+
+
+def test_the_version_is_the_same_everywhere(program):
+    """Of the package, which pip reads, of the program and of the citation."""
+    root = INIT.parents[2]
+    version = ricochet.__version__
+    assert f"ricochet {version}" in ran(program, "--version").stdout
+    assert f"\nversion: {version}\n" in (root / "CITATION.cff").read_text()
+    settings = tomllib.loads((root / "pyproject.toml").read_text())
+    assert "version" in settings["project"]["dynamic"]
+    assert root / settings["tool"]["hatch"]["version"]["path"] == INIT
+
+
+def test_inputs_are_found_by_name(tmp_path, monkeypatch):
+    """Wherever Python works; another name is answered with the one that it is like."""
+    monkeypatch.chdir(tmp_path)
+    assert ricochet.example("gas") == ricochet.example("gas.nml")
+    with ricochet.Simulation(ricochet.example("gas")) as gas:
+        assert gas.n_disks > 1
+    with pytest.raises(ricochet.RunError, match="no input carter; did you mean crater"):
+        ricochet.example("carter")
+    with pytest.raises(ricochet.RunError, match="there are active, brownian"):
+        ricochet.example("../README")
 
 
 def test_the_package_loads_no_more_than_its_names_need():

@@ -164,6 +164,23 @@ def test_what_is_no_input_is_refused(groups, words):
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize("begin", [package.run, package.Simulation])
+def test_overrides_may_be_nested_and_are_named_in_messages(begin):
+    """A mapping stands for the common beginning of names; a mistake is answered without options."""
+    flat = {"contact.restitution": 0.8, "species.light.mass": 2, "run.seed": 7}
+    nested = {"contact": {"restitution": 0.8}, "species": {"light": {"mass": 2}}, "run.seed": 7}
+    one, other = begin(GROUPS, flat), begin(GROUPS, nested)
+    assert one.parameters["contact"]["restitution"] == 0.8 and set(one.mass) == {1, 2}
+    assert np.array_equal(one.velocity[:], other.velocity[:])
+    with pytest.raises(ValueError, match=r"run\.seed: is given twice"):
+        begin(GROUPS, {"run.seed": 1, "run": {"seed": 2}})
+    for value, words in ((7, 'species.light.mass: "-1"'), (0, "species.light: unknown variable")):
+        wrong = {"species.light.mass": -1} if value else {"species.light": None}
+        with pytest.raises(ProgramError) as refused:
+            begin(GROUPS, wrong)
+        assert refused.value.message.startswith(words) and "--set" not in refused.value.message
+
+
 def test_file_names_may_begin_with_a_dash(tmp_path):
     Path("-i.nml").write_text(TEXT)
     run = package.run("-i.nml", output="-o.h5")

@@ -76,6 +76,17 @@ def test_frames_and_observables_are_values_in_expressions(small):
     assert [frame.tolist() for frame in run.position] == run.position[:].tolist()
 
 
+def test_a_run_is_a_sequence_of_frames(small):
+    run = read_run(small)
+    assert len(run) == run.n_frames == 3
+    assert [frame.time for frame in run] == run.time.tolist()
+    for frame in (*run, run[-1], run[0]):
+        assert np.array_equal(frame.position, run.position[frame.index])
+        assert np.array_equal(frame.speed, run.speed(frame.index))
+    with pytest.raises(RunError, match="no frame 3 of 3"):
+        run[3]
+
+
 def test_frames_are_indexed_like_an_array_and_are_one_for_numpy(small):
     run = read_run(small)
     whole = run.position[:]

@@ -91,6 +91,14 @@ def test_arrays_are_read_only_and_are_assigned_whole():
         assert np.array_equal(pickle.loads(pickle.dumps(before)), before)
 
 
+def test_a_simulation_says_in_one_line_what_it_is():
+    gas = Simulation(GAS).advance(collisions=4)
+    words = f"<Simulation: 60 a, 20 b; t = {gas.time:g}, 4 collisions, {gas.events} events>"
+    assert repr(gas) == words
+    gas.close()
+    assert repr(gas) == "<Simulation: closed>"
+
+
 def test_a_moment_where_a_slice_has_ended_is_reached_again():
     """In one go, to the last bit: in the middle of an epoch, and where one ends."""
     text = "&box boundary = 'periodic', 'periodic' /\n&species name = 'a' count = 200"

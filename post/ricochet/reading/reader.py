@@ -23,7 +23,7 @@ import numpy as np
 
 from .arrays import Index, as_index
 from .files import RunError, Unsound, did_you_mean, open_file, tree
-from .frames import DISKS, Frames, Series
+from .frames import DISKS, Frames, NoSuchFrame, Series
 from .nature import TRAITS, Nature, allow, nature_of
 from .units import UNNAMED, Units
 
@@ -153,6 +153,20 @@ class Run:
         kinds = ", ".join(f"{np.sum(kind.disks)} {kind.name}" for kind in self.by_species)
         frames = f"{self.n_frames} frame{'s' * (self.n_frames > 1)}, t = {span(self.time)}"
         return f"<Run {self.path}: {kinds}; {frames}>"
+
+    def __len__(self) -> int:
+        """Return T, the number of frames."""
+        return len(self.time)
+
+    def __getitem__(self, frame: int) -> "Frame":
+        """Return a frame; a negative number counts from the end."""
+        if not -len(self) <= frame < len(self):
+            raise NoSuchFrame(f"{self.path}: there is no frame {frame} of {len(self)}")
+        return Frame(self, frame % len(self))
+
+    def __iter__(self) -> "Iterator[Frame]":
+        """Yield the frames in chronological order."""
+        return (Frame(self, k) for k in range(len(self)))
 
     @property
     def n_disks(self) -> int:
@@ -780,6 +794,56 @@ class Run:
     def gravity(self) -> np.ndarray:
         """(2,) acceleration of free flight."""
         return np.asarray(self.parameter("box", "gravity", (0.0, 0.0)), dtype=float)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame of a run; its arrays are read from the file on demand.
+
+    `for frame in run` yields all frames, `run[-1]` is the last one.
+
+    Parameters
+    ----------
+    run : Run
+        the run
+    index : int
+        number of the frame, from 0
+
+    Examples
+    --------
+    >>> frame = run[-1]
+    >>> frame.time == run.time[-1], frame.position.shape
+    (True, (64, 2))
+    >>> len([frame for frame in run if frame.time < 0.1]) < len(run)
+    True
+    """
+
+    run: Run = field(repr=False)
+    index: int
+
+    @property
+    def time(self) -> float:
+        """Time of the frame."""
+        return float(self.run.time[self.index])
+
+    @property
+    def position(self) -> np.ndarray:
+        """(N, 2) positions [length]."""
+        return self.run.position[self.index]
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """(N, 2) velocities [length/time]."""
+        return self.run.velocity[self.index]
+
+    @property
+    def speed(self) -> np.ndarray:
+        """(N,) speeds [length/time]."""
+        return self.run.speed(self.index)
+
+    def per_disk(self, name: str) -> np.ndarray:
+        """Return a quantity of each disk that only some runs have, as `Run.per_disk`."""
+        return self.run.per_disk(name)[self.index]
 
 
 def read_run(path: str | Path) -> Run:

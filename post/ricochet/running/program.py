@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from numbers import Integral
 from pathlib import Path
 from typing import Any
@@ -20,12 +20,14 @@ import numpy as np
 from tqdm import tqdm
 
 from ..commands import HERE
-from ..reading.files import RunError
+from ..reading.files import RunError, did_you_mean
 from ..reading.reader import Run, read_run
 
 STOPPED = 75
 PROGRESS = "\033[?7l"  # begins each update of the program's line on a terminal
 PAUSE = 30.0  # s between two lines without a terminal
+#: Folders of the inputs: inside an installed package, and in a clone.
+INPUTS = (HERE / "input", HERE.parents[1] / "input")
 ESCAPES = re.compile(r"\033\[\??\d*[A-Za-z]")
 
 
@@ -59,7 +61,8 @@ def run(
         an input file, its text, or its groups, as in `{"species": {"count": 9, "radius": 0.1}}`,
         with a list of dictionaries for a repeated group
     overrides : mapping of str to object, optional
-        values of variables, as `{"species.gas.mass": 2}`; None means the default of a variable
+        values of variables, as `{"species.gas.mass": 2}` or `{"contact": {"restitution": 0.9}}`;
+        None means the default of a variable
     output : str or Path, optional
         the output file [a temporary file, which is removed when Python ends]
     force, resume : bool
@@ -106,11 +109,44 @@ def run(
     if code != 0:
         part = output.with_name(f"{output.name}.part")
         written = part.is_file() and part.stat().st_mtime > began - 1  # else it is another run's
-        message = named(message, groups) or f"{program} ended with exit code {code}"
+        message = without_options(named(message, groups), pairs)
+        message = message or f"{program} ended with exit code {code}"
         raise ProgramError(message, code, part if written else None)
     if message:
         print(message, file=sys.stderr)
     return read_run(output)
+
+
+def example(name: str) -> Path:
+    """Return the path of an input file that comes with Ricochet.
+
+    Parameters
+    ----------
+    name : str
+        name of the file, with or without `.nml`, such as "crater"
+
+    Returns
+    -------
+    Path
+        the input file
+
+    Raises
+    ------
+    RunError
+        if there is no such input; the message lists the names
+
+    Examples
+    --------
+    >>> ricochet.example("crater").name
+    'crater.nml'
+    """
+    folder = next((place for place in INPUTS if place.is_dir()), INPUTS[-1])
+    path = folder / f"{name.removesuffix('.nml')}.nml"
+    if Path(name).name != name or not path.is_file():
+        names = sorted(own.stem for own in folder.glob("*.nml"))
+        hint = did_you_mean(name, names) or f"; there are {', '.join(names)}"
+        raise RunError(f"{folder}: there is no input {name}{hint}")
+    return path
 
 
 def whole_threads(threads: int | None) -> int:
@@ -232,13 +268,35 @@ def namelist(groups: Mapping[str, Any]) -> str:
 
 def settings_of(overrides: Mapping[str, Any]) -> list[str]:
     """Return GROUP.VARIABLE=VALUE for each override; without a value it is the default."""
+    return [
+        f"{name}={'' if value is None else value_text(name, value)}"
+        for name, value in flat(overrides).items()
+    ]
+
+
+def flat(overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Return overrides by full names: `{"run": {"seed": 2}}` means `{"run.seed": 2}`."""
     if not isinstance(overrides, Mapping):
         kind = type(overrides).__name__
         raise TypeError(f"values are a dictionary as {{'run.seed': 2}}, not {kind}")
-    return [
-        f"{name}={'' if value is None else value_text(name, value)}"
-        for name, value in overrides.items()
-    ]
+    found: dict[str, Any] = {}
+    for name, value in overrides.items():
+        inner = flat(value) if isinstance(value, Mapping) else {"": value}
+        for rest, own in inner.items():
+            whole = ".".join(filter(None, (name, rest)))
+            if whole in found:
+                raise ValueError(f"{whole}: is given twice")
+            found[whole] = own
+    return found
+
+
+def without_options(message: str, settings: Iterable[str]) -> str:
+    """Replace the option --set in the program's messages by the name of the override."""
+    for pair in settings:
+        name = pair.partition("=")[0]
+        place = re.compile(rf"^--set {re.escape(pair)}: (?:{name.split('.')[0]}[\w.]*: )?", re.M)
+        message = place.sub(lambda _, name=name: f"{name}: ", message)  # type: ignore[misc]
+    return message
 
 
 def named(message: str, text: str | None) -> str:

@@ -28,7 +28,14 @@ from ..commands import HERE
 from ..reading.arrays import snapshot
 from ..reading.files import RunError, did_you_mean
 from ..reading.nature import Nature, nature_of
-from .program import ProgramError, named, settings_of, unseen, whole_threads
+from .program import (
+    ProgramError,
+    named,
+    settings_of,
+    unseen,
+    whole_threads,
+    without_options,
+)
 
 ROOM = 100_000  # size of a message [bytes]
 PATIENCE = 0.05  # interval of checks for signals [s]
@@ -57,7 +64,8 @@ class Simulation:
     system : str, Path or mapping
         an input file, its text, or its groups, as for `ricochet.run`
     overrides : mapping of str to object, optional
-        values of variables, as for `ricochet.run`
+        values of variables, as for `ricochet.run`, such as {"contact.restitution": 0.9} or
+        {"contact": {"restitution": 0.9}}
     threads : int, optional
         number of threads [that of the input, or one]
 
@@ -87,11 +95,22 @@ class Simulation:
     ):
         """Start from an input; the class describes the arguments."""
         text, groups = read_input(system), isinstance(system, Mapping)
+        settings = settings_of({} if overrides is None else overrides)
         try:
-            self._begin(text, settings_of({} if overrides is None else overrides), threads)
+            self._begin(text, settings, threads)
         except ProgramError as problem:
             message = named(problem.message, text if groups else None)
-            raise ProgramError(message, problem.code) from None
+            raise ProgramError(without_options(message, settings), problem.code) from None
+
+    def __repr__(self) -> str:
+        """Return one line: disks, time and numbers of events."""
+        if not self._handle:
+            return "<Simulation: closed>"
+        names = [*self.parameters["species"]]
+        numbers = np.bincount(self.species, minlength=len(names) + 1)[1:]
+        kinds = ", ".join(f"{n} {name}" for n, name in zip(numbers, names, strict=True))
+        counts = f"{self.collisions} collisions, {self.events} events"
+        return f"<Simulation: {kinds}; t = {self.time:g}, {counts}>"
 
     @classmethod
     def _of(cls, text: str, settings: list[str]) -> Self:
@@ -320,7 +339,12 @@ class Simulation:
         ...     box.change({"box.gravity": (0, -1)}).changes
         [(0.0, 'box.gravity', '0, -1')]
         """
-        return self._change(settings_of(values))
+        settings = settings_of(values)
+        try:
+            return self._change(settings)
+        except ProgramError as problem:
+            message = without_options(problem.message, settings)
+            raise ProgramError(message, problem.code) from None
 
     def _change(self, settings: list[str]) -> Self:
         with self._open() as handle:
