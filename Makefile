@@ -46,7 +46,7 @@ Q := $(if $(V),,@)
 sources := $(wildcard src/*.f90 src/*/*.f90)
 vpath %.f90 $(sort $(dir $(sources))) $(BUILD)
 vpath %.c src/base
-modules := $(filter-out main library library_files %_without_hdf5,$(notdir $(sources:.f90=))) build_info
+modules := $(filter-out main library library_events library_files %_without_hdf5,$(notdir $(sources:.f90=))) build_info
 objects := $(modules:%=$(BUILD)/%.o) $(patsubst src/base/%.c,$(BUILD)/%_c.o,$(wildcard src/base/*.c))
 
 # Unit tests: the same .pf files under pFUnit or the substitute, each in its own folder, with all checks on.
@@ -93,7 +93,7 @@ $(BUILD)/libricochet.so: $(filter-out $(BUILD)/main.o,$(without_hdf5)) $(filter 
 	$(call link,$(as_library),$(filter %.o,$^))
 
 $(BUILD)/libricochet_files.so: hdf5_libs = $(filter-out -I%,$(wordlist 2,99,$(shell $(H5FC) -shlib -show)))
-$(BUILD)/libricochet_files.so: $(BUILD)/library.o $(BUILD)/library_files.o $(objects)
+$(BUILD)/libricochet_files.so: $(BUILD)/library.o $(BUILD)/library_events.o $(BUILD)/library_files.o $(objects)
 	$(call link,$(as_library),$^)
 
 $(BUILD)/%.o: %.f90 $(BUILD)/flags

@@ -30,11 +30,10 @@ module library
   use variables, only: change_of, in_motion, obstacle_groups, row_of
   implicit none
   private
-  public :: answer, begin, session_of, session_t, text_of
+  public :: advance_to, answer, begin, changes_of, goal_of, renew, session_of, session_t, text_of
 
   integer(c_int), parameter :: going_on = 1          !! the only result of `advance` that is not an exit code
-  integer(int64), parameter :: longest_look = 2000000 !! largest number of events, and of kicks of a disk, for which future
-                                                      !! collisions are searched
+  integer, parameter :: most_logged = 1000000         !! smallest number of latest events that are kept
 
   type :: session_t
     type(run_input_t) :: input
@@ -42,6 +41,8 @@ module library
     class(evolution_t), allocatable :: evolution
     type(stop_rule_t) :: rule
     integer(int64) :: iterations = 1                  !! number of iterations between two checks of the clock
+    logical :: logged = .false.                       !! events are logged
+    type(event_log_t) :: log                          !! latest events; older ones are dropped
   end type session_t
 
 contains
@@ -86,6 +87,7 @@ contains
     call start_threads(session%input%settings, warning)
     call choose_evolution(session%input%settings, session%evolution)
     session%rule = stop_rule_t(session%input%settings%stop, session%sim)
+    session%logged = session%input%settings%output%event_log
     call session%evolution%start(session%sim)
     handle = c_loc(session)
   end function begin
@@ -109,35 +111,59 @@ contains
     integer(c_int), value :: room
     integer(c_int) :: code
     type(session_t), pointer :: session
-    type(stop_rule_t) :: rule
-    type(limits_t) :: limits
     type(error_t), allocatable :: error
-    real(real64) :: began, looked                     ! [s]
 
     session => session_of(handle)
+    call advance_to(session, goal_of(session, time, collisions, events), patience, code, error)
+    if (allocated(error) .or. code /= going_on) code = answer(error, message, room)
+  end function advance
+
+  !> The rule by which an advance to these values ends; that of the input, if none of them is a limit.
+  pure function goal_of(session, time, collisions, events) result(rule)
+    type(session_t), intent(in) :: session
+    real(real64), intent(in) :: time                  !! since the start of the run [time]
+    integer(int64), intent(in) :: collisions, events
+    type(stop_rule_t) :: rule
+
     rule = session%rule
-    if (ieee_is_nan(time)) then
+    if (.not. (time < never .or. ieee_is_nan(time) .or. min(collisions, events) < huge(events))) return
+    rule%limits = limits_t(time=time, collisions=collisions, events=events, at_rest=rule%limits%at_rest)
+    if (time >= never) rule%limits%time = never
+  end function goal_of
+
+  !> Advances a simulation until a rule is met, or until several seconds have passed; `code` is then `going_on`.
+  subroutine advance_to(session, rule, patience, code, error)
+    type(session_t), intent(inout) :: session
+    type(stop_rule_t), intent(in) :: rule
+    real(real64), intent(in) :: patience              !! [s]
+    integer(c_int), intent(out) :: code
+    type(error_t), allocatable, intent(out) :: error
+    type(limits_t) :: limits
+    real(real64) :: began, looked                     ! [s]
+
+    code = going_on
+    if (ieee_is_nan(rule%limits%time)) then
       call fail(error, exit_usage, "time: NaN is not a time")
-      code = answer(error, message, room)
       return
-    end if
-    if (time < never .or. min(collisions, events) < huge(events)) then
-      rule%limits = limits_t(time=min(time, never), collisions=collisions, events=events, at_rest=rule%limits%at_rest)
     end if
     call make_team(session%input%settings%run%threads)
     began = seconds()
-    code = going_on
     do while (.not. rule%is_over(session%sim, session%evolution))
       looked = seconds()
       if (.not. looked - began <= patience) return
       limits = rule%limits
       limits%iterations = session%iterations
-      call advance_once(session%evolution, session%sim, limits, error)
-      if (allocated(error)) exit
+      if (session%logged) then
+        call advance_once(session%evolution, session%sim, limits, error, session%log)
+        call session%log%keep(most_logged)
+      else
+        call advance_once(session%evolution, session%sim, limits, error)
+      end if
+      if (allocated(error)) return
       session%iterations = adapted_iterations(session%iterations, seconds() - looked, session%evolution%iterations_left > 0)
     end do
-    code = answer(error, message, room)
-  end function advance
+    code = 0
+  end subroutine advance_to
 
   !> See ricochet.h. The changed input is stored as a new text, on which later changes and saved files are based.
   function change(handle, overrides, message, room) bind(C, name="ricochet_change") result(code)
@@ -449,38 +475,6 @@ contains
     length = len(words)
     if (room > length) call give(words, text, room)
   end function copy_text
-
-  !> See ricochet.h. The collisions are found by advancing a copy, because a disk may collide twice, or be kicked in between.
-  function next_events(handle, most, records) bind(C, name="ricochet_next_events") result(n)
-    type(c_ptr), value :: handle
-    integer(c_int), value :: most
-    real(c_double), intent(inout) :: records(6, *)
-    integer(c_int) :: n
-    type(session_t), pointer :: session
-    type(simulation_t) :: ahead
-    class(evolution_t), allocatable :: evolution
-    type(event_log_t) :: log
-    type(limits_t) :: limits
-    type(error_t), allocatable :: error
-    integer(int64) :: looked
-
-    session => session_of(handle)
-    n = -1
-    if (session%input%settings%run%dynamics == "steps") return
-    ahead = session%sim
-    allocate (evolution, source=session%evolution)
-    call evolution%start(ahead)
-    log%most = max(most, 0)
-    looked = 0
-    do while (log%n < most .and. looked < longest_look + 100_int64*most)
-      limits%iterations = 1000
-      call advance_once(evolution, ahead, limits, error, log)
-      if (allocated(error) .or. evolution%idle) exit
-      looked = looked + max(limits%iterations - evolution%iterations_left, int(ahead%n_disks(), int64))
-    end do
-    n = min(log%n, log%most)
-    if (n > 0) records(:, :n) = log%record(:, :n)
-  end function next_events
 
   !> The simulation of a handle.
   function session_of(handle) result(session)

@@ -62,6 +62,9 @@ typedef struct ricochet ricochet;
    Returns a handle, or NULL after a failure. */
 ricochet *ricochet_open(const char *text, const char *overrides, int threads, char *message, int room, int *code);
 
+/* Opens a copy of a simulation in its present state. Returns a handle, or NULL after a failure. */
+ricochet *ricochet_copy(ricochet *, char *message, int room, int *code);
+
 /* Closes a simulation and frees its memory. NULL is allowed. */
 void ricochet_close(ricochet *);
 
@@ -71,6 +74,17 @@ void ricochet_close(ricochet *);
    Returns 0 when a limit is reached, 1 if `patience` seconds have passed before (call it again), or an exit code: 2 if `time` is
    NAN, other codes if the simulation cannot be continued. */
 int ricochet_advance(ricochet *, double time, int64_t collisions, int64_t events, double patience, char *message, int room);
+
+/* As ricochet_advance, but ends after the next event at the latest, with all events of its moment. Returns 0 also if no event
+   occurred before one of the limits was reached. The events are those that ricochet_last_events copies. */
+int ricochet_advance_event(ricochet *, double time, int64_t collisions, int64_t events, double patience, char *message, int room);
+
+/* Copies the latest events.
+   most:     largest number of events
+   records:  as of ricochet_next_events
+   Returns the number of events. At least 1,000,000 events are kept if output.event_log is true in the input, else those of the
+   last call of ricochet_advance_event. */
+int ricochet_last_events(ricochet *, int most, double records[][6]);
 
 /* Time since the start of the run. */
 double ricochet_time(ricochet *);
@@ -101,6 +115,12 @@ int ricochet_change(ricochet *, const char *overrides, char *message, int room);
    velocities:  x and y component for each disk
    The change of the total energy counts as work. Returns an exit code; unless it is 0, nothing is changed. */
 int ricochet_set_velocities(ricochet *, const double *velocities, char *message, int room);
+
+/* Sets the positions of all disks at the present time.
+   positions:  x and y for each disk
+   Positions at which disks overlap each other, an obstacle or a side are refused, and any in a sheared box. The change of
+   the total energy counts as work. Returns an exit code; unless it is 0, nothing is changed. */
+int ricochet_set_positions(ricochet *, const double *positions, char *message, int room);
 
 /* Copies a text that describes the simulation at the present time.
    what:  "input": an input file that includes overrides and changes

@@ -20,7 +20,7 @@ from .aliases import Aliases
 from .reading.bridges import mdanalysis_universe
 from .reading.files import RunError
 from .reading.frames import Frames, Series
-from .reading.reader import EventLog, Frame, Obstacle, Run, read_run
+from .reading.reader import Event, EventLog, Frame, Obstacle, Run, read_run
 from .running.ensembles import ensemble, sweep
 from .running.program import ProgramError, example, run
 from .running.simulation import Simulation
@@ -29,6 +29,7 @@ from .running.starting import write_start
 __version__ = "0.2.0"
 
 __all__ = [
+    "Event",
     "EventLog",
     "Frame",
     "Frames",
@@ -74,7 +75,9 @@ if TYPE_CHECKING:  # the modules that `__getattr__` loads, for type checkers
     from .reading import nature as nature
     from .reading import reader as reader
     from .reading import units as units
+    from .running import engine as engine
     from .running import ensembles as ensembles
+    from .running import inputs as inputs
     from .running import program as program
     from .running import simulation as simulation
     from .running import starting as starting

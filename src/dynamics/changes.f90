@@ -1,5 +1,5 @@
-!> Changes to a running simulation: of forces, laws and motions of sides, and of velocities. They act at the present time on all
-!> disks at once. Their effect on the energy is counted as work.
+!> Changes to a running simulation: of forces, laws and motions of sides, of positions and velocities. They act at the present time
+!> on all disks at once. Their effect on the energy is counted as work.
 module changes
   use box_sides, only: bounds
   use disks, only: advance_disk
@@ -8,11 +8,12 @@ module changes
   use partners, only: n_sides
   use observables, only: total_energy
   use side_motion, only: piston, side_state_t
+  use sample_values, only: wrap
   use simulation_state, only: simulation_t, system_t
   use tally, only: work
   implicit none
   private
-  public :: change_system, change_velocities
+  public :: change_positions, change_system, change_velocities
 
 contains
 
@@ -88,6 +89,29 @@ contains
     call restart_epoch(sim)
     call book(sim, before)
   end subroutine change_velocities
+
+  !> Sets the positions of all disks, without a test for overlaps. A position outside a periodic side is that of an image.
+  subroutine change_positions(sim, x)
+    type(simulation_t), intent(inout) :: sim
+    real(real64), intent(in) :: x(:, :)                      !! (2,n) new positions in the order of ids [length]
+    real(real64) :: before, old(2), v(2), image(2)           ! energy [energy], position [length], velocity [length/time]
+    integer(int32) :: i
+
+    before = total_energy(sim)
+    call advance_all(sim)
+    do i = 1, sim%n_disks()
+      image = 0
+      if (any(sim%box%periodic)) image = sim%extra(i)%image
+      old = sim%disk(i)%x
+      v = sim%disk(i)%v
+      call wrap(sim, old, v, image)                          ! the image that a frame would show
+      sim%disk(i)%x = x(:, sim%tag(i)%id)
+      call wrap(sim, sim%disk(i)%x, v, image)
+      if (any(sim%box%periodic)) sim%extra(i)%image = image
+    end do
+    call restart_epoch(sim)
+    call book(sim, before)
+  end subroutine change_positions
 
   !> Advances all disks to the present time under the old law. Their clocks are equal afterwards. The last partners are erased,
   !> because a disk may collide with its last partner again at once, as after a kick, and this must not be taken for a rounding

@@ -15,6 +15,7 @@ module event_log
     real(real64), allocatable :: record(:, :)
   contains
     procedure :: append
+    procedure :: keep
   end type event_log_t
 
 contains
@@ -38,5 +39,15 @@ contains
     self%n = self%n + 1
     self%record(:, self%n) = record
   end subroutine append
+
+  !> Drops the oldest entries of a log that has become twice as long as it has to be.
+  pure subroutine keep(self, least)
+    class(event_log_t), intent(inout) :: self
+    integer, intent(in) :: least                    !! number of latest entries that are needed
+
+    if (self%n < 2*least) return
+    self%record(:, :least) = self%record(:, self%n - least + 1:self%n)
+    self%n = least
+  end subroutine keep
 
 end module event_log

@@ -6,7 +6,7 @@ module sample_values
   use team, only: many
   implicit none
   private
-  public :: frame_column_t, frame_columns, frame_sample, observable_sample
+  public :: frame_column_t, frame_columns, frame_sample, observable_sample, wrap
 
   !> A quantity that frames contain for each disk.
   type :: frame_column_t

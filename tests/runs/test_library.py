@@ -8,6 +8,7 @@ import copy
 import ctypes
 import gc
 import json
+import multiprocessing
 import os
 import pickle
 import random
@@ -18,13 +19,14 @@ import sys
 import textwrap
 import threading
 import time
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
-from ricochet import ProgramError, RunError, Simulation, read_run
+from ricochet import EventLog, ProgramError, RunError, Simulation, read_run
 from ricochet.running.simulation import COLUMNS, NEVER, library
 from whole_runs import ran
 
@@ -35,6 +37,9 @@ GAS = """&box boundary = 'periodic', 'wall' gravity = 0, -1 /
 &output event_log = .true. /
 &stop collisions = 400 /
 """
+RESTING = {"species": {"count": 9, "radius": 0.1, "velocities": "rest"}}
+SHEARED = {"box": {"boundary": ["periodic", "periodic"], "shear_rate": 1}}
+SHEARED |= {"species": {"count": 1, "radius": 0.1}}
 ENDLESS = {"contact.restitution": 1, "contact.tangential_restitution": 1}
 
 
@@ -97,6 +102,121 @@ def test_a_simulation_says_in_one_line_what_it_is():
     assert repr(gas) == words
     gas.close()
     assert repr(gas) == "<Simulation: closed>"
+
+
+def states(*simulations):
+    """Everything that simulations show."""
+    return [
+        [(gas.time, gas.events, gas.changes)]
+        + [getattr(gas, name).tolist() for name in COLUMNS]
+        + [np.ravel(gas.observable(name)).tolist() for name in gas.observables]
+        for gas in simulations
+    ]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_copy_and_a_pickle_continue_with_the_same_bits(seed):
+    """Whatever was done before, and neither disturbs the other; so does another process."""
+    random.seed(seed)
+    gas = Simulation(GAS, {"run.seed": seed}, threads=1 + seed)
+    gas.advance(events=random.randrange(300))
+    if seed:
+        gas.change({"box.gravity": (0, -2)})
+        gas.velocity = gas.velocity[::-1]
+        gas.advance_by(events=random.randrange(99))
+    before = states(gas)
+    others = [gas.copy(), copy.copy(gas), copy.deepcopy(gas), pickle.loads(pickle.dumps(gas))]
+    assert states(*others) == 4 * before
+    assert {other.nature for other in others} == {gas.nature}
+    others[0].velocity = 2 * others[0].velocity
+    others[0].advance_by(events=50)
+    assert states(gas) == before
+    for other in (gas, *others[1:]):
+        other.advance_by(events=200)
+    assert states(*others[1:]) == 3 * states(gas)
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        far = pool.submit(Simulation.advance_by, gas, events=20).result()
+    assert states(far) == states(gas.advance_by(events=20))
+    assert np.array_equal(gas.event_log(9).time, others[1].advance_by(events=20).event_log(9).time)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_each_event_is_reported_in_the_state_of_its_moment(whole, threads):
+    """The events are those of the log, and the function does not change the motion."""
+    log, seen = whole.event_log(), []
+
+    def see(event):
+        assert event.time == gas.time and gas.events == len(seen) + 1
+        seen.append(event)
+
+    gas = Simulation(GAS, threads=threads)
+    gas.advance(on_event=see)
+    for k, name in enumerate(EventLog._fields):
+        assert np.array_equal([event[k] for event in seen], getattr(log, name))
+    assert np.array_equal(gas.position, whole.position[-1])
+    kept = gas.event_log(30)
+    for name in EventLog._fields:
+        assert np.array_equal(getattr(kept, name), getattr(log, name)[-30:])
+    assert len(gas.event_log(10**6).time) == len(seen) and len(gas.event_log(0).time) == 0
+
+
+def test_a_function_of_events_may_stop_and_change_the_simulation():
+    system = {"species": {"count": 30, "radius": 0.02, "temperature": 1}}
+    gas = Simulation(system)
+    assert gas.advance(time=9, on_event=lambda event: event.j > 0).collisions == 1
+    first, energy = gas.events, gas.observable("total_energy")
+    bounds, changed = [], []
+
+    def mark(event):
+        if event.j <= 0 and not changed:
+            gas.velocity *= 2
+            changed.append(gas.time)
+        bounds.append(event.time)
+
+    gas.advance_by(time=0.5, on_event=mark)
+    assert len(changed) == 1 and gas.time == bounds[-1] + (gas.time - bounds[-1])
+    assert gas.events == first + len(bounds)
+    assert gas.observable("total_energy") == pytest.approx(4 * energy, rel=1e-12)
+    assert gas.observable("work") == pytest.approx(3 * energy, rel=1e-12)
+    with pytest.raises(ZeroDivisionError):
+        gas.advance_by(events=9, on_event=lambda event: 1 / 0)
+    assert gas.events == first + len(bounds) + 1
+    assert gas.advance_by(events=0, on_event=1).events == first + len(bounds) + 1
+
+
+@pytest.mark.parametrize("boundary", ["wall", "periodic"])
+def test_positions_are_set_and_their_energy_is_work(boundary):
+    """The simulation continues as one that starts so; a change of nothing is none."""
+    gas = Simulation(GAS, {"box.boundary": [boundary, "wall"], **ENDLESS}).advance(events=77)
+    gas.position = before = gas.position
+    assert gas.changes == []
+    place = [1 - before[:, 0], before[:, 1]]  # a mirror image
+    place = np.column_stack(place)
+    gas.position = place
+    assert gas.changes == [(gas.time, "position", "")]
+    assert gas.observable("work") == pytest.approx(0, abs=1e-12)
+    assert np.array_equal(gas.position, np.mod(place, 1) if boundary == "periodic" else place)
+    order = np.argsort(gas.position[gas.species == 1][:, 1])
+    energy = gas.observable("total_energy")
+    place = gas.position.copy()
+    place[:60] = place[:60][order[::-1]]
+    gas.position = place
+    assert gas.observable("total_energy") - energy == pytest.approx(gas.observable("work"))
+    gas.advance_by(events=400)
+    change = gas.observable("total_energy") - energy
+    assert change == pytest.approx(gas.observable("work"), abs=1e-9)
+    where = np.linalg.norm(gas.position[:, None] - gas.position, axis=-1) + np.eye(80)
+    assert np.all(where > (gas.radius[:, None] + gas.radius) * (1 - 1e-9))
+
+
+def test_a_moved_disk_keeps_the_periods_that_it_has_crossed():
+    system = {"box": {"boundary": ["periodic", "periodic"]}}
+    system["species"] = {"position": [(0.5, 0.5)], "velocity": [(1, 0)], "radius": 0.1}
+    gas = Simulation(system).advance(time=3.2)
+    gas.position = [(0.9, 0.5)]
+    assert gas.image.tolist() == [[3, 0]]
+    gas.position += [0.2, 0]
+    assert gas.image.tolist() == [[4, 0]] and gas.position[0, 0] == pytest.approx(0.1)
 
 
 def test_a_moment_where_a_slice_has_ended_is_reached_again():
@@ -191,7 +311,20 @@ def kept(system) -> Simulation:
         (lambda _: Simulation(None), TypeError, "its text"),
         (lambda _: Simulation("&species count = -1 radius = 1 /"), ProgramError, "from 1 to"),
         (lambda gas: gas.save("/proc/none/x.h5"), ProgramError, "/proc/none"),
-        (copy.copy, TypeError, "save it"),
+        (lambda gas: gas.advance(events=9).advance(events=8), ValueError, "8 is past"),
+        (lambda gas: gas.advance(collisions=-1), ValueError, "-1 is past"),
+        (lambda gas: gas.advance_by(), ValueError, "how far?"),
+        (lambda gas: gas.advance_by(time=-1), ValueError, "-1 is not a number from 0"),
+        (lambda _: kept(RESTING).advance(events=1), RunError, "ever collide again"),
+        (lambda _: kept(RESTING).event_log(3), RunError, "output.event_log"),
+        (lambda gas: setattr(gas, "position", 0 * gas.position), ProgramError, "wholly inside"),
+        (
+            lambda gas: setattr(gas, "position", gas.position[[1, *range(79)]]),
+            ProgramError,
+            "overlaps disk 1",
+        ),
+        (lambda gas: setattr(gas, "position", gas.position * np.nan), ValueError, "below"),
+        (lambda _: setattr(kept(SHEARED), "position", [(0.1, 0.2)]), ProgramError, "sheared"),
         (lambda gas: [gas.close(), gas.close(), gas.position], ValueError, "closed"),
         (lambda gas: [gas.close(), gas.advance()], ValueError, "closed"),
         (lambda _: Simulation("no.nml"), ProgramError, "no.nml"),

@@ -54,6 +54,16 @@ class EventLog(NamedTuple):
     momentum_change: np.ndarray | None = None  # (E, 2) of disk i; None in files of before
 
 
+class Event(NamedTuple):
+    """One collision of any kind, with `j` as in `EventLog`."""
+
+    time: float
+    i: int  # id of a disk
+    j: int
+    impulse: float  # magnitude of the change of momentum
+    momentum_change: np.ndarray  # (2,) of disk i
+
+
 class Obstacle(NamedTuple):
     """A circular obstacle; disks stay outside it, or inside it if `inside` is true."""
 

@@ -29,8 +29,9 @@ import numpy as np
 
 from ..reading.files import RunError, open_file, plain
 from ..reading.reader import committed, series_in
+from .inputs import read_input
 from .program import STOPPED, ProgramError, find_program, settings_of, tied, value_text
-from .simulation import Simulation, read_input
+from .simulation import Simulation
 
 if TYPE_CHECKING:
     import pandas

@@ -9,35 +9,35 @@ on, its state is that of `build/ricochet` with the same input.
 """
 
 import ctypes
-import functools
 import json
 import math
+import operator
 import os
 import sys
+import tempfile
 import threading
 import weakref
-import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NoReturn, Self, cast
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..commands import HERE
 from ..reading.arrays import snapshot
 from ..reading.files import RunError, did_you_mean
 from ..reading.nature import Nature, nature_of
+from ..reading.reader import Event, EventLog
+from .engine import ROOM, c_text, called, library, opened
+from .inputs import check_input_place, read_input, write_input
 from .program import (
     ProgramError,
     named,
     settings_of,
-    unseen,
     whole_threads,
     without_options,
 )
 
-ROOM = 100_000  # size of a message [bytes]
 PATIENCE = 0.05  # interval of checks for signals [s]
 NEVER = 2**63 - 1
 ROUNDING = 1e-14  # relative rounding of a time
@@ -104,7 +104,7 @@ class Simulation:
 
     def __repr__(self) -> str:
         """Return one line: disks, time and numbers of events."""
-        if not self._handle:
+        if not getattr(self, "_handle", None):
             return "<Simulation: closed>"
         names = [*self.parameters["species"]]
         numbers = np.bincount(self.species, minlength=len(names) + 1)[1:]
@@ -229,8 +229,41 @@ class Simulation:
         if not sys.is_finalizing():
             self.close()
 
-    def __reduce__(self) -> NoReturn:
-        raise TypeError("a simulation cannot be copied or sent; save it, and load it there")
+    def copy(self) -> Self:
+        """Return an independent simulation in the same state.
+
+        Both continue with the same bits.  `copy.copy`, `copy.deepcopy` and `pickle` work, too.  A
+        pickle contains a checkpoint, so it may be loaded by another process or later; a starting
+        file that the input names must exist there.
+
+        Returns
+        -------
+        Simulation
+            the copy
+
+        Examples
+        --------
+        >>> with ricochet.Simulation(small) as box, box.copy() as other:
+        ...     other.advance(collisions=10).collisions, box.collisions
+        (10, 0)
+        """
+        twin = type(self).__new__(type(self))
+        with self._open() as handle:
+            twin._take(opened(library().ricochet_copy, handle))
+        twin._settled, twin._start_energy = self._settled, self._start_energy
+        return twin
+
+    def __copy__(self) -> Self:
+        return self.copy()
+
+    def __deepcopy__(self, _: object) -> Self:
+        return self.copy()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return a checkpoint for `pickle`."""
+        with tempfile.TemporaryDirectory(prefix="ricochet-") as folder:
+            data = self.save(Path(folder) / "state.h5").read_bytes()
+        return restored, (type(self), data, self._start_energy)
 
     def _open(self) -> "Held":
         return Held(self)
@@ -240,6 +273,7 @@ class Simulation:
         time: float | None = None,
         collisions: int | None = None,
         events: int | None = None,
+        on_event: Callable[[Event], object] | None = None,
     ) -> Self:
         """Continue until the first of these values is reached, counted from the start of the run.
 
@@ -256,6 +290,10 @@ class Simulation:
             number of collisions of two disks
         events : int, optional
             number of collisions of any kind; events of one moment are never separated
+        on_event : callable, optional
+            function of an `Event` that is called after each event, while the simulation is in the
+            state of that moment and may be changed; a true result ends the advance after the
+            events of this moment.  Each event takes about 20 us then
 
         Returns
         -------
@@ -265,7 +303,9 @@ class Simulation:
         Raises
         ------
         ValueError
-            if the time is past, or if neither a value nor the input says how far
+            if one of the values is past, or if neither a value nor the input says how far
+        RunError
+            if nothing will ever happen again, so that none of the values can be reached
         ProgramError
             if the simulation breaks off, as in an inelastic collapse
 
@@ -274,23 +314,141 @@ class Simulation:
         >>> with ricochet.Simulation(small) as box:
         ...     box.advance(time=0.1).time, box.advance(collisions=20).collisions
         (0.1, 20)
+        >>> with ricochet.Simulation(small) as box:
+        ...     found = []
+        ...     box.advance(events=5, on_event=found.append).events, len(found), found[0].i > 0
+        (5, 5, True)
         """
         limits = (
             math.inf if time is None else float(time),
             NEVER if collisions is None else min(int(collisions), NEVER),
             NEVER if events is None else min(int(events), NEVER),
         )
-        if limits == (math.inf, NEVER, NEVER) and self._endless():
+        given = limits != (math.inf, NEVER, NEVER)
+        if not given and self._endless():
             raise ValueError(
                 "advance: how far? The input has no &stop; give time, collisions or events"
             )
         if math.isnan(limits[0]):
             raise ValueError("time: nan is no time")
-        if limits[0] < self.time * (1 - ROUNDING):
-            raise ValueError(f"time: {time} is past; it is {self.time:.6g}")
-        while self._go_on(limits, PATIENCE):
-            pass
+        before = (self.time, self.collisions, self.events)
+        if limits[0] < before[0] * (1 - ROUNDING):
+            raise ValueError(f"time: {time} is past; it is {before[0]:.6g}")
+        for name, limit, now in zip(("collisions", "events"), limits[1:], before[1:], strict=True):
+            if limit < now:
+                raise ValueError(f"{name}: {limit} is past; there were {now}")
+        if on_event is None:
+            while self._go_on(limits, PATIENCE):
+                pass
+        else:
+            self._report(limits, on_event)
+        after = (self.time, self.collisions, self.events)
+        if given and before == after and all(map(operator.lt, after, limits)):
+            why = self._text("note") or "no disk will ever collide again"
+            raise RunError(f"advance: none of the values will be reached: {why}")
         return self
+
+    def advance_by(
+        self,
+        time: float | None = None,
+        collisions: int | None = None,
+        events: int | None = None,
+        on_event: Callable[[Event], object] | None = None,
+    ) -> Self:
+        """Continue by a time, or by a number of collisions or events, as `advance` does.
+
+        Parameters
+        ----------
+        time : float, optional
+            time from now
+        collisions : int, optional
+            number of further collisions of two disks
+        events : int, optional
+            number of further collisions of any kind
+        on_event : callable, optional
+            function that is called after each event, as of `advance`
+
+        Returns
+        -------
+        Simulation
+            this one
+
+        Raises
+        ------
+        ValueError
+            if no value is given, or a negative one
+
+        Examples
+        --------
+        >>> with ricochet.Simulation(small) as box:
+        ...     box.advance(collisions=4).advance_by(collisions=3).collisions
+        7
+        """
+        steps = {"time": time, "collisions": collisions, "events": events}
+        goals = {name: step for name, step in steps.items() if step is not None}
+        if not goals:
+            raise ValueError("advance_by: how far? Give time, collisions or events")
+        for name, step in goals.items():
+            if not step >= 0:
+                raise ValueError(f"{name}: {step} is not a number from 0")
+            goals[name] = getattr(self, name) + step
+        return self.advance(**goals, on_event=on_event)  # type: ignore[arg-type]
+
+    def _report(self, limits: tuple[float, int, int], on_event: Callable[[Event], object]) -> None:
+        """Advance towards these limits; call a function after each event."""
+        stopped = False
+        while not stopped:
+            before = self.events
+            with self._open() as handle:
+                advance = library().ricochet_advance_event
+                while called(advance, handle, *limits, PATIENCE):
+                    pass
+                records = self._last_events(self.events - before)
+            if len(records) == 0:
+                return
+            for t, i, j, impulse, *change in records.tolist():
+                event = Event(t, int(i), int(j), impulse, np.array(change))
+                stopped = bool(on_event(event)) or stopped
+
+    def _last_events(self, most: int) -> np.ndarray:
+        """Return records (E, 6) of the latest events: time, i, j, impulse, momentum change."""
+        records = np.empty((most, 6))
+        with self._open() as handle:
+            n = library().ricochet_last_events(handle, most, records.ctypes.data)
+        return records[:n]
+
+    def event_log(self, most: int) -> EventLog:
+        """Return the latest events in chronological order.
+
+        At least the latest million is kept.
+
+        Parameters
+        ----------
+        most : int
+            number of events; there may be fewer
+
+        Returns
+        -------
+        EventLog
+            (E,) times, partners and impulses
+
+        Raises
+        ------
+        RunError
+            unless the input has `output.event_log = .true.`
+
+        Examples
+        --------
+        >>> with ricochet.Simulation(small, {"output.event_log": True}) as box:
+        ...     log = box.advance(events=30).event_log(10)
+        >>> len(log.time), bool(np.all(np.diff(log.time) >= 0))
+        (10, True)
+        """
+        if not self.parameters.get("output", {}).get("event_log"):
+            raise RunError("the simulation has no event log, set output.event_log = .true.")
+        records = self._last_events(max(int(most), 0))
+        ids = records[:, 1:3].astype(np.int32)
+        return EventLog(records[:, 0], ids[:, 0], ids[:, 1], records[:, 3], records[:, 4:])
 
     def _endless(self) -> bool:
         """Whether no rule of the input stops the run, apart from wall-clock time."""
@@ -453,8 +611,16 @@ class Simulation:
 
     @property
     def position(self) -> np.ndarray:
-        """(N, 2) positions [length] within the box where an axis is periodic; a read-only copy."""
+        """(N, 2) positions [length] within the box where an axis is periodic; a read-only copy.
+
+        All can be set at once: disks must not overlap, and the change of energy counts as work.
+        """
         return self._column("position")
+
+    @position.setter
+    def position(self, value: ArrayLike) -> None:
+        if not np.array_equal(value, self.position):
+            self._set("position", value, library().ricochet_set_positions)
 
     @property
     def velocity(self) -> np.ndarray:
@@ -463,13 +629,17 @@ class Simulation:
 
     @velocity.setter
     def velocity(self, value: ArrayLike) -> None:
+        self._set("velocity", value, library().ricochet_set_velocities)
+
+    def _set(self, name: str, value: ArrayLike, function: Callable[..., int]) -> None:
+        """Give an array (N, 2) to a function of the library."""
         array = np.ascontiguousarray(value, dtype=float)
         if array.shape != (self.n_disks, 2):
-            raise ValueError(f"velocity: has the shape {array.shape}, not ({self.n_disks}, 2)")
+            raise ValueError(f"{name}: has the shape {array.shape}, not ({self.n_disks}, 2)")
         if not np.abs(array).max() < FASTEST:
-            raise ValueError(f"velocity: has values that are not below {FASTEST:g}")
+            raise ValueError(f"{name}: has values that are not below {FASTEST:g}")
         with self._open() as handle:
-            called(library().ricochet_set_velocities, handle, array.ctypes.data)
+            called(function, handle, array.ctypes.data)
 
     @property
     def angular_velocity(self) -> np.ndarray:
@@ -585,6 +755,16 @@ class Simulation:
         return [(float(t), int(i), int(j)) for t, i, j in records[:n, :3]]
 
 
+def restored(kind: type[Simulation], data: bytes, start_energy: float) -> Simulation:
+    """Return the simulation of a checkpoint that was pickled."""
+    with tempfile.TemporaryDirectory(prefix="ricochet-") as folder:
+        path = Path(folder) / "state.h5.part"
+        path.write_bytes(data)
+        simulation = kind.load(path)
+    simulation._start_energy = start_energy
+    return simulation
+
+
 def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
     """The table of all obstacles, if a group has a file or points; its own row is emptied."""
     if not any({"file", "points"} & row.keys() for row in rows):
@@ -631,119 +811,3 @@ class Held:
 
     def __exit__(self, *_: object) -> None:
         self.simulation._lock.release()
-
-
-# --- the library ---
-
-
-def head_of(text: str) -> str:
-    """The first line of an input that `save` writes: it says what the rest was."""
-    crc = zlib.crc32(text.encode(errors="surrogateescape"))
-    return f"! Saved by ricochet.Simulation, which may replace it unless it is edited: {crc:08x}\n"
-
-
-def check_input_place(path: Path, output: Path) -> None:
-    """Refuse a place where `save` would write its input over something else."""
-    c_text(path)
-    try:
-        if path.parent.resolve() == output.parent.resolve() and path.name in [
-            output.name + end for end in ("", ".part", ".part_new", ".lock")
-        ]:
-            raise ProgramError(f"{path}: is a file of the output; choose another for the input", 3)
-        if not path.parent.is_dir():
-            raise ProgramError(f"{path}: there is no folder {path.parent}", 3)
-        if not os.path.lexists(path):
-            return
-        if path.is_file() and not path.is_symlink():
-            text = path.read_text(encoding="utf-8", errors="surrogateescape")
-            head, end, rest = text.partition("\n")
-            if head + end == head_of(rest):
-                return
-    except OSError as error:
-        raise ProgramError(f"{path}: cannot be written: {error.strerror}", 3) from error
-    raise ProgramError(
-        f"{path}: exists already, and save has not written it; choose another file for the input", 3
-    )
-
-
-def write_input(path: Path, text: str) -> None:
-    """Write an input, in place of one that `save` has written; never through a link."""
-    try:
-        path.unlink(missing_ok=True)
-        with path.open("x", encoding="utf-8", errors="surrogateescape") as file:
-            file.write(head_of(text) + text)
-    except OSError as error:
-        raise ProgramError(f"{path}: cannot be written: {error.strerror}", 3) from error
-
-
-def read_input(system: str | Path | Mapping[str, Any]) -> str:
-    """Return the text of an input of any kind."""
-    if (text := unseen(system)) is not None:
-        return text
-    try:
-        return Path(cast(str, system)).read_text(encoding="utf-8", errors="surrogateescape")
-    except OSError as error:
-        raise ProgramError(f"{system}: cannot be read: {error.strerror}", 3) from error
-
-
-def c_text(text: str | Path) -> bytes:
-    """Return a text or a path for the library; a zero byte in it is refused."""
-    words = os.fsencode(text) if isinstance(text, Path) else text.encode(errors="surrogateescape")
-    if b"\0" in words:
-        raise ValueError(f"{text!r} has a zero byte")
-    return words
-
-
-def opened(make: Callable[..., int], *arguments: object) -> int:
-    """Return a new handle from a function of the library; raise its error."""
-    message, code = ctypes.create_string_buffer(ROOM), ctypes.c_int()
-    handle = make(*arguments, message, ROOM, ctypes.byref(code))
-    if not handle:
-        raise ProgramError(message.value.decode(errors="replace"), code.value)
-    return handle
-
-
-def called(function: Callable[..., int], *arguments: object) -> bool:
-    """Call a function of the library; raise its error; return whether to call it again."""
-    message = ctypes.create_string_buffer(ROOM)
-    code = function(*arguments, message, ROOM)
-    if code > 1:
-        raise ProgramError(message.value.decode(errors="replace"), code)
-    return code == 1
-
-
-@functools.cache
-def library(files: bool = False) -> ctypes.CDLL:
-    """Load the engine; the version with functions for files needs the HDF5 of the system."""
-    name = "libricochet_files.so" if files else "libricochet.so"
-    wish = os.environ.get("RICOCHET_LIBRARY")  # a folder
-    places = [Path(wish)] if wish else [HERE / "lib", HERE.parents[1] / "build"]
-    path = next((place / name for place in places if (place / name).is_file()), None)
-    if path is None:
-        raise ProgramError(f"no {name} in {places[-1]}: run make library in a clone", 3)
-    engine = ctypes.CDLL(str(path))  # its symbols are its own: no clash with the HDF5 of h5py
-    p, n, text = ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p
-    long, real = ctypes.c_int64, ctypes.c_double
-    answer = [ctypes.c_char_p, n]
-    kinds = {
-        "open": (p, text, text, n, *answer, p),
-        "close": (None, p),
-        "advance": (n, p, real, long, long, real, *answer),
-        "time": (real, p),
-        "count": (None, p, p),
-        "column": (n, p, text, p),
-        "observables": (n, p, text, n, p),
-        "next_events": (n, p, n, p),
-        "change": (n, p, text, *answer),
-        "set_velocities": (n, p, p, *answer),
-        "text": (n, p, text, text, n),
-    }
-    if files:
-        kinds |= {
-            "save": (n, p, text, n, *answer),
-            "load": (p, text, n, *answer, p),
-        }
-    for function, (result, *arguments) in kinds.items():
-        it = getattr(engine, f"ricochet_{function}")
-        it.restype, it.argtypes = result, arguments
-    return engine

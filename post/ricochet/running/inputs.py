@@ -1,0 +1,60 @@
+"""Input files: their text, and those that `Simulation.save` writes."""
+
+import os
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from .engine import c_text
+from .program import ProgramError, unseen
+
+
+def read_input(system: str | Path | Mapping[str, Any]) -> str:
+    """Return the text of an input of any kind."""
+    if (text := unseen(system)) is not None:
+        return text
+    try:
+        return Path(cast(str, system)).read_text(encoding="utf-8", errors="surrogateescape")
+    except OSError as error:
+        raise ProgramError(f"{system}: cannot be read: {error.strerror}", 3) from error
+
+
+def head_of(text: str) -> str:
+    """The first line of an input that `save` writes: it says what the rest was."""
+    crc = zlib.crc32(text.encode(errors="surrogateescape"))
+    return f"! Saved by ricochet.Simulation, which may replace it unless it is edited: {crc:08x}\n"
+
+
+def check_input_place(path: Path, output: Path) -> None:
+    """Refuse a place where `save` would write its input over something else."""
+    c_text(path)
+    try:
+        if path.parent.resolve() == output.parent.resolve() and path.name in [
+            output.name + end for end in ("", ".part", ".part_new", ".lock")
+        ]:
+            raise ProgramError(f"{path}: is a file of the output; choose another for the input", 3)
+        if not path.parent.is_dir():
+            raise ProgramError(f"{path}: there is no folder {path.parent}", 3)
+        if not os.path.lexists(path):
+            return
+        if path.is_file() and not path.is_symlink():
+            text = path.read_text(encoding="utf-8", errors="surrogateescape")
+            head, end, rest = text.partition("\n")
+            if head + end == head_of(rest):
+                return
+    except OSError as error:
+        raise ProgramError(f"{path}: cannot be written: {error.strerror}", 3) from error
+    raise ProgramError(
+        f"{path}: exists already, and save has not written it; choose another file for the input", 3
+    )
+
+
+def write_input(path: Path, text: str) -> None:
+    """Write an input, in place of one that `save` has written; never through a link."""
+    try:
+        path.unlink(missing_ok=True)
+        with path.open("x", encoding="utf-8", errors="surrogateescape") as file:
+            file.write(head_of(text) + text)
+    except OSError as error:
+        raise ProgramError(f"{path}: cannot be written: {error.strerror}", 3) from error
