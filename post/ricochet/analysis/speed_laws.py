@@ -23,11 +23,12 @@ from .thermodynamics import comoving, thermal_energy
 __all__ = ["SpeedTest", "speed_test"]
 
 BINS = 30  # of equal probability
-WIDE = 5  # of these in a bin whose counts vary as slowly as the distance of two distributions does
 DRAWN = 4000  # drawn samples
 MOST = 1000  # speeds of a drawn sample; more have the same distribution of the scaled statistics
 MANY = 2000  # disks, among whom the motion of the centre of mass does not matter
-SIGNIFICANT = 2.0  # standard deviations
+#: Excess of an inefficiency times the root of the frames: one standard deviation of the noise of
+#: cumulative counts, of which two are independent, and two of the counts in all bins.
+LEAST_DISTANCE, LEAST_CHI2 = 1.4, 4 / np.sqrt(BINS - 1)
 TAIL = 0.05  # share of the drawn samples whose exponential tail continues their distribution
 
 
@@ -129,16 +130,14 @@ def chance(found: float, drawn: np.ndarray) -> float:
     return TAIL * float(np.exp((drawn[first] - found) / mean))
 
 
-def per_frame(counts: np.ndarray) -> float:
+def per_frame(counts: np.ndarray, least: float) -> float:
     """Return the statistical inefficiency of counts in bins (F, B) of a run.
 
-    It is 1 unless it is larger than that of independent frames is by chance: chi^2 of many bins is
-    so sharp that the noise of a single estimate would spoil its p-value.
+    It is 1 unless it exceeds 1 by more than `least` / sqrt(F), which chance explains: chi^2 of many
+    bins is so sharp that the noise of an estimate would spoil its p-value.
     """
-    frames, bins = counts.shape
-    noise = 2 / np.sqrt(frames * (bins - 1))
-    found = statistical_inefficiency(counts) if frames > 2 else 1.0
-    return found if found > 1 + SIGNIFICANT * noise else 1.0
+    found = statistical_inefficiency(counts) if len(counts) > 2 else 1.0
+    return found if found > 1 + least / np.sqrt(len(counts)) else 1.0
 
 
 def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> SpeedTest:
@@ -174,21 +173,20 @@ def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> Speed
     for one in values:
         bins = np.minimum((one * BINS).astype(int), BINS - 1)
         counts.append(np.stack([np.bincount(row, minlength=BINS) for row in bins]))
-    size = np.array(list(map(len, counts)))
-    memory = [
-        float(size @ [per_frame(of(own)) for own in counts]) / size.sum()
-        for of in (lambda own: own.reshape(len(own), -1, WIDE).sum(axis=2), lambda own: own)
-    ]
+    size = [len(own) for own in counts]
+    slow = [per_frame(np.cumsum(own, axis=1)[:, :-1], LEAST_DISTANCE) for own in counts]
+    memory = float(np.average(slow, weights=size))
+    fast = float(np.average([per_frame(own, LEAST_CHI2) for own in counts], weights=size))
     total = sample.own * sample.frames
     if not known:
-        return SpeedTest("none", total / memory[0], *[np.nan] * 4)
+        return SpeedTest("none", total / memory, *[np.nan] * 4)
     square, chi2 = statistics_of(np.concatenate(values).reshape(1, -1))[:, 0]
     drawn, fixed = by_chance(sample.smaller()), runs[0].nature.keeps_kinetic_energy
     return SpeedTest(
         "fixed_energy" if fixed else "Maxwell",
-        total / memory[0],
+        total / memory,
         float(np.sqrt(square / total)),
-        chance(square / memory[0], drawn[0]),
-        chi2 / memory[1] / (BINS - 1),
-        chance(chi2 / memory[1], drawn[1]),
+        chance(square / memory, drawn[0]),
+        chi2 / fast / (BINS - 1),
+        chance(chi2 / fast, drawn[1]),
     )
