@@ -1,10 +1,11 @@
-"""Animate a run: disks of true size in time.
+"""Write an animation of a run, with disks drawn to scale.
 
     python post/animate.py runs/gas.h5 -o gas.mp4              needs ffmpeg, see below
     python post/animate.py runs/crater.h5 --colour speed --count 500 --fps 30
 
-A name without an ending gets .mp4 if ffmpeg is there, and .gif if not; without -o it is that of
-the run.  Where the system has no ffmpeg, `.venv/bin/pip install imageio-ffmpeg` brings one.
+A name without an ending gets .mp4 if ffmpeg is installed, and .gif otherwise.  Without -o the film
+has the name of the run.  If the system has no ffmpeg, `.venv/bin/pip install imageio-ffmpeg`
+installs it.
 """
 
 from contextlib import suppress
@@ -38,7 +39,7 @@ from tqdm import tqdm
 
 
 def film_path(wish: Path | None, run: Run) -> Path:
-    """Return the path of the film: -o, else the name of the run in the current folder."""
+    """Return the path of the film: -o, or else the name of the run in the current folder."""
     if not animation.FFMpegWriter.isAvailable():  # by the system
         with suppress(ImportError, RuntimeError):
             from imageio_ffmpeg import get_ffmpeg_exe
@@ -92,7 +93,7 @@ def animate(
         species_legend(figure, run, by_outline=True)
     warn(figure, [run.termination_note] if run.termination_note else [])
     figure.canvas.draw()
-    figure.set_layout_engine("none")  # the layout stays; solving it for each frame is slow
+    figure.set_layout_engine("none")  # one layout for all frames, since computing it is slow
     return animation.FuncAnimation(
         figure, show, frames, interval=1000 / fps, cache_frame_data=False
     )

@@ -1,15 +1,16 @@
-"""Mean kinetic energy in time, elastic and inelastic, of each species of a mixture.
+"""Mean kinetic energy of each species of an elastic or inelastic mixture against time.
 
     python post/cooling.py runs/cooling/*.h5 -o cooling.png --csv cooling.csv
 
 Runs are combined by restitution xi; lines are means over the runs.  The first panels, one for each
 xi, show the mean kinetic energy per disk against time in the units of the input, with the band that
-contains 95 % of single runs: measured from four runs on, else estimated from the numbers of disks.
-The row below compares all xi on a logarithmic axis: K is per disk and in units of its start value
-over all disks, and bands are errors of the means.  The lowest row shows the temperature ratio of
-the heaviest to the lightest species, 1 in equilibrium; not for equal masses.  Of few runs its band
-is the expected scatter of single runs, too.  The table has all curves, against collisions per disk
-in the same units, against time in those of the input.
+contains 95 % of single runs.  The band is measured if there are at least four runs; otherwise it is
+estimated from the numbers of disks. The row below compares all xi on a logarithmic axis.  It shows
+the kinetic energy per disk of each species in units of the initial mean over all disks; bands are
+errors of the means.  The lowest row shows the temperature of the heaviest species over that of the
+lightest, which is 1 in equilibrium; it is omitted if all masses are equal.  With fewer than four
+runs its band is twice the scatter of single runs.  The table contains all curves: those against
+collisions per disk in these reduced units, and those against time in the units of the input.
 """
 
 from itertools import chain, cycle
@@ -31,7 +32,7 @@ DASHES = ("--", ":", "-.", (0, (5, 1)), (0, (1, 3)), (0, (8, 3)))  # line styles
 
 
 def in_time(found: Curves, name: str) -> Estimate:
-    """Draw an energy over that of all disks at the start, against time."""
+    """Draw the energy of a species, divided by the initial energy of all disks, against time."""
     first = found["energy_all"].mean[0]
     return Estimate(*(part / first for part in found[f"energy_{name}"]))
 
@@ -57,7 +58,7 @@ def draw_ratio(axes: plt.Axes, groups: list, results: list[Curves]) -> None:
 
 
 def draw_overview(figure: plt.Figure, places: tuple, runs: list[Run], found: list) -> None:
-    """Draw all energies, logarithmic, against time and collisions; colours mean restitution."""
+    """Draw all energies on logarithmic axes; each restitution has a colour."""
     left = figure.add_subplot(places[0])
     right = figure.add_subplot(places[1], sharey=left)
     styles = list(zip(("all", *runs[0].names), chain("-", cycle(DASHES)), strict=False))
@@ -70,7 +71,7 @@ def draw_overview(figure: plt.Figure, places: tuple, runs: list[Run], found: lis
     for name, style in styles:
         right.plot([], [], color="0.3", ls=style, label=name)
     left.set(yscale="log", xlabel=runs[0].units.label("time"))
-    low, high = left.get_ylim()  # for an elastic gas the limits would enclose rounding only
+    low, high = left.get_ylim()  # an elastic gas has rounding errors only
     left.set_ylim(min(low, 0.9), max(high, 1.1))
     left.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     left.yaxis.set_major_formatter("{x:g}")
@@ -85,18 +86,20 @@ def draw_overview(figure: plt.Figure, places: tuple, runs: list[Run], found: lis
 def randomised(run: Run, kind: Species, tau: np.ndarray) -> np.ndarray:
     """Return the variance of the energies of a species' disks over their squared mean.
 
-    It goes from its value at the start to 1, that of an exponential distribution, as disks collide.
+    Collisions change it from its initial value to 1, the value of an exponential distribution.
     """
     first = run.kinetic_energy(0)[kind.disks]
     start = float(np.var(first) / np.mean(first) ** 2) if np.any(first) else 1.0
-    return 1 - (1 - start) * np.exp(-tau)  # exp(-tau): share of disks without a collision
+    return 1 - (1 - start) * np.exp(-tau)  # exp(-tau): fraction without a collision
 
 
 def expected_scatter(run: Run, energies: dict[str, np.ndarray], tau: np.ndarray) -> dict:
-    """Return the standard deviation of mean energies, of species and "all", over single runs.
+    """Return the expected scatter between runs of the mean energy of each species and of "all".
 
-    Energies of disks are taken as independent; where the kinetic energy is kept, their sum is
-    fixed.  Losses correlate energies, which makes the true scatter smaller.
+    The scatter is the standard deviation over single runs.
+
+    The energies of disks are assumed to be independent or, in an elastic gas, independent with a
+    fixed sum.  Inelastic collisions correlate the energies, which makes the true scatter smaller.
     """
     counts = {kind.name: int(kind.disks.sum()) for kind in run.by_species}
     variances = {
@@ -112,9 +115,9 @@ def expected_scatter(run: Run, energies: dict[str, np.ndarray], tau: np.ndarray)
 
 
 def scatter(runs: list[Run], found: Curves) -> dict[str, np.ndarray]:
-    """Return the standard deviation of each energy against time over single runs.
+    """Return the standard deviation of each energy over single runs, against time.
 
-    It is measured over four runs and more, else expected.
+    It is measured if there are at least four runs; otherwise it is the expected scatter.
     """
     names = ("all", *runs[0].names)
     if len(runs) >= FEWEST_RUNS:
@@ -126,7 +129,7 @@ def scatter(runs: list[Run], found: Curves) -> dict[str, np.ndarray]:
 
 
 def ratio_band(runs: list[Run], found: Curves) -> np.ndarray:
-    """Return the error of the temperature ratio; of few runs, twice the scatter of a single one."""
+    """Return the error of the temperature ratio; for few runs, twice a single run's scatter."""
     if len(runs) >= FEWEST_RUNS:
         return found["ratio"].error
     both = [runs[0].by_species[k] for k in lightest_and_heaviest(runs[0])]
@@ -137,7 +140,7 @@ def ratio_band(runs: list[Run], found: Curves) -> np.ndarray:
 
 
 def draw_energies(axes: plt.Axes, runs: list[Run], found: Curves, xi: Restitution) -> None:
-    """Draw the mean energies of one restitution in units of the input, on linear axes."""
+    """Draw the mean energies at one restitution in units of the input, on linear axes."""
     names = ("all", *runs[0].names) if len(runs[0].names) > 1 else ("all",)
     labels, deviations = (
         {kind.name: kind.label for kind in runs[0].by_species},
@@ -153,7 +156,7 @@ def draw_energies(axes: plt.Axes, runs: list[Run], found: Curves, xi: Restitutio
 
 
 def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
-    """Draw a panel for each restitution, then all of them: energies, and the ratio."""
+    """Draw the energies for each restitution, all energies together, and the temperature ratio."""
     ratio = any("ratio" in found for found in results)
     columns = min(len(groups), 3)
     above = -(-len(groups) // columns)
@@ -169,7 +172,7 @@ def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
             axes.set_ylabel(runs[0].units.label("mean energy per disk", "energy"))
         if k == 0:
             measured = all(len(own) >= FEWEST_RUNS for _, own in groups)
-            title = "band: 95 % of single runs" + ("" if measured else " at least, estimated")
+            title = "band: 95 % of single runs" + ("" if measured else " at least (estimate)")
             axes.legend(loc="upper right", title=title)
     places = grid[above, :3], grid[above, 3:]
     draw_overview(figure, places, runs, list(zip(groups, results, strict=True)))
@@ -180,7 +183,7 @@ def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
 
 
 def table(groups: list, results: list[Curves]) -> list[dict]:
-    """Return a row for each restitution: energy and temperature ratio at the end."""
+    """Return a row for each restitution with the final energy and temperature ratio."""
     return [
         {
             "restitution": xi.name,

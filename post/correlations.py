@@ -2,35 +2,37 @@
 
     python post/correlations.py runs/state/memory_*.h5 -o correlations.png --csv correlations.csv
 
-The disks are in a box without obstacles and gravity.  Runs are combined by packing fraction; lines
-are means over the runs, bands are errors.  Frames may be equally spaced in time or in decades
-(--equilibration 0 if the run begins in equilibrium).  The units are the mean free time 1/w and the
-mean diameter.  Frames before equilibrium, which is found or begins after --equilibration, count for
-a2 only.  For gases that cool or flow only a2 and the structure are found, the latter in the frames
-after --equilibration, or else where nothing drifts, or 15 collisions per disk after the start of a
-gas that cools.  Broken lines are the species of a mixture.
+The box must have no obstacles and no gravity.  Runs are combined by packing fraction; lines are
+means over the runs, bands are errors.  Frames may be spaced equally or logarithmically in time (use
+--equilibration 0 if the run begins in equilibrium).  The units are the mean free time 1/w and the
+mean diameter.  Equilibrium begins after --equilibration or, without that option, when no observable
+drifts any longer.  Earlier frames are used for a2 only.  For gases that cool or flow, only a2 and
+the structure are computed.  The structure is an average over the frames after --equilibration;
+without that option it is an average over the frames without drift or, in a gas that cools, over
+those later than 15 collisions per disk.  Dashed lines show the species of a mixture.
 
 The time correlations are those of the package's `correlations`, whose docstring explains how pairs
-of frames are chosen: the velocity autocorrelation <v(0) v(t)>, in theory exp(-w t) at first and
-1/t late (mode coupling); the mean square displacement; F_s(k, t) = <exp(i k r)> at --wavenumber;
-the non-Gaussian parameter alpha2 = <r^4> / (2 <r^2>^2) - 1.  The table also has the share of disks
-within 0.3 diameters of their first position (overlap).
+of frames are chosen: the velocity autocorrelation <v(0) v(t)>, in theory exp(-w t) at short times
+and 1/t at long times (mode coupling); the mean square displacement; F_s(k, t) = <exp(i k r)> at
+--wavenumber; the non-Gaussian parameter alpha2 = <r^4> / (2 <r^2>^2) - 1.  The table also has the
+share of disks within 0.3 diameters of their first position (overlap).
 
 D(t) is a quarter of the slope of the mean square displacement between neighbouring lags.  It is
-also half the integral of <v(0) v(s)> from 0 to t, which equals half of <v(0) (x(t) - x(0))> and so
-is exact for any spacing of frames, except for kicked disks, which have the first D only.  D_E of
-Enskog is shown for equal smooth disks of fixed energy.  In two dimensions the long-time tail makes
-D(t) grow as the logarithm of t without limit: a value of D belongs to a time, and to a box, whose
-size matters once sound has crossed it.  The table has both D, which must agree, between half of
-`D_time` and `D_time`; that is the time of crossing, or an eighth of the run if that is shorter.
-They need a periodic box and equally spaced frames.
+also half the integral of <v(0) v(s)> from 0 to t.  This integral is computed as half of <v(0) (x(t)
+- x(0))>, which is exact for any spacing of frames.  For driven disks, whose velocities change
+between collisions, only the first definition applies.  Enskog's D_E is shown for equal smooth disks
+of fixed energy.  In two dimensions the long-time tail makes D(t) grow as the logarithm of t without
+limit: a value of D applies to one time and one box, because the size of the box matters once sound
+has crossed it.  The table contains D from both definitions, averaged between half of `D_time` and
+`D_time`; the two values must agree.  `D_time` is the time in which sound crosses the box, or an
+eighth of the run if that is shorter.  D requires a periodic box and equally spaced frames.
 
 a2 = <v^4> / (2 <v^2>^2) - 1, the second Sonine coefficient with each species at its own
 temperature, is 0 in equilibrium and -1/2 for equal speeds.  S(k) = <|sum of exp(i k x)|^2> / N.
-psi6 of a disk is the mean of exp(6 i theta) over its Delaunay neighbours; `local` is its modulus,
-`global` the modulus of the mean over all disks, which is 1 in a perfect triangular crystal.
-g6(r) = <psi6*(0) psi6(r)> decays exponentially in a fluid, as a power of r in a hexatic phase, and
-not at all in a crystal.
+psi6 of a disk is the mean of exp(6 i theta) over its Delaunay neighbours; `local` is the mean of
+its modulus over the disks, `global` the modulus of its mean, which is 1 in a perfect triangular
+crystal. g6(r) = <psi6*(0) psi6(r)> decays exponentially in a fluid, as a power of r in a hexatic
+phase, and not at all in a crystal.
 """
 
 from itertools import combinations_with_replacement, cycle
@@ -69,8 +71,8 @@ from ricochet.script import by_packing, command_line, launch, measured, over_run
 
 import numpy as np
 
-PLAIN = {"walls"}  # traits of plain disks: equal, smooth, elastic
-#: Traits of runs without an equilibrium, which nevertheless have a structure.
+PLAIN = {"walls"}  # the only special property allowed for Enskog's D
+# : Properties of runs that have no equilibrium but whose structure can be computed.
 RESTLESS = (
     "inelastic",
     "soft_contacts",
@@ -85,7 +87,7 @@ NUMBERS = ("D_displacement", "D_velocities", "psi6_local", "psi6_global")
 
 
 class Found(NamedTuple):
-    """Results of the runs at one packing fraction: numbers with errors, and curves by name."""
+    """Results of the runs at one packing fraction: scalars with errors, and curves by name."""
 
     members: dict[str, list[SeriesMean]]
     curves: dict[str, Curve]
@@ -93,18 +95,18 @@ class Found(NamedTuple):
 
 
 def check(run: Run, first: Run) -> None:
-    """Refuse runs that are not homogeneous."""
-    allow(run, "correlations are those of disks in an empty box", *FLUID, *RESTLESS)
+    """Raise an error for runs of systems that are not homogeneous."""
+    allow(run, "correlations are those of disks without obstacles and gravity", *FLUID, *RESTLESS)
     if run.n_disks < 3:
-        raise Refused(f"{run.path}: needs three disks and more")
+        raise Refused(f"{run.path}: needs at least three disks")
     if ("mixture" in run.nature) != ("mixture" in first.nature):
         raise RunError(f"{run.path}: not equal disks, or not a mixture, as {first.path} is")
     if run.n_frames < 10:
-        raise RunError(f"{run.path}: needs 10 frames and more")
+        raise RunError(f"{run.path}: needs at least 10 frames")
 
 
 def bins(run: Run) -> dict[str, np.ndarray]:
-    """Return the bins of distances and of wavenumbers, in mean diameters."""
+    """Return the bins of distances and of wavenumbers; the mean diameter is the unit of length."""
     half = 0.5 * run.edges.min() / (2 * run.radius.mean())
     least = float(run.radius.min() / run.radius.mean())
     found = {
@@ -214,14 +216,14 @@ def table(groups: list, results: list[Found]) -> tuple[list[dict], list[str]]:
                 row |= measured(name, None)
         plain = runs[0].nature <= PLAIN
         row["D_enskog"] = float(transport.enskog_of(runs[0])["D"]) if plain else None
-        alike = "mixture" not in runs[0].nature  # else no distance is the first
+        alike = "mixture" not in runs[0].nature  # a mixture has no first bin
         first = Estimate(*found.curves["g"][1:]) if alike else None
         rows.append(row | measured("g_first_bin", first, 0))
     return rows, notes
 
 
 def curves(groups: list, results: list[Found]) -> list[dict]:
-    """Return the numbers with errors, then all curves one below the other."""
+    """Return the scalars with errors, followed by all curves."""
     names, rows = ("what", "packing", "x", "y", "error"), []
     for (eta, _), found in zip(groups, results, strict=True):
         for what, members in found.members.items():
@@ -250,7 +252,7 @@ LINES = ("-", "--", ":", "-.")  # line styles of all disks, and of species
 
 
 def parts(shown: dict[str, Curve], panel: str) -> dict[str, Curve]:
-    """Return the curves of a panel by species or pair; that of all disks as ""."""
+    """Return the curves of a panel by species or pair of species; "" is the key of all disks."""
     names = [one for one in shown if one == panel or one.startswith(f"{panel}_")]
     return {one[len(panel) + 1 :]: shown[one] for one in names if one != "vacf_tail"}
 
@@ -291,7 +293,7 @@ def draw_group(
 def draw(
     groups: list[tuple[float, list[Run]]], results: list[Found], rows: list[dict], wave: float
 ) -> plt.Figure:
-    """Draw motion above and structure below, where there are any."""
+    """Draw the time correlations above and the structure below, as far as they were computed."""
     there = set().union(*(one.curves for one in results))
     of = {"tail": "vacf", "D": "D_displacement(t)"}
     shown = {name: style for name, style in AXES.items() if of.get(name, name) in there}
@@ -355,7 +357,8 @@ def main() -> None:
     rows, notes = table(groups, results)
     notes += motion_notes(args.runs)
     if not all("vacf" in found.curves for found in results):
-        notes.append("no steady state without flow: no memory and no diffusion coefficient")
+        notes.append("no steady state without flow: time correlations and diffusion coefficients "
+            "are omitted")
     figure = draw(groups, results, rows, args.wavenumber)
     report(args, figure, rows, data=curves(groups, results), notes=notes)
 

@@ -1,11 +1,11 @@
-"""Time per collision against the number of disks for each way of finding the next one.
+"""Time per collision against the number of disks, for each method of finding the next event.
 
     python post/cost.py runs/cost/*.h5 -o cost.png --csv cost.csv
 
-Reads the collisions per second of processor time that each run records; of equal runs the best one
-counts.  Lines: powers of N fitted to the points with N in --fit.  Below that range the cost of the
-collision itself is not small compared with the search; above it disks no longer fit into the
-caches.
+The script reads the collisions per second of processor time that each run records, and uses the
+fastest of several equal runs.  The lines are powers of N fitted to the points with N in --fit.
+Below that range the cost of the collision itself is not small compared with the search; above it
+disks no longer fit into the caches.
 """
 
 from ricochet import Run
@@ -17,8 +17,8 @@ from ricochet.script import command_line, launch, recorded, report
 import numpy as np
 
 LABELS = {
-    "rescan": "everything anew at each collision",
-    "pairs": "all pairs of the disks just involved",
+    "rescan": "rescan: all pairs at each collision",
+    "pairs": "pairs: all pairs of the disks just involved",
     "cells": "neighbouring cells",
 }
 
@@ -48,7 +48,7 @@ def fits(measured: dict, low: float, high: float) -> dict[str, PowerLaw]:
 def draw(
     runs: list[Run], measured: dict, laws: dict[str, PowerLaw], low: float, high: float
 ) -> plt.Figure:
-    """Draw doubly logarithmic; the fits are dotted outside their range."""
+    """Draw on logarithmic axes; the fits are dotted outside their range."""
     figure, axes = plt.subplots(figsize=(7, 5.5))
     for search, colour, marker in zip(LABELS, COLOURS, "osD", strict=False):
         if search in measured:

@@ -1,11 +1,13 @@
-"""How often does a printed error bar hold the truth?
+"""Fraction of error bars that contain the true value (coverage).
 
     python post/coverage.py runs/coverage/*/*.h5 -o coverage.png --csv coverage.csv
 
-Many runs that differ only by their seed, at one or more packing fractions.  Each gives Z by the
-virial with its error, half of the 68 % interval; the truth is the mean over all runs of a packing
-fraction.  Right errors hold it in 68 of 100 runs, and are as large as the scatter of the means.
-For comparison: the error that takes every sample of the observables for independent.
+The input is a set of many runs that differ only by their seed, at one or more packing fractions.  Z
+is computed from the virial of each run, with an error that is half the width of the 68 % interval.
+The true value is taken as the mean over all runs of a packing fraction.  If the errors are correct,
+68 of 100 intervals contain the true value, and the errors equal the scatter of the means.  For
+comparison the script also computes the error that treats all samples of the observables as
+independent.
 """
 
 from ricochet import Run, RunError
@@ -21,7 +23,7 @@ SHOWN = 60  # runs in a panel
 
 
 def naive_error(run: Run, skip: float | None) -> float:
-    """Return the standard error of Z by the virial if samples were independent."""
+    """Return the standard error of Z from the virial for samples treated as independent."""
     amount, per = virial_over_kt(run, skip)
     return float(scipy.stats.sem(amount - per * np.sum(amount) / np.sum(per)) / np.mean(per))
 
@@ -29,7 +31,7 @@ def naive_error(run: Run, skip: float | None) -> float:
 def main() -> None:
     args = command_line(__doc__, "coverage.png", equilibration=None).parse_args()
     for run in args.runs:
-        allow(run, "it has no equation of state", *FLUID)
+        allow(run, "the equation of state is not defined for it", *FLUID)
     groups, rows = by_packing(args.runs), []
     figure, panels = plt.subplots(
         1, len(groups), squeeze=False, figsize=(max(5, 3.6 * len(groups)), 4.2)
@@ -50,7 +52,7 @@ def main() -> None:
             style = {"color": COLOURS[0 if abs(mean - row["Z"]) < reach else 1], "ms": 2.5, "lw": 1}
             axes.errorbar(k, mean, reach, marker="o", **style)
         axes.axhline(row["Z"], color="black", lw=1)
-        axes.set_title(f"η = {eta:g}: {row['within_%']:.0f} % of {len(runs)} hold it")
+        axes.set_title(f"η = {eta:g}: {row['within_%']:.0f} % of {len(runs)} contain it")
         axes.set(xticks=[], xlabel=f"{len(first)} runs, in order of their mean")
     panels[0, 0].set_ylabel("$Z = P\\,/\\,(n\\,kT)$ of a run")
     figure.suptitle(caption(args.runs))

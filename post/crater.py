@@ -1,16 +1,17 @@
-"""A crater: before and after, energy in time, and its size.
+"""Crater of a projectile: the bed before and after, the energy against time, and the crater's size.
 
     python post/crater.py runs/crater.h5 -o crater.png
     python post/crater.py runs/scan/*.h5 --csv craters.csv     sizes of many runs, no figure
 
-The projectile is the species of that name, or else the only disk that moves at the start; the
-others are the bed.  Sizes: `hit`, bed disks that collided with anything; `displaced`, bed disks
-now further than one radius from their first position; `width` and `depth`, the extent of the first
-positions of the displaced ones, from the rim of the bed downwards; `hole_width` and `hole_depth`,
-the extent of the hole, where more than half of the bed's packing is gone, smoothed over a few
-disks.  A bed that moves without a projectile, as under gravity, is refused.  A crater is marked if
-the box takes part (wall hits are more than 1 % of the number of disks), or if the run ended with
-more energy left than `stop.energy_fraction`.
+The projectile is the species 'projectile', or else the only disk that moves at the start.  All
+other disks form the bed.  The sizes are: `hit`, the number of bed disks that collided at least
+once; `displaced`, the number of bed disks that are now further than one radius from their first
+position; `width` and `depth`, the extent of the first positions of the displaced ones, from the rim
+of the bed downwards; `hole_width` and `hole_depth`, the extent of the hole, where more than half of
+the bed's packing is gone, smoothed over a few disks.  Runs in which the bed moves without a
+projectile, for example under gravity, are refused.  A crater is marked if the walls affect it
+(their collisions exceed 1 % of the number of disks), or if the run ended with more energy left than
+`stop.energy_fraction`.
 """
 
 from ricochet import Run, crater, drawing
@@ -24,7 +25,7 @@ from matplotlib.ticker import LogLocator
 
 
 def draw_state(axes: plt.Axes, run: Run, frame: int, values: np.ndarray, limits: tuple):
-    """Draw the bed coloured by value, and the projectile black."""
+    """Draw the bed disks in the colours of the values, and the projectile in black."""
     draw_box(axes, run, run.time[frame])
     colours = plt.get_cmap("viridis")(plt.Normalize(*limits)(values))
     colours[projectile(run)] = (0, 0, 0, 1)
@@ -33,7 +34,7 @@ def draw_state(axes: plt.Axes, run: Run, frame: int, values: np.ndarray, limits:
 
 
 def hull(run: Run) -> np.ndarray:
-    """Return the outline (P, 2) of the first positions of displaced disks; it may be empty."""
+    """Return the convex hull (P, 2) of the first positions of displaced disks; it may be empty."""
     points = run.position[0][displaced(run)]
     if len(points) < 4:
         return points[:0]
@@ -76,7 +77,7 @@ def draw(run: Run, size: Crater) -> plt.Figure:
     draw_state(before, run, 0, moved, limits)
     draw_outline(before, hull(run), "hull of the displaced disks")
     draw_state(after, run, -1, moved, limits)
-    draw_outline(after, crater.hole(run), "hole: less than half as dense")
+    draw_outline(after, crater.hole(run), "hole: less than half of the bed's packing")
     below = {"location": "bottom", "pad": 0.02}
     scale = plt.cm.ScalarMappable(plt.Normalize(*limits), "viridis")
     label = f"{drawing.label_of(run, 'displacement')} at the end"

@@ -2,15 +2,16 @@
 
     python post/crater_scan.py runs/crater_scan/*.h5 -o crater_scan.png --csv crater_scan.csv
 
-The four parameters are read from each run.  Runs that differ in one of them make a curve against
-it; there is a curve for every combination of the other three, and a panel for every parameter that
-varies so.  A run without such a partner is named, in print and on the figure.  Points: means over
-the runs, bars: errors.  Lines: weighted fits of size = A x^p (x = 1 - xi^2 for the
-restitution, the fraction of normal energy lost in a collision); the exponents are printed, with
-chi^2 per degree of freedom, and a fit that misses its points says so.  With fewer than four runs a
-point all points weigh alike, and their scatter makes the error.  Open symbols are left out of the
-fit: the box takes part (wall hits are more than 1 % of the number of disks), or some of the
-runs ended by time, with more energy left than `stop.energy_fraction`.
+The four parameters are read from each run.  Runs that differ in only one of them form a curve
+against that parameter.  There is a curve for every combination of the other three parameters, and a
+panel for every parameter with at least one curve.  Runs that belong to no curve are listed in the
+printed notes and on the figure.  Points are means over the runs, with error bars.  Lines are
+weighted fits of size = A x^p.  For the restitution, x = 1 - xi^2 is the fraction of the normal
+energy lost in a collision.  The exponents are printed with chi^2 per degree of freedom, and a note
+marks each fit that does not describe its points.  If a point has fewer than four runs, all points
+have equal weights and the error follows from their scatter about the fit.  Points with open symbols
+are not fitted: there the walls affect the crater (their collisions exceed 1 % of the number of
+disks), or some of the runs reached `stop.time` with more energy left than `stop.energy_fraction`.
 """
 
 from itertools import chain
@@ -41,7 +42,7 @@ from ricochet.script import command_line, grouped, launch, measured, report
 
 import numpy as np
 
-#: Words and dimension of the label of each parameter.
+# : Text and dimension of the label of each parameter.
 AXES = {
     "mass": ("mass of the projectile / mass of a bed disk, $M$", "number"),
     "speed": ("speed of the projectile $v$", "speed"),
@@ -65,17 +66,17 @@ class Point(NamedTuple):
     sizes: dict[str, Estimate]
     energy_left: Estimate
     side_collisions: Estimate  # per run
-    by_time: bool  # some runs ended before the energy fraction was reached
-    free: bool  # neither time nor walls cut it short
+    by_time: bool  # some runs reached stop.time before the energy fraction
+    free: bool  # limited by neither time nor walls
 
 
-Scans = dict[str, list[list[Point]]]  # by parameter: curves of points in ascending order
+Scans = dict[str, list[list[Point]]]  # the curves of each parameter; points in ascending order
 
 
 def key_of(run: Run) -> tuple[float, ...]:
     """Return mass ratio, speed, radius ratio and restitution."""
     if np.isnan(run.restitution):
-        raise Refused(f"{run.path}: has no single restitution, as a scan needs it")
+        raise Refused(f"{run.path}: has no constant restitution, which a scan requires")
     tip, lying = projectile(run), np.flatnonzero(bed(run))[0]
     ratios = run.mass[tip] / run.mass[lying], run.radius[tip] / run.radius[lying]
     values = ratios[0], run.speed(0)[tip], ratios[1], run.restitution
@@ -83,7 +84,7 @@ def key_of(run: Run) -> tuple[float, ...]:
 
 
 def point(key: tuple[float, ...], runs: list[Run]) -> Point:
-    """Average over runs."""
+    """Return the means over runs of equal parameters."""
     craters = [crater(run) for run in runs]
     sizes = {name: estimate([getattr(c, name) for c in craters]) for name in ALL}
     left, hits = (
@@ -96,12 +97,12 @@ def point(key: tuple[float, ...], runs: list[Run]) -> Point:
 
 
 def others(axis: str, curve: list[Point]) -> dict[str, float]:
-    """Return the parameters that the points of a curve share."""
+    """Return the three parameters that are equal for all points of a curve."""
     return {name: value for name, value in curve[0].values.items() if name != axis}
 
 
 def scanned(points: list[Point]) -> Scans:
-    """Return the curves with several points, or else the largest one."""
+    """Return the curves with at least two points; without any, the curve with most points."""
     scans = {}
     for axis in AXES:
         families = grouped(points, lambda p, axis=axis: tuple(others(axis, [p]).values()))
@@ -112,7 +113,7 @@ def scanned(points: list[Point]) -> Scans:
 
 
 def unused(points: list[Point], scans: Scans) -> list[str]:
-    """Return the runs that are on no curve."""
+    """Return the points that belong to no curve."""
     drawn = [p.values for scan in scans.values() for curve in scan for p in curve]
     return [
         f"not drawn: {listed(p.values)} (runs: {p.runs}), from which no other run differs in one "
@@ -128,29 +129,29 @@ def fitted_values(curve: list[Point], axis: str) -> int:
 
 
 def unfitted(scans: Scans, runs: list[Run]) -> list[str]:
-    """Return why curves have no fit, and the beds that would have one."""
+    """Return the reason why curves have no fit, and the bed size that would allow one."""
     notes, fraction = [], energy_fraction(runs[0])
     for axis, curve in ((axis, curve) for axis, scan in scans.items() for curve in scan):
         cut = [p for p in curve if not p.free]
         if fitted_values(curve, axis) >= FEWEST_POINTS or not cut:
             continue
-        what = f"no fit against {axis}: {len(cut)} of {len(curve)} points are cut short"
+        what = f"no fit against {axis}: time or walls limit {len(cut)} of {len(curve)} points"
         if timed := sum(p.by_time for p in cut):
-            what += f"; {timed} ended by time: raise stop.time"
+            what += f"; {timed} reached stop.time: increase it"
         by_box = [p.values for p in cut if not p.by_time]
         sizes = [enough_disks(v["mass"], v["restitution"], fraction) for v in by_box]
         if sizes and np.isfinite(max(sizes)):
             number = 100 * int(np.ceil(max(sizes) / 100))
-            what += f"; the crater reaches the box in {len(sizes)}: take about {number} disks"
+            what += f"; the crater reaches the box in {len(sizes)}: use about {number} disks"
             what += f" instead of {span(np.array([run.n_disks - 1 for run in runs]))}"
         elif sizes:
-            what += f"; the crater reaches the box in {len(sizes)}, as it would in any bed"
+            what += f"; the crater reaches the box in {len(sizes)}, and a larger bed would not help"
         notes.append(what)
     return notes
 
 
 def fewest(curve: list[Point]) -> int:
-    """Return the smallest number of runs of a point that is fitted."""
+    """Return the smallest number of runs per point among the fitted points."""
     return min(p.runs for p in curve if p.free)
 
 
@@ -160,12 +161,12 @@ def listed(values: dict[str, float]) -> str:
 
 
 def abscissa(axis: str, x: np.ndarray) -> np.ndarray:
-    """Return the variable of a fit."""
+    """Return the independent variable against which the data are fitted."""
     return 1 - np.square(x) if axis == "restitution" else np.asarray(x, dtype=float)
 
 
 def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
-    """Fit a power law to a size; points of few runs have equal weights."""
+    """Fit a power law to a size; points of fewer than four runs have equal weights."""
     free = [p for p in curve if p.free]
     x = abscissa(axis, [p.values[axis] for p in free])
     y, error = np.array([p.sizes[name] for p in free]).reshape(-1, 2).T
@@ -195,14 +196,17 @@ def draw_size(
     else:
         axes.plot(x, y, color=style["color"], lw=0.8, alpha=0.4)
     open_style = style | {"mfc": "white"}
-    if free.any():  # the legend has the symbol of most points
+    if free.any():  # the legend shows the symbol that most points have
         axes.errorbar(x[free], y[free], error[free], ls="", **style)
         open_style["label"] = ""
     axes.errorbar(x[~free], y[~free], error[~free], ls="", **open_style)
 
 
 def draw_sizes(axes: plt.Axes, axis: str, scan: list[list[Point]], names: dict, own: list) -> None:
-    """Draw several sizes; colours mean sizes on a single curve, and curves in a family."""
+    """Draw several sizes.
+
+    If there is one curve, colours distinguish sizes; otherwise they distinguish curves.
+    """
     shared = [others(axis, curve) for curve in scan]
     varying = [name for name in shared[0] if len({values[name] for values in shared}) > 1]
     for curve, values, shade in zip(scan, shared, colours(len(scan)), strict=True):
@@ -248,13 +252,14 @@ def draw(runs: list[Run], scans: Scans) -> plt.Figure:
     figure.suptitle(
         f"N = {count},  {number} run{'s' * (number != '1')} per point,"
         f"  ended at {100 * fraction:g} % of the energy"
-        + ("\n(open: the box takes part, or ended by time)" * any(not p.free for p in points))
+        + "\n(open symbols: walls affect the crater, or stop.time was reached)"
+        * any(not p.free for p in points)
     )
     return figure
 
 
 def tables(scans: Scans) -> tuple[list[dict], list[dict], list[str]]:
-    """Return a row for each point, a row for each fit, and notes on fits that miss their points."""
+    """Return a row per point, a row per fit, and notes on fits that do not describe the points."""
     rows, fits, missed = [], [], []
     for axis, curve in ((axis, curve) for axis, scan in scans.items() for curve in scan):
         for p in curve:
@@ -270,7 +275,8 @@ def tables(scans: Scans) -> tuple[list[dict], list[dict], list[str]]:
                 row |= {"of": "1 - xi^2" if axis == "restitution" else axis}
                 row |= measured("exponent", Estimate(fit.exponent, fit.exponent_error))
                 fits.append(row | {"chi2/dof": fit.chi2})
-                what = f"{size} against {axis}: misses its points, chi^2 per degree of freedom is "
+                what = f"{size} against {axis}: the fit does not describe its points; "
+                what += "chi^2 per degree of freedom is "
                 missed += [f"{what}{fit.chi2:.2g}"] * fit.misses(fewest(curve))
     return rows, fits, missed
 

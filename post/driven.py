@@ -1,32 +1,35 @@
-"""Quantities of driven disks in time, with pictures of the disks.
+"""Quantities of driven disks against time, with pictures of the disks.
 
     python post/driven.py runs/heated/*.h5 -o heated.png --csv heated.csv
     python post/driven.py runs/demon/*.h5 --show share -o demon.png
     python post/driven.py runs/constant_pressure/*.h5 --show width -o width.png
 
---show temperature: kT, in the table also its parts kT_x and kT_y, and that of each species; of all
-N disks, m <(v - u)^2> / 2 times N / (N - 1).  The dashed line is for equal disks with white-noise
-driving in a periodic box, where driving and dissipation balance (van Noije and Ernst 1998); or for
-equal elastic disks in a box with one side that moves at a constant velocity: the adiabat of the
-equation of state with the layers at the walls (`hard_disks.adiabat`), which slow strokes follow.
-That needs several runs, because a single one has no error once the side is at rest.
---show width: of the box with a piston (motion = 'piston').  The dashed lines are for equal elastic
-disks: mean, and mean plus and minus a standard deviation, by the equation of state at constant
-enthalpy (docs/theory.md).  Also printed are the deviation, and the largest relative changes of the
-enthalpy and of the momentum of disks and piston, which are conserved.
---show share: of the disks in the left half of the box.  The dashed line is for a dilute gas over a
-sawtooth floor, in halves with a hole above the floor: the lasting shares (after Eggers 1999).
---show height: mean height of the disks of each species.
---show viscosity: -P_xy over the shear rate of a sheared box (box.shear_rate), between observables,
-from the momentum in flight and in collisions; also of disks that lose energy.
---show cluster: share of the disks in the largest cluster, with gaps below a tenth of the mean
+--show temperature: kT about the mean velocity u.  For all N disks kT is m <(v - u)^2> / 2 times N /
+(N - 1).  The table also contains the components kT_x and kT_y, and kT of each species.  The dashed
+line is for equal disks with white-noise driving in a periodic box, where driving and dissipation
+balance (van Noije and Ernst 1998).  For equal elastic disks in a box with one side that moves at a
+constant velocity, the line is instead the adiabat of the equation of state including the layers at
+the walls (`hard_disks.adiabat`), which applies to slow compression and expansion.  This comparison
+requires several runs, because the temperature of a single run has no error once the side is at
+rest. --show width: width of the box with a piston (motion = 'piston').  The dashed lines are a
+prediction for equal elastic disks: the mean width, and the mean plus and minus a standard
+deviation, from the equation of state at constant enthalpy (docs/theory.md).  The script also prints
+the measured standard deviation and the largest relative changes of two conserved quantities: the
+enthalpy, and the momentum of disks and piston. --show share: fraction of the disks in the left half
+of the box.  The dashed lines show the steady fractions of a dilute gas above a sawtooth floor, in
+two halves that are connected by a hole above the floor (after Eggers 1999). --show height: mean
+height of the disks of each species. --show viscosity: -P_xy over the shear rate of a sheared box
+(box.shear_rate).  P_xy is an average between samples of the observables and includes the kinetic
+and the collisional part.  The disks may be inelastic. --show cluster: fraction of the disks in the
+largest cluster.  Disks belong to one cluster if the gaps between them are below a tenth of the mean
 diameter.
 
-There is a curve for each run, of means over a sixtieth of the time (of a width over a thousandth),
-and a colour for each input and species.  Printed are the mean over the second half of the time, its
-error, and its ratio to the theory; a `share` is that of the half that is fuller at another time.
-Pictures show the end of the first run of each input, or the start and the end of a single input;
-the smallest disks are enlarged.
+There is a curve for each run, and a colour for each input and species.  Each point is a mean over a
+sixtieth of the time (of a width, over a thousandth).  The script prints the mean over the second
+half of the time with its error, and the ratio of this mean to the theory.  For a `share` the mean
+is that of the half that contains more disks; this half is chosen at a different time. Pictures show
+the end of the first run of each input, or the start and the end of a single input; the smallest
+disks are enlarged.
 """
 
 from collections.abc import Callable
@@ -44,17 +47,18 @@ from ricochet.script import command_line, launch, measured, over_runs, report
 import numpy as np
 
 MOST_PICTURES = 3
-POINTS, FINE = 60, 1000  # points of a curve, and of one with real fluctuations
+POINTS, FINE = 60, 1000  # points of a curve, and of a curve whose fluctuations are of interest
 HEIGHT = 4.5  # height of a picture [inch]
 GAP = 0.1  # largest gap in a cluster [mean diameters]
-SMALLEST = 2.2  # points across that a disk is drawn with at least
+SMALLEST = 2.2  # smallest diameter of a drawn disk [points]
 Curves = dict[str, tuple[np.ndarray, np.ndarray]]  # time and value by species, '' for all of them
 
 
 def temperature(run: Run) -> Curves:
-    """Return the temperature about the mean motion, at the observables."""
+    """Return the temperature about the mean velocity at the times of the observables."""
     if run.n_disks < 2:
-        raise Refused(f"{run.path}: holds one disk; a temperature is about the motion of all")
+        raise Refused(f"{run.path}: holds one disk; a temperature requires at least two, as it is "
+            "about their mean velocity")
     time, value = run.observable("all/temperature")
     curves = {"": (time, value * run.n_disks / (run.n_disks - 1))}
     for kind in run.by_species if len(run.names) > 1 else ():
@@ -65,7 +69,7 @@ def temperature(run: Run) -> Curves:
 
 
 def components(run: Run) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return kT_x and kT_y of all disks about their mean motion, at the observables."""
+    """Return kT_x and kT_y of all disks about their mean velocity at the observables' times."""
     time, tensor = run.observable("kinetic_tensor")
     motion = 0 if run.shear_rate else run.observable("momentum").value ** 2 / run.mass.sum()
     kt = (tensor[:, [0, 3]] - motion) / (run.n_disks - 1)
@@ -91,7 +95,7 @@ def noise_law(run: Run) -> float | None:
 
 
 def temperature_law(run: Run) -> np.ndarray | float | None:
-    """Return the steady temperature of driven disks, or the adiabat at the observables."""
+    """Return the steady temperature of driven disks, or the adiabat at the times of observables."""
     side = only_moving(run, "constant_velocity")
     if side is None:
         return noise_law(run)
@@ -100,44 +104,47 @@ def temperature_law(run: Run) -> np.ndarray | float | None:
 
 
 def only_moving(run: Run, motion: str) -> int | None:
-    """Return the number of the only moving side around equal elastic disks, or None."""
+    """Return the number of the moving side of a box of equal elastic disks.
+
+    The result is None unless exactly one side moves.
+    """
     moves = [k for k, side in enumerate(run.sides) if side.get("motion", "still") != "still"]
     plain = run.nature <= {"moving_sides", "piston", "walls", "rotating"} and len(moves) == 1
     return moves[0] if plain and run.sides[moves[0]]["motion"] == motion else None
 
 
 def widths(run: Run, side: int) -> np.ndarray:
-    """Return widths (S,) of the box along the motion of a side, at the observables."""
+    """Return the widths (S,) of the box along the motion of a side at the times of observables."""
     lower, upper = run.corners_at(run.observable("total_energy").time)
     return (upper - lower)[:, side // 2]
 
 
 def adiabat(run: Run, side: int, widths: np.ndarray) -> np.ndarray:
-    """Return temperatures over that at the first of the widths (W,)."""
+    """Return the adiabatic temperatures at the widths (W,), divided by that at the first width."""
     height, walled = float(run.edges[1 - side // 2]), not run.periodic[1 - side // 2]
     return hard_disks.adiabat(widths, height, run.n_disks, float(run.radius[0]), walled)
 
 
 def width(run: Run) -> Curves:
-    """Return the width of the box along the motion of a piston."""
+    """Return the width of the box along the direction in which its piston moves."""
     if not run.piston_positions:
         raise Refused(f"{run.path}: has no piston (side.motion = 'piston')")
     return {"": (run.observable("total_energy").time, widths(run, min(run.piston_positions)))}
 
 
 class Room(NamedTuple):
-    """Mean and standard deviation of a fluctuating width."""
+    """Mean and standard deviation of the fluctuating width of a box."""
 
     mean: float
     deviation: float
 
 
 def width_law(run: Run) -> Room | None:
-    """Return the width of a fluid at constant enthalpy; the piston starts at rest."""
+    """Return the predicted width of a fluid at constant enthalpy; the piston starts at rest."""
     side = only_moving(run, "piston")
     if side is None or not run.sides[side]["force"] > 0:
         return None
-    along = bool(run.periodic[1 - side // 2])  # keeps its momentum
+    along = bool(run.periodic[1 - side // 2])  # momentum along the sides is conserved
     flow = along * run.observable("momentum").value[0, 1 - side // 2] ** 2 / 2 / run.mass.sum()
     energy = run.observable("all/kinetic_energy").value[0] * run.n_disks - flow
     start, force = widths(run, side)[:1], float(run.sides[side]["force"])
@@ -150,7 +157,7 @@ def width_law(run: Run) -> Room | None:
 
 
 def balances(run: Run) -> tuple[float, float]:
-    """Return the largest changes of the enthalpy, and of the momentum of disks and piston."""
+    """Return the largest relative changes of enthalpy and momentum of disks and piston."""
     k = min(run.piston_positions)
     side = run.sides[k]
     time, energy = run.observable("total_energy")
@@ -164,17 +171,17 @@ def balances(run: Run) -> tuple[float, float]:
 
 
 def share(run: Run) -> Curves:
-    """Return the share of the disks in the left half, at the frames."""
+    """Return the fraction of the disks in the left half at the times of frames."""
     middle = run.lower[0] + run.edges[0] / 2
     return {"": (run.time, np.mean(run.position[:][..., 0] < middle, axis=1))}
 
 
 def fuller(share: np.ndarray) -> np.ndarray:
-    """Return shares (T,) of one half as those of the half that contained more disks.
+    """Return the fractions (T,) of disks in the fuller half, from those in one half.
 
-    The half is chosen in the last third of the time for the first third, and the other way round:
-    chosen by its own disks, a half would contain more than 1/2 by chance alone.  The middle third
-    makes the two independent.
+    For the first third of the time, the fuller half is determined from the last third, and the
+    other way round.  If the same frames determined it, the fraction would exceed 1/2 by chance
+    alone.  The middle third separates the two, so that they are independent.
     """
     third = max(1, len(share) // 3)
     ends = share[:third], share[-third:]
@@ -183,7 +190,7 @@ def fuller(share: np.ndarray) -> np.ndarray:
 
 
 def demon_law(run: Run) -> float | None:
-    """Return the lasting share in the fuller half; a wall separates the halves."""
+    """Return the predicted steady fraction in the fuller of two halves that a wall separates."""
     floor = run.parameters.get("side", {}).get("bottom", {})
     middle = run.lower[0] + run.edges[0] / 2
     parting = [wall for wall in run.walls if np.allclose(wall[:, 0], middle)]
@@ -201,7 +208,7 @@ def demon_law(run: Run) -> float | None:
 
 
 def height(run: Run) -> Curves:
-    """Return the mean height above the floor of each species, at the frames."""
+    """Return the mean height of each species above the floor at the times of frames."""
     y = run.position[:][..., 1] - run.lower[1]
     several = len(run.names) > 1
     return {
@@ -210,7 +217,7 @@ def height(run: Run) -> Curves:
 
 
 def cluster(run: Run) -> Curves:
-    """Return the share of the disks in the largest cluster, at the frames."""
+    """Return the fraction of the disks in the largest cluster at the times of frames."""
     gap = GAP * 2 * float(run.radius.mean())
     shares = [largest_cluster(run, frame, gap) / run.n_disks for frame in range(run.n_frames)]
     return {"": (run.time, np.array(shares))}
@@ -219,9 +226,9 @@ def cluster(run: Run) -> Curves:
 def viscosity(run: Run) -> Curves:
     """Return -P_xy over the shear rate."""
     if "sheared" not in run.nature:
-        raise Refused(f"{run.path}: is not sheared; a viscosity takes box.shear_rate")
+        raise Refused(f"{run.path}: is not sheared; --show viscosity requires box.shear_rate")
     if "random_walk" in run.nature:
-        why = "noise moves its centre of mass through the flow, and so changes the stress"
+        why = "noise moves its centre of mass through the flow, which changes the stress"
         raise Refused(f"{run.path}: {why}; set drive.keep_momentum = .true.")
     time, first = np.unique(run.observable("kinetic_tensor").time, return_index=True)
     flown, handed = (run.observable(f"{k}_tensor").value[first, 1] for k in ("kinetic", "virial"))
@@ -247,20 +254,20 @@ QUANTITIES = {
 
 
 def on_average(laws: list) -> np.ndarray | float | Room | None:
-    """Average over runs that differ by their seed, and so in their first energy."""
+    """Average over runs that differ by their seed and therefore in their initial energy."""
     rooms = all(isinstance(law, Room) for law in laws)
     return Room(*map(float, np.mean(laws, axis=0))) if rooms else laws[0]
 
 
 def levels(law: np.ndarray | float | Room | None, compared: Callable) -> list:
-    """Return the heights of the lines of a prediction."""
+    """Return the values at which the lines of a prediction are drawn."""
     if isinstance(law, Room):
         return [law.mean, law.mean - law.deviation, law.mean + law.deviation]
     return [] if law is None else [law, 1 - law] if compared is fuller else [law]
 
 
 def by_input(runs: list[Run]) -> dict[str, list[Run]]:
-    """Group runs that differ only by their seed, under what distinguishes them from the others."""
+    """Group runs that differ only by their seed; the key states the differences between groups."""
     own = [{"N": run.n_disks, "ξ": run.restitution, **drawing.numbers_of(run)} for run in runs]
     names = [name for name in own[0] if len({numbers.get(name) for numbers in own}) > 1]
     groups: dict[str, list[Run]] = {}
@@ -316,7 +323,7 @@ def draw(
         panel.set_title("\n".join(filter(None, (name, f"t = {run.time[frame]:.4g}"))))
     panels[0].tick_params(labelleft=True)
     panels[0].set_ylabel("y", labelpad=-8)
-    if not any(species for _, species in tracks):  # else the curves name them, in their colours
+    if not any(species for _, species in tracks):  # otherwise the legend shows their colours
         drawing.species_legend(figure, runs[0])
     figure.suptitle(drawing.titled(runs))
     return figure
@@ -328,7 +335,7 @@ def main() -> None:
     args = parser.parse_args()
     for run in args.runs:
         if run.n_frames < 2 or not run.time[-1] > run.time[0]:
-            raise RunError(f"{run.path}: has one frame; it takes two")
+            raise RunError(f"{run.path}: has one frame, two are required")
     label, curves_of, law_of, compared = QUANTITIES[args.show]
     groups, tracks, rows, notes = by_input(args.runs), {}, [], []
     for name, runs in groups.items():
@@ -343,11 +350,11 @@ def main() -> None:
         members = [correlated_mean(half) for half in late]
         if (
             args.show == "temperature" and not species
-        ):  # what fluctuates in one run does not tell how seeds differ
+        ):  # fluctuations within one run do not show the scatter over seeds
             own = zip(members, groups[name], strict=True)
             members = [m._replace(error=np.nan) if keeps_energy(run) else m for m, run in own]
         row |= over_runs("late", members, notes, about)
-        notes += [f"{about}: grows or falls all the time, 'late' is not what lasts"] * any(
+        notes += [f"{about}: still increases or decreases; 'late' is not steady"] * any(
             map(has_trend, late)
         )
         law = None if species else expected[name]

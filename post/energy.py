@@ -1,17 +1,17 @@
-"""Energies in time, and how well the total is conserved.
+"""Energies against time, and conservation of the total energy.
 
     python post/energy.py runs/gravity/events.h5 runs/gravity/steps_*.h5 -o energy.png
 
 The panels of the first row show the total energy and its parts against time on linear axes, side by
 side for the first run of each time step.  The middle row shows the mean kinetic and potential
 energy per disk of each species in the first run, against linear and logarithmic time.  The lowest
-panel shows, for each run, the largest relative change so far of the conserved quantity.  That is
-the total energy, or, where energy is exchanged, total + dissipated - heat - work - drive.  Of
-driven disks no time axis is logarithmic.
+panel shows, for each run, the largest relative change so far of the conserved quantity.  The
+conserved quantity is the total energy or, where energy is exchanged, total + dissipated - heat -
+work - drive.  The figure of driven disks has no logarithmic time axis.
 
-Time steps here do not conserve energy better if they are smaller: a step moves disks along their
-exact parabolas and every collision conserves energy, so that only rounding is left.  Larger steps
-miss collisions instead; missed.py counts them.
+Smaller time steps do not improve the conservation of energy: a step moves disks along their exact
+parabolas and every collision conserves energy, so that all changes are rounding errors.  Larger
+steps miss collisions instead; missed.py counts them.
 
 The table has three numbers for each run, relative to the total energy at the start, or to the
 largest one if that is 0: the drift, which is the change over the whole run along a fitted line; the
@@ -27,20 +27,20 @@ from ricochet.script import command_line, launch, report
 
 import numpy as np
 
-EPSILON = np.finfo(float).eps  # the smallest change of a number near 1
+EPSILON = np.finfo(float).eps  # rounding unit of a number near 1
 WINDOWS = 60  # windows of time
 MOST_PANELS = 4
-ROUNDING = 1e-9  # largest relative change that is taken for rounding
-WHY_EXACT = "flight and collisions are exact, only rounding is left; larger steps miss collisions"
+ROUNDING = 1e-9  # largest relative change that rounding can explain
+WHY_EXACT = "flights and collisions are exact except for rounding; larger steps miss collisions"
 
 
 def method(run: Run) -> str:
-    """Return how the run was integrated, for the legend."""
+    """Return the method of integration of the run, for the legend."""
     return f"time steps, Δt = {run.time_step:g}" if run.time_step else "event driven"
 
 
 def balance(run: Run) -> tuple[np.ndarray, str]:
-    """Return the conserved quantity at the observables, and its terms in words."""
+    """Return the conserved quantity at the times of observables, and the names of its terms."""
     energy, words = run.observable("total_energy").value, "total"
     size = 1e-9 * np.abs(energy).max()
     for sign, term in ((1, "dissipated_energy"), (-1, "heat"), (-1, "work"), (-1, "drive_energy")):
@@ -55,9 +55,10 @@ def change(run: Run) -> tuple[np.ndarray, np.ndarray]:
     """Return time and relative change of the conserved quantity."""
     time, total = run.observable("total_energy")
     if len(time) < 2:
-        raise RunError(f"{run.path}: has one sample of the energies so far; nothing has changed")
+        raise RunError(f"{run.path}: has only one sample of the energies; at least two are "
+            "required")
     if not np.any(total):
-        raise Refused(f"{run.path}: all disks are at rest, there is no energy")
+        raise Refused(f"{run.path}: all disks are at rest, so that the energy is zero")
     energy, _ = balance(run)
     return time, (energy - energy[0]) / (abs(total[0]) or np.abs(total).max())
 
@@ -75,9 +76,9 @@ def means_of_windows(
 
 
 def draw_species(axes: plt.Axes, run: Run, spaced: Callable) -> None:
-    """Draw kinetic energy solid and potential dotted, a colour for each species.
+    """Draw kinetic energies solid and potential energies dotted, in a colour per species.
 
-    Windows of the means are made by `spaced`: `np.linspace`, or `np.geomspace` on a log axis.
+    `spaced` divides the time into windows: `np.linspace`, or `np.geomspace` for a logarithmic axis.
     """
     curves = [(name, "kinetic", "-") for name in run.names]
     if np.any(run.gravity):
@@ -97,7 +98,7 @@ def draw_species(axes: plt.Axes, run: Run, spaced: Callable) -> None:
 
 
 def of_each_method(runs: list[Run]) -> list[Run]:
-    """Return the first run of each way of integration and time step, at most `MOST_PANELS`."""
+    """Return the first run of each method of integration and time step, at most `MOST_PANELS`."""
     first: dict[float, Run] = {}
     for run in runs:
         first.setdefault(run.time_step, run)
@@ -139,7 +140,7 @@ def draw(runs: list[Run]) -> plt.Figure:
     for axes, spaced in zip(figure.axes[-len(scales) :], scales, strict=True):
         draw_species(axes, runs[0], spaced)
     left.set_title(f"{method(runs[0])}: {caption(runs[:1])}")
-    left.legend(ncols=2, loc="upper right", title="means; faint: samples")
+    left.legend(ncols=2, loc="upper right", title="means over windows; faint: samples")
     draw_changes(figure.add_subplot(grid[2, :]), runs)
     return figure
 

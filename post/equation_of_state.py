@@ -1,16 +1,18 @@
-"""Equation of state of hard disks: Z = P / (n kT) against packing fraction, three ways.
+"""Equation of state of hard disks: Z = P / (n kT) against packing fraction, by three methods.
 
     python post/equation_of_state.py runs/state/eta_*.h5 -o state.png --csv state.csv
 
-By the virial of the pair collisions; by the collision rate (equal disks); by the force on the sides
-(walls).  Means are taken in equilibrium: from where nothing drifts any more, or after
---equilibration.
-Errors take the memory of the pressure into account; `samples` is how many independent ones the
-virial is worth.  Runs at equal packing fraction are combined.  Elastic gases without gravity; walls
-and kicks may heat them, all at one temperature.  kT is then its mean, and its error counts.  Disks
-between walls are denser away from them: the wall pressure belongs to the area open to the centres,
-and differs from the bulk by about 1/sqrt(N).  Of disks of many radii r the curves are those of
-Santos, Yuste and Lopez de Haro 1999, of the fluid, for their <r>^2 / <r^2>: one for all runs.
+The pressure P follows from the virial of the pair collisions, from the collision rate (equal disks)
+and from the force on the sides (walls).  Means are taken in equilibrium, which begins after
+--equilibration or, without that option, when no observable drifts any longer. Errors include the
+autocorrelation of the pressure; `samples` is the effective number of independent samples of the
+virial. Runs at equal packing fraction are combined.  The gases must be elastic and without gravity.
+Thermal walls and driving are allowed if all have the same temperature; kT is then a mean whose
+error is included.  Walls exclude disks from a layer, so that the density in the interior is higher:
+the wall pressure therefore refers to the area accessible to the centres, and differs from the bulk
+pressure by a fraction of about 1/sqrt(N).  For disks of many radii r the curves are the equation of
+state of a fluid by Santos, Yuste and Lopez de Haro 1999.  It depends on the radii through <r>^2 /
+<r^2> only, which must be the same for all runs.
 """
 
 from ricochet import Run, RunError, hard_disks
@@ -27,20 +29,20 @@ WAYS = {"virial": "virial", "rate": "collision rate", "walls": "force on the wal
 
 
 def likeness(runs: list[Run]) -> float:
-    """Return <r>^2 / <r^2>, 1 for equal disks, which the curves depend on."""
+    """Return <r>^2 / <r^2>, on which the theoretical curves depend (1 for equal disks)."""
     found = np.array([np.mean(run.radius) ** 2 / np.mean(run.radius**2) for run in runs])
     equal = np.array([np.ptp(run.radius) == 0 for run in runs])
     other = (np.abs(found - found[0]) > UNLIKE) | (equal != equal[0])
     if other.any():
         path = runs[int(np.argmax(other))].path
         raise RunError(
-            f"{path}: not of one radius, or not of radii that differ as in {runs[0].path}"
+            f"{path}: the radii are not equal or not distributed as in {runs[0].path}"
         )
     return 1.0 if equal.all() else float(found.mean())
 
 
 def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
-    """Return a row for each packing fraction, empty where a way does not apply, and the notes."""
+    """Return a row per packing fraction, empty where a method does not apply, and the notes."""
     rows, notes, alike = [], [], likeness(runs)
     for eta, same in by_packing(runs):
         row = {"packing": eta, "runs": len(same)}
@@ -58,12 +60,12 @@ def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
 
 
 def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
-    """Draw Z above, and its deviation from the reference below."""
+    """Draw Z in the upper panel and its deviation from the reference in the lower one."""
     figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(8, 8), height_ratios=(2, 1))
     alike, fluid, solid = likeness(runs), np.linspace(0, 0.72, 200), np.linspace(0.715, 0.86, 100)
     laws = (hard_disks.henderson(fluid), hard_disks.simulated(fluid))
     henderson, published = (hard_disks.of_sizes(z, fluid, alike) for z in laws)
-    label = "Kolafa and Rottner 2006; to 0.65 Erpenbeck and Luban 1985; then this program"
+    label = "Kolafa and Rottner 2006; up to 0.65 Erpenbeck and Luban 1985; then this program"
     if alike < 1:
         label = "Santos, Yuste and López de Haro 1999, from those of equal disks"
     above.plot(fluid, henderson, color="0.6", label="Henderson 1975")
@@ -83,7 +85,7 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
     below.axhline(0, color="black", lw=1, zorder=0)
     largest = 3 * np.nanmax(np.abs(100 * (found["Z_virial"] / expected - 1)), initial=0.1)
     below.set(xlabel="packing fraction $\\eta$", ylabel="deviation (%)", ylim=(-largest, largest))
-    most = np.nanmax([found[f"Z_{name}"] for name in WAYS])  # top of the data; curves go far beyond
+    most = np.nanmax([found[f"Z_{name}"] for name in WAYS])  # from the data, as the curves diverge
     above.set(ylabel="$Z = P\\,/\\,(n\\,kT)$", xlim=(0, 0.05 + max(eta)), title=caption(runs))
     if most > 3:
         above.semilogy()

@@ -1,13 +1,15 @@
-"""Two species under gravity: when do their kinetic energies agree?
+"""Thermalisation time of two species under gravity, after which their kinetic energies agree.
 
     python post/equipartition.py runs/gravity_v0/*.h5 -o equipartition.png --csv times.csv
 
 Runs are combined by the width v0 of the start velocities; energies are means over the runs and over
-windows of --window.  T_therm is when their difference enters --within, to stay for three windows:
-between where it does so less its error, and where with it.  The error of a single run is how much
-the ratio of the energies fluctuates in the second half of the time.  With 30 + 30 disks that is 26
-%, too much for a T_therm: take many runs, or many disks.  K_light and K_heavy in the table are
-means in equilibrium, which is found or begins after --equilibration.
+windows of --window.  T_therm is the time at which the relative difference of the energies falls
+below --within and stays there for three windows.  Its limits are the times at which the difference
+minus its error and the difference plus its error do so.  For a single run, the error is the
+fluctuation of the ratio of the energies in the second half of the time.  With 30 + 30 disks this
+error is 26 %, which is too large to determine T_therm: use many runs or many disks.  K_light and
+K_heavy in the table are means in equilibrium, which begins after --equilibration or, without that
+option, when no observable drifts any longer.
 """
 
 from functools import reduce
@@ -36,11 +38,14 @@ class Approach(NamedTuple):
     light: Estimate  # (W,)
     heavy: Estimate
     gap: Estimate  # (W,) heavy / light - 1
-    thermalisation: Estimate  # NaN if they never agree, or are not known so well
+    thermalisation: Estimate  # NaN if they never agree or the error is too large
 
 
 def entry(time: np.ndarray, gap: np.ndarray, within: float = 0.1, lasting: int = 3) -> float:
-    """Return when a gap (W,) enters `within` for at least `lasting` windows, by interpolation."""
+    """Return the time at which a difference (W,) falls below `within`, by interpolation.
+
+    It must stay below `within` for at least `lasting` windows.
+    """
     close = gap <= within
     for k in range(len(time) - lasting + 1):
         if close[k : k + lasting].all():
@@ -50,12 +55,12 @@ def entry(time: np.ndarray, gap: np.ndarray, within: float = 0.1, lasting: int =
 
 
 def approach(runs: list[Run], width: float, within: float) -> Approach:
-    """Return energies of the lightest and heaviest species by window, means over runs."""
+    """Return the energies of the lightest and heaviest species per window, as means over runs."""
     both = []
     for kind in lightest_and_heaviest(runs[0]):
         name = runs[0].names[kind]
         tracks = [windows(*run.observable(f"{name}/kinetic_energy"), width) for run in runs]
-        time = reduce(np.intersect1d, [middles for middles, _ in tracks])  # all have samples then
+        time = reduce(np.intersect1d, [middles for middles, _ in tracks])  # end of the shortest run
         both.append(np.array([values[np.isin(middles, time)] for middles, values in tracks]))
     light, heavy = map(estimate, both)
     difference = estimate(both[1] - both[0])
@@ -113,7 +118,7 @@ def main() -> None:
     parser.add_argument("--until", type=float, default=20, help="end of the time axis [20]")
     args = parser.parse_args()
     for run in args.runs:
-        allow(run, "its species do not come to one temperature", *SETTLED)
+        allow(run, "its species do not reach a common temperature", *SETTLED)
     groups, rows, notes = grouped(args.runs, start_width), [], []
     results = [approach(runs, args.window, args.within) for _, runs in groups]
     for (v0, runs), found in zip(groups, results, strict=True):
@@ -126,7 +131,7 @@ def main() -> None:
         rows.append(row)
         if np.isnan(found.thermalisation.mean):
             known, share = 2 * np.median(found.gap.error) <= args.within, f"{100 * args.within:g} %"
-            why = f"the difference of the energies is not known to {share}, take more runs or disks"
+            why = f"the error of the energy difference exceeds {share}; use more runs or disks"
             why = f"the energies never agree within {share}" if known else why
             notes.append(f"v0 = {v0:g}: no T_therm; {why}")
     figure = draw(groups, results, args.until, args.within)

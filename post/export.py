@@ -1,11 +1,11 @@
 """Export a run for other programs.
 
     python post/export.py runs/gas.h5 -o gas.xyz     extended XYZ, opens in OVITO as a 2D system
-    python post/export.py runs/gas.h5 -o gas.csv     one line per disk and frame, for anything
+    python post/export.py runs/gas.h5 -o gas.csv     one line per disk and frame, for other programs
 
 Extended XYZ has two position columns, which makes OVITO treat the file as two-dimensional, and
-carries velocity, radius, mass, whatever else the disks have (such as their orientation), the box
-and the time.  Numbers keep all their digits.
+contains velocity, radius, mass, any further quantities of the disks (such as their orientation),
+the box and the time.  Numbers are written with all digits.
 """
 
 from pathlib import Path
@@ -58,7 +58,7 @@ def main() -> None:
     (run,) = args.runs
     path = args.output or Path(run.path.name).with_suffix(".xyz")
     if path.suffix not in (".xyz", ".csv"):
-        raise RunError(f"{path}: export ends in .xyz or .csv")
+        raise RunError(f"{path}: the name of an export must end in .xyz or .csv")
     frames = chosen_frames(run, args.frames, args.count)
     one = csv_frame if path.suffix == ".csv" else xyz_frame
     with destination(path).open("w") as file:

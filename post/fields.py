@@ -3,26 +3,30 @@
     python post/fields.py runs/fourier/*.h5 --across x -o fourier.png --csv fourier.csv
     python post/fields.py runs/hopper.h5 --grid 16,24 -o hopper.png
 
-Per cell, of the disks with their centres in it: number density n over the area that centres can
-reach, flow u (mean of v by mass), kT (mean of m c^2 / 2, c = v - u), kT_x and kT_y (means of m
-c_x^2 and m c_y^2), kT_rot (mean of I omega^2) of disks that can turn, the stress that disks carry
-(sum of m c_a c_b over the area) and the heat that they carry (sum of m c^2 c / 2); what collisions
-hand on over the distance of two centres comes on top of both.  u changes within a cell as it does
-from cell to cell.  Frames count after --equilibration, or in the second half of a run.  Errors are
-over blocks of time of all runs of one input (docs/theory.md); cells in which fewer than two of them
-saw a disk have a density alone, and three disks must be left without any block for kT, stress and
-heat.  --species measures the disks of one species alone, about their own flow.
+The fields of a cell are averages over the disks whose centres are in the cell: the number density n
+per accessible area (the area that centres can reach), the flow u (the mass-weighted mean of v), kT
+(the mean of m c^2 / 2, c = v - u), kT_x and kT_y (the means of m c_x^2 and m c_y^2), kT_rot (the
+mean of I omega^2, for disks that can rotate), the kinetic part of the stress (the sum of m c_a c_b
+per area) and the kinetic part of the heat flux (the sum of m c^2 c / 2 per area).  The collisional
+parts of stress and heat flux are not included.  Within a cell u is interpolated linearly from the
+neighbouring cells.  The frames after --equilibration are used, by default those in the second half
+of a run.  Errors follow from the scatter of blocks of time over all runs of one input
+(docs/theory.md).  A cell that contained disks in fewer than two blocks has a density only.  A cell
+has kT, stress and heat flux if at least three disks remain whichever block is left out.  With
+--species the fields are those of one species, relative to the mean flow of that species.
 
 --grid also draws the stream function psi of the flux j = n u, j_x = d psi / dy and j_y = -d psi /
-dx: its lines are the paths of the mean flow.  The longest arrow is the largest significant flow;
-arrows are pale where the flow is within its error (chi^2 of both components below 5.99, which noise
-exceeds in 5 % of the cells).
+dx: its contour lines are the streamlines of the mean flow.  The longest arrow is the largest
+significant flow; arrows are pale where the flow is within its error (chi^2 of both components below
+5.99, which noise exceeds in 5 % of the cells).
 
-Across equal disks between two walls, dashed: what the fluxes of momentum and energy at the walls
-say by Enskog's viscosity and conductivity (Gass 1971) and the equation of state, from temperature
-and flow in the middle on; nothing is fitted.  The band is the error by fluxes and middle.  At a
-packing of 0.2 the viscosity is 0.98 to 1.00 of Enskog's, the conductivity 1.03 to 1.05.  Squares
-are the walls; how far the gas there is from them, by the law, is in the table.
+For equal disks between two walls, dashed lines show predicted profiles.  They start from
+temperature and flow in the middle and follow from the measured fluxes of momentum and energy at the
+walls, Enskog's viscosity and conductivity (Gass 1971) and the equation of state, without fitted
+parameters.  The band is the error that follows from the errors of the fluxes and of the values in
+the middle.  At a packing fraction of 0.2 the viscosity is 0.98 to 1.00 times Enskog's, the
+conductivity 1.03 to 1.05 times.  Squares are the temperatures and velocities of the walls; the
+table contains the predicted differences between wall and gas.
 """
 
 import argparse
@@ -42,26 +46,26 @@ import numpy as np
 from matplotlib.patches import Circle
 
 MOST_CELLS = 100_000
-LEAST_FLOW = 0.2  # smallest range of the axis of a flow, in thermal speeds
-SIGNIFICANT = 5.99  # chi^2 of two components that noise exceeds in 5 % of the cells
-#: Words and dimension of the label of each field.
+LEAST_FLOW = 0.2  # smallest range of the axis of a flow velocity [thermal speeds]
+SIGNIFICANT = 5.99  # 95 % quantile of chi^2 with two degrees of freedom
+# : Text and dimension of the label of each field.
 LABELS = {
     "density": ("number density n", "number density"),
     "flow_x": ("flow $u_x$", "speed"),
     "flow_y": ("flow $u_y$", "speed"),
     "temperature": ("kT", "energy"),
     "rotational_temperature": ("$kT_{rot}$", "energy"),
-    "stress_xx": ("stress carried, xx", "stress"),
-    "stress_xy": ("stress carried, xy", "stress"),
-    "stress_yy": ("stress carried, yy", "stress"),
-    "heat_x": ("heat carried along x", "heat flux"),
-    "heat_y": ("heat carried along y", "heat flux"),
+    "stress_xx": ("kinetic stress, xx", "stress"),
+    "stress_xy": ("kinetic stress, xy", "stress"),
+    "stress_yy": ("kinetic stress, yy", "stress"),
+    "heat_x": ("kinetic heat flux along x", "heat flux"),
+    "heat_y": ("kinetic heat flux along y", "heat flux"),
 }
-PANELS = {"density": "A", "flow": "B", "temperature": "C"}  # panels that have a prediction
+PANELS = {"density": "A", "flow": "B", "temperature": "C"}  # panels with a prediction
 
 
 def draw_profile(runs: list[Run], axis: int, x: np.ndarray, found: dict, law) -> plt.Figure:
-    """Draw density, flow along the walls, temperatures, stress and heat across an axis."""
+    """Draw density, flow along the walls, temperatures, stress and heat flux against an axis."""
     run, flow = runs[0], f"flow_{'yx'[axis]}"
     figure, panels = plt.subplot_mosaic("AABBCC;DDDEEE", figsize=(12, 7))
     draw_fields(panels["A"], run.units, x, found, "density")
@@ -90,7 +94,7 @@ def draw_profile(runs: list[Run], axis: int, x: np.ndarray, found: dict, law) ->
 
 
 def draw_fields(axes: plt.Axes, units: Units, x: np.ndarray, found: dict, *names: str) -> None:
-    """Draw points with errors, with gaps at cells without disks."""
+    """Draw points with errors; cells without disks are gaps."""
     there = [name for name in names if name in found]
     for name in there:
         label = LABELS[name][0] if len(there) > 1 else "measured"
@@ -100,13 +104,13 @@ def draw_fields(axes: plt.Axes, units: Units, x: np.ndarray, found: dict, *names
 
 
 def with_ends(run: Run, axis: int, x: np.ndarray) -> np.ndarray:
-    """Return the positions x between the first and the last that centres can reach."""
+    """Return the positions x completed by the first and the last one that centres can reach."""
     reach = run.radius[0]
     return np.concatenate([[run.lower[axis] + reach], x, [run.upper[axis] - reach]])
 
 
 def walls(run: Run, axis: int) -> list[dict]:
-    """Return position, kT and flow of the two thermal sides across an axis."""
+    """Return position, kT and velocity of the two thermal sides across an axis."""
     each = zip(SIDES, run.sides, np.stack([run.lower, run.upper], axis=1).ravel(), strict=True)
     return [
         {
@@ -121,7 +125,7 @@ def walls(run: Run, axis: int) -> list[dict]:
 
 
 def at_walls(run: Run, axis: int, law: dict) -> list[dict]:
-    """Return kT and flow of the walls, and of the gas next to them by theory."""
+    """Return kT and velocity of the walls, and of the gas next to them according to theory."""
     rows = []
     for wall in walls(run, axis):
         end = 0 if wall["wall"] == ACROSS[axis][0] else -1
@@ -136,12 +140,12 @@ class Flow(NamedTuple):
     """The mean flow on a grid of cells."""
 
     u: np.ndarray  # (2, C) along x and y [speed]
-    significant: np.ndarray  # (C,) whether it differs from 0 by more than its error explains
+    significant: np.ndarray  # (C,) whether the flow differs from 0 by more than its error explains
     stream: np.ndarray  # (NY + 1, NX + 1) stream function at the corners [1/time]
 
 
 def flow_of(run: Run, cells: tuple[int, int], found: dict[str, Estimate]) -> Flow:
-    """Return the flow of measured fields, and the stream function of its flux."""
+    """Return the mean flow of measured fields and the stream function of the particle flux."""
     parts = [found[name] for name in ("flow_x", "flow_y")]
     u, error = (np.array([part[k] for part in parts]) for k in (0, 1))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -151,9 +155,10 @@ def flow_of(run: Run, cells: tuple[int, int], found: dict[str, Estimate]) -> Flo
 
 
 def draw_arrows(axes: plt.Axes, run: Run, cells: tuple[int, int], flow: Flow, colour: str) -> None:
-    """Draw the flow as arrows: the largest significant one is as long as a cell, others are pale.
+    """Draw the flow as arrows; those of cells without significant flow are pale.
 
-    Where no flow is significant, the largest of all sets the scale.
+    The arrow of the largest significant flow is as long as a cell.  If no flow is significant, the
+    largest flow sets the scale.
     """
     size = np.hypot(*flow.u)
     shown = size[flow.significant] if flow.significant.any() else size
@@ -184,7 +189,7 @@ def draw_grid(
         figure.colorbar(image, ax=axes, label=run.units.label(*LABELS[name]), shrink=0.8)
     draw_box(panels[2], run)
     top = float(np.abs(flow.stream).max()) or 1.0
-    levels = np.linspace(-top, top, 16)  # an even number: no line at 0, where all is noise
+    levels = np.linspace(-top, top, 16)  # even: no line at 0, where noise dominates
     style = {"cmap": "RdBu_r", "zorder": 0.2}
     filled = panels[2].contourf(*sides, flow.stream, levels, **style)
     panels[2].contour(*sides, flow.stream, levels, colors="0.5", linewidths=0.5, zorder=0.3)
@@ -196,21 +201,23 @@ def draw_grid(
 
 
 def cells_of(text: str) -> tuple[int, ...]:
-    """Parse N cells of a profile, or NX,NY of a map."""
+    """Parse N, the cells of a profile, or NX,NY, the cells of a map."""
     cells = tuple(int(word) for word in text.split(","))
     if min(cells) < 1 or not 2 <= np.prod(cells) <= MOST_CELLS:
-        raise argparse.ArgumentTypeError(f"there are 2 to {MOST_CELLS} cells")
+        raise argparse.ArgumentTypeError(f"the number of cells must be 2 to {MOST_CELLS}")
     return cells
 
 
 def main() -> None:
     parser = command_line(__doc__, "fields.png", equilibration=None)
-    parser.add_argument("--across", choices=("x", "y"), default="x", help="axis of a profile [x]")
+    parser.add_argument("--across", choices=("x", "y"), default="x", help="axis of the profile [x]")
     shape = parser.add_mutually_exclusive_group()
-    whole = {"type": cells_of, "metavar": "N", "default": (20,), "help": "of the profile [20]"}
+    whole = {"type": cells_of, "metavar": "N", "default": (20,), "help": "number of cells of the "
+        "profile [20]"}
     shape.add_argument("--cells", **whole)
-    shape.add_argument("--grid", type=cells_of, metavar="NX,NY", help="a map, no profile")
-    parser.add_argument("--species", metavar="NAME", help="measure this species alone")
+    shape.add_argument("--grid", type=cells_of, metavar="NX,NY", help="cells of a map, instead of "
+        "a profile")
+    parser.add_argument("--species", metavar="NAME", help="species whose fields are measured [all]")
     args = parser.parse_args()
     runs, axis, tables = args.runs, "xy".index(args.across), []
     cells = args.grid or (*args.cells, 1)[:: 1 if axis == 0 else -1]
@@ -218,7 +225,7 @@ def main() -> None:
         parser.error("--cells takes one number, --grid two")
     cooling = [run.path.name for run in runs if run.nature.cooling]
     notes = motion_notes(runs)
-    notes += [f"{name} loses energy and gets none: means of what is not steady" for name in cooling]
+    notes += [f"{name} loses energy and gains none: its state is not steady" for name in cooling]
     own = fields(runs, args.equilibration, cells, args.species)
     found = own.found
     middles = places(runs[0], cells)
@@ -245,7 +252,8 @@ def main() -> None:
             data |= spread({"_expected": inner})
             tables.append(at_walls(runs[0], axis, law))
         elif tables:
-            notes.append("no gas has these fluxes and this temperature in the middle: run longer")
+            notes.append("no profile agrees with these fluxes and the temperature in the middle: "
+                "run longer")
         figure = draw_profile(runs, axis, x, found, law)
         tables = [{name: v for name, v in data.items() if "stress" not in name}, *tables]
     report(args, figure, *tables, data=data, notes=notes)

@@ -1,9 +1,10 @@
-"""A table of the members of an ensemble: what each was given, how far it is, and what it measured.
+"""Table of the member runs of a sweep: their settings, states and results.
 
     python post/gather.py runs/scan --csv scan.csv
 
-A row for each member: its name; each override by its full name; seed; state (finished, unfinished,
-failed) with the reason; wall time in s; and the last value of each observable that is one number.
+The table has a row for each member run.  Its columns are the name; each changed variable by its
+full name; the seed; the state (finished, unfinished, failed) with the reason; the wall time in s;
+and the last value of each scalar observable.
 """
 
 import argparse
@@ -21,12 +22,12 @@ def main() -> None:
     summary, _, text = __doc__.partition("\n")
     raw = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(description=summary, epilog=text, formatter_class=raw)
-    parser.add_argument("folder", type=Path, help="of runs/ensemble.sh or ricochet.sweep")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="where the table goes [printed]")
+    parser.add_argument("folder", type=Path, help="folder of runs/ensemble.sh or ricochet.sweep")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="file for the table [printed]")
     args = parser.parse_args()
     rows = gathered(args.folder)
     columns = list(dict.fromkeys(name for row in rows for name in row))
-    last = ["state", "reason"]  # as the words are long, but for a machine they are where they are
+    last = ["state", "reason"]  # the longest texts are in the last columns
     if args.csv:
         with destination(args.csv).open("w", newline="", encoding="utf-8") as file:
             table = csv.DictWriter(file, columns, restval="")

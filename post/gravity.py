@@ -1,15 +1,16 @@
-"""A gas under gravity in equilibrium: squared speeds and heights against exponential laws.
+"""Distributions of squared speeds and heights of a gas under gravity, against exponential laws.
 
     python post/gravity.py runs/gravity/long.h5 -o gravity.png --csv gravity.csv
 
-kT is the mean of the kinetic energy in equilibrium, which is found or begins after --equilibration;
-the figure and the second table say why the frames before it are left out.
-The solid laws are P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT) for the height
-h of the centre above its lowest position.  They hold for many disks without size.  The dashed laws
-include two effects.  N disks that share a fixed energy have (1 - e / (2 N kT))^(2 N - 2) instead of
-exp(-e / kT).  Disks exclude the area pi s_ij^2 for each other, which multiplies the density of
-species i by exp(-sum_j pi s_ij^2 n_j(h)) to first order, a few per cent near the floor.  No law of
-the heights is drawn where that sum is above 0.5 for disks without size.
+kT is the mean of the kinetic energy in equilibrium.  Equilibrium begins after --equilibration or,
+without that option, when no observable drifts any longer; the figure and the second table state why
+earlier frames are left out. The solid laws are P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~
+exp(-m g h / kT) for the height h of the centre above its lowest position.  They apply to many point
+particles.  The dashed laws include two effects.  N disks that share a fixed energy have (1 - e / (2
+N kT))^(2 N - 2) instead of exp(-e / kT).  A disk of species j excludes the area pi s_ij^2 for the
+centre of a disk of species i, which multiplies the density of species i by exp(-sum_j pi s_ij^2
+n_j(h)) to first order, a few per cent near the floor.  No law of the heights is drawn if that sum,
+computed for point particles, exceeds 0.5.
 
 Slopes are those of weighted lines through the logarithm of the histograms, from 0 to 5 kT in the
 kinetic energy and from 1 to 5 kT in m g h, above the layer that the size of the disks flattens;
@@ -38,11 +39,11 @@ import scipy
 SPEED_RANGE = (0.0, 5.0)  # range of m v^2 / 2 kT
 HEIGHT_RANGE = (1.0, 5.0)  # range of m g h / kT
 BLOCKS = 10  # blocks of time, for errors
-CROWDED = 0.5  # share of the area at the floor up to which the first order is used
+CROWDED = 0.5  # excluded fraction of the area at the floor up to which the first order is used
 
 
 class Samples(NamedTuple):
-    """Samples of one species in F frames: (F, n) squared speeds, their x part, and heights."""
+    """Samples of one species in F frames, (F, n): squared speeds, their x parts, and heights."""
 
     mass: float
     radius: float
@@ -52,14 +53,14 @@ class Samples(NamedTuple):
 
 
 def samples(run: Run, kind: Species, frames: list[int]) -> Samples:
-    """Return squared speeds, and heights above the lowest position."""
+    """Return squared speeds of a species and its heights above the lowest position of a centre."""
     squares = run.velocity[frames][:, kind.disks] ** 2
     height = run.position[frames][:, kind.disks, 1] - (run.lower[1] + kind.radius)
     return Samples(kind.mass, kind.radius, squares.sum(axis=2), squares[..., 0], height)
 
 
 def log_slope(values: np.ndarray, limits: tuple[float, float], bins: int = 30) -> float:
-    """Return the decay constant of a histogram, by a weighted line through its logarithm."""
+    """Return the decay constant of a histogram from a weighted line fitted to its logarithm."""
     counts, edges = np.histogram(values, bins, limits)
     good = counts >= 5
     if good.sum() < 3:
@@ -69,12 +70,12 @@ def log_slope(values: np.ndarray, limits: tuple[float, float], bins: int = 30) -
 
 
 def sharers(run: Run) -> float:
-    """Return how many disks share a fixed energy: infinitely many in contact with a heat bath."""
+    """Return the number of disks that share a fixed total energy; infinity with a heat bath."""
     return run.n_disks if run.nature.keeps_energy else np.inf
 
 
 def sharing(energy: np.ndarray, temperature: float, count: float) -> np.ndarray:
-    """Return the weight of an energy of one disk among `count` that share a fixed energy."""
+    """Return the weight of an energy of one disk if `count` disks share a fixed total energy."""
     if np.isinf(count):
         return np.exp(-energy / temperature)
     return np.maximum(1 - energy / (2 * count * temperature), 0) ** (2 * count - 2)
@@ -83,15 +84,16 @@ def sharing(energy: np.ndarray, temperature: float, count: float) -> np.ndarray:
 def crowded_heights(
     height: np.ndarray, species: list[Samples], pull: float, kt: float, width: float, share: float
 ) -> list[np.ndarray]:
-    """Return densities at the heights (H,), with the area that disks exclude for each other.
+    """Return the densities at the heights (H,) with the excluded area to first order.
 
-    `width` is that of the box for centres, `share` is from `sharers`.  No disk excludes itself.
+    `width` is the width of the box that is accessible to centres, and `share` is the result of
+    `sharers`.  A disk excludes no area for its own centre.
     """
     numbers = [s.height.shape[1] for s in species]
     ideal = [sharing(s.mass * pull * height, kt, share) for s in species]
     density = [normalised(height, weight) for weight in ideal]
     for _ in range(50):
-        taken = [  # area per height, by the other disks from one of each species
+        taken = [  # area per height that the other disks exclude for one disk of each species
             sum(
                 np.pi * (one.radius + s.radius) ** 2 * (numbers[j] - (i == j)) * density[j]
                 for j, s in enumerate(species)
@@ -104,7 +106,7 @@ def crowded_heights(
 
 
 def normalised(x: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Scale a density to the integral 1."""
+    """Return a density that is normalised to the integral 1."""
     return weight / np.trapezoid(weight, x)
 
 
@@ -116,14 +118,14 @@ def law_slope(x: np.ndarray, density: np.ndarray, limits: tuple[float, float], c
 
 
 def crowding(run: Run, species: list[Samples], kt: float) -> float:
-    """Return the largest share of the area at the floor that disks exclude for one another."""
+    """Return the largest fraction of the area at the floor that is excluded for a species."""
     radius, pull = np.array([(s.radius, s.height.shape[1] * s.mass) for s in species]).T
     taken = np.pi * np.add.outer(radius, radius) ** 2 @ pull * abs(run.gravity[1]) / kt
     return float(taken.max() / (run.edges[0] - 2 * radius[0]))
 
 
 def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Return all heights that a disk can have, and the densities of `crowded_heights`, or NaN."""
+    """Return the accessible heights and the densities of `crowded_heights` (NaN without a law)."""
     free = run.edges - 2 * species[0].radius
     grid = np.linspace(0, free[1], 4001)
     if crowding(run, species, kt) > CROWDED:
@@ -132,7 +134,7 @@ def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, li
 
 
 def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[dict]:
-    """Return fitted slopes over those of the exponential laws and of the dashed laws."""
+    """Return the fitted slopes divided by those of the exponential laws and of the dashed laws."""
     temperature = kt[0]
     grid, crowded = heights(run, species, temperature)
     rows = []
@@ -157,7 +159,7 @@ def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[d
 
 
 def draw_histogram(panels, values: np.ndarray, top: float, colour: str, label: str) -> None:
-    """Draw a normalised histogram in a linear and a logarithmic panel; errors by blocks."""
+    """Draw a normalised histogram in a linear and a logarithmic panel, with errors from blocks."""
     bins = np.linspace(0, top, 51)
     blocks = np.array_split(values, min(BLOCKS, len(values)))
     parts = [binned(part.ravel(), bins).mean for part in blocks]
@@ -167,15 +169,15 @@ def draw_histogram(panels, values: np.ndarray, top: float, colour: str, label: s
 
 
 def draw(run: Run, species: list[Samples], result: list[dict], began: tuple) -> plt.Figure:
-    """Draw squared speeds above and heights below; linear left, logarithmic right.
+    """Draw squared speeds above and heights below, linear on the left and logarithmic on the right.
 
-    `began` is the time of the first frame, and why those before it are left out.
+    `began` is the time of the first frame and the reason why earlier frames are left out.
     """
     figure, panels = plt.subplots(2, 2, figsize=(11, 8), sharex="row")
     kt, g = result[0]["kT"], float(np.abs(run.gravity[1]))
     squares = np.linspace(0, 18 * kt / min(s.mass for s in species), 1000)
     (grid, crowded), count = heights(run, species, kt), sharers(run)
-    lawful = 1 + 0 * crowded[0]  # without one law of the heights the other does not hold either
+    lawful = 1 + 0 * crowded[0]  # both laws of the heights apply under the same condition
     for k, (s, row, colour) in enumerate(zip(species, result, colours(len(species)), strict=True)):
         v_law, h_law = s.mass / (2 * kt), s.mass * g / kt
         shared = sharing(0.5 * s.mass * squares, kt, count) * v_law * (1 - 0.5 / count)
@@ -234,11 +236,11 @@ def main() -> None:
     args = command_line(__doc__, "gravity.png", one=True, equilibration=None).parse_args()
     (run,) = args.runs
     known = "walls", "gravity", "mixture", "thermal_walls", "thermostatted", "time_stepped"
-    allow(run, "it follows no exponential laws", *known)
+    allow(run, "the exponential laws do not apply to it", *known)
     start, reason = thermodynamics.explained_start(run, args.equilibration)
     frames = thermodynamics.frames_from(run, start)
     if not run.gravity[1]:
-        raise Refused(f"{run.path}: has no gravity along y; it follows no law of heights")
+        raise Refused(f"{run.path}: has no gravity along y; the laws of heights do not apply")
     if not frames:
         raise RunError(f"{run.path}: needs frames in equilibrium")
     species = [samples(run, kind, frames) for kind in thermodynamics.kinds_of_disks(run)]

@@ -2,24 +2,27 @@
 
     python post/haff.py runs/haff/*.h5 -o haff.png --csv haff.csv
 
-Runs are combined by restitution xi.  The left panel has K against time in units of the first mean
-free time, with K0 / (1 + (1 - xi^2) w0 t / 4)^2 (Haff 1983); the right one K against collisions per
-disk, with an exponential (van Noije and Ernst 1998).  The ratios of K to both laws are below.  Both
-laws hold while the gas stays homogeneous; later, flows carry energy and it decreases more slowly.
-Boxes are periodic, and the total momentum is 0.  w0 follows from the equation of state; for unequal
-disks it is measured by their first collisions, and both laws assume one temperature for all sizes,
+Runs are combined by restitution xi.  The left panel shows the kinetic energy K against time in
+units of the initial mean free time 1/w0, and Haff's law K0 / (1 + (1 - xi^2) w0 t / 4)^2 (Haff
+1983).  The right panel shows K against collisions per disk, and an exponential law (van Noije and
+Ernst 1998).  The lower panels show the ratios of K to both laws.  Both laws apply while the gas is
+homogeneous.  Later a part of K is the energy of flows, and K decreases more slowly. The boxes must
+be periodic with a total momentum of 0.  w0 follows from the equation of state; for unequal disks it
+is measured from the first collisions.  Both laws assume that all species have the same temperature,
 which is wrong for very different masses.
 
-The cooling rate is -d ln K / d tau, tau the number of collisions per disk.  The homogeneous state
-ends where the rate, averaged over two collisions per disk and over the runs, stays below 90 % of
-the law.  Curves are pale from there on, and for several runs this tau is printed with its error.
-`rate` is the slope of a line through ln K from tau = 2 on until half of that end, or until the end
-of a run without one; its error is from the scatter of the runs.
+The cooling rate is -d ln K / d tau, where tau is the number of collisions per disk.  The
+homogeneous state ends where the rate, averaged over two collisions per disk and over the runs,
+stays below 90 % of the law.  Beyond this tau the curves are pale; for several runs its value is
+printed with an error. `rate` is the slope of a line fitted to ln K from tau = 2 to half of the tau
+at which the homogeneous state ends, or to the end of the run if it stays homogeneous.  Its error
+follows from the scatter of the runs.
 
-Soft disks (contact.restitution_law) follow another law, for Maxwell's velocities (docs/theory.md).
-Instead of the rate the table has the `exponent` of K ~ t^-p in the last decade of time, which tends
-to 5/3.  A note says by how much a slightly smaller rate changes K if K ends more than 10 % from the
-law in a run without an end of the homogeneous state.
+Disks with velocity-dependent restitution (contact.restitution_law) follow another law, which
+assumes Maxwell's velocities (docs/theory.md).  For these the table contains, instead of the rate,
+the `exponent` p of K ~ t^-p in the last decade of time, which tends to 5/3.  If K differs from the
+law by more than 10 % at the end of a run that stays homogeneous, a note states by how much a
+slightly smaller rate would change K.
 """
 
 from ricochet import Run
@@ -33,11 +36,11 @@ from ricochet.script import by_restitution, command_line, launch, measured, repo
 
 import numpy as np
 
-RATIO_TOP = 2.0  # largest top of the axis of ratios
+RATIO_TOP = 2.0  # largest upper limit of the axis of ratios
 
 
 def draw(runs: list[Run], groups: list, results: list) -> plt.Figure:
-    """Draw K against time and against collisions, and the ratios to the laws below."""
+    """Draw K against time and against collisions above, and the ratios of K to the laws below."""
     figure, panels = plt.subplots(
         2, 2, sharex="col", sharey="row", figsize=(10, 7), height_ratios=(2, 1)
     )
@@ -60,7 +63,7 @@ def draw(runs: list[Run], groups: list, results: list) -> plt.Figure:
         panels[0, 1].plot([], [], color=colour, label=label)
     laws = "Haff 1983", "van Noije and Ernst 1998"
     if any(xi.law != "constant" for xi, _ in groups):
-        laws = ("law, of soft disks for Maxwell's velocities",) * 2
+        laws = ("law for viscoelastic disks and Maxwell's velocities",) * 2
     for axes, law in zip(panels[0], laws, strict=True):
         axes.plot([], [], color="black", ls="--", lw=1, label=law)
     floor = min(found["K_by_time"].mean.min() for found, *_ in results)
@@ -78,7 +81,7 @@ def draw(runs: list[Run], groups: list, results: list) -> plt.Figure:
 
 
 def energies(groups: list, results: list) -> list[dict]:
-    """Return the energies after 5, 10 and 20 collisions per disk, as far as the runs go."""
+    """Return the energies after 5, 10 and 20 collisions per disk, as far as the runs reach."""
     rows = []
     for (xi, members), (found, *_) in zip(groups, results, strict=True):
         reached = found["collisions_per_disk"]
@@ -93,14 +96,14 @@ def energies(groups: list, results: list) -> list[dict]:
 
 
 def expected(law: Restitution, found: dict) -> tuple[str, float]:
-    """Return the predicted cooling rate, or the exponent of soft disks in the same period."""
+    """Return the predicted cooling rate, or for viscoelastic disks the predicted exponent."""
     if law.law == "constant":
         return "rate", haff_rate(law.xi)
     return "exponent", exponent(found["w0_t"], found["haff"])
 
 
 def rates(groups: list, results: list) -> list[dict]:
-    """Return the cooling rate with its prediction, and the end of the homogeneous state."""
+    """Return the cooling rate, its prediction, and the end of the homogeneous state."""
     return [
         {
             "restitution": xi.name,
@@ -114,7 +117,7 @@ def rates(groups: list, results: list) -> list[dict]:
 
 
 def apart(xi: Restitution, found: dict, end: float) -> list[str]:
-    """Return how far a rate slightly below the law carries K from it by the end of a run."""
+    """Return the final ratio of K to the law that a slightly smaller cooling rate causes."""
     ratio, tau = found["K"].mean[-1] / found["law"][-1], found["collisions_per_disk"][-1]
     if not np.isnan(end) or abs(ratio - 1) < 1 - SLOW:
         return []

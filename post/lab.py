@@ -1,12 +1,12 @@
-"""The laboratory: a page where disks move, and where what acts on them can be changed.
+"""Laboratory: an interactive page that shows running simulations and changes their parameters.
 
     python post/lab.py                 the inputs of the folder input/
-    python post/lab.py my.nml          and one of your own
+    python post/lab.py my.nml          and your own input file
 
-Choose an input, move sliders, and the disks follow at once; speeds, energies and pressure stand
-beside them.  Runs can be kept side by side, and taken along: as input file, script, and as a file
-that the program goes on from.  The page is at an address that is printed, until
-Ctrl-C; everything ends with it.
+Choose an input and move sliders: the simulation responds at once.  The page also plots speeds,
+energies and pressure.  Several runs can be shown side by side.  A run can be downloaded as an input
+file, as a script, and as an output file from which the program continues.  The script prints the
+address of the page and serves it until Ctrl-C, which also ends all simulations.
 """
 
 import asyncio
@@ -24,7 +24,7 @@ from ricochet.script import Parser, launch
 
 from aiohttp import web
 
-#: A worker, which finds the player's module where this one is.
+# : Program of a worker process; the module `player` is in the folder of this file.
 WORKER = """import sys; sys.path[:0] = [{!r}]
 from player import scene
 from ricochet.pages.worker import work
@@ -32,7 +32,7 @@ work(scene)"""
 
 
 def routes(lab: Lab) -> dict:
-    """Return the function that answers at each address."""
+    """Return the function that answers the requests for each address."""
     data = {"table": lab.table, "inputs": chooser([*lab.inputs.values()])}
 
     async def formed(request: web.Request) -> web.Response:
@@ -50,7 +50,7 @@ def routes(lab: Lab) -> dict:
 
 
 async def open_lab(lab: Lab, port: int, visit: bool) -> None:
-    """Serve until a signal comes."""
+    """Serve the page until a signal arrives."""
     lab.prepare()
     try:
         async with serving(application(routes(lab), frames="'self'"), port) as (address, stop):
@@ -65,7 +65,7 @@ async def open_lab(lab: Lab, port: int, visit: bool) -> None:
 def port(text: str) -> int:
     """Parse a port number."""
     if not text.isdecimal() or int(text) > 65535:
-        raise ArgumentTypeError(f"'{text}' is not a port: 0 (any that is free) to 65535")
+        raise ArgumentTypeError(f"'{text}' is not a port: allowed are 0 (any free port) to 65535")
     return int(text)
 
 
@@ -75,19 +75,20 @@ def main() -> None:
     parser.add_argument("inputs", nargs="*", type=Path, metavar="INPUT.nml", help="more inputs")
     opened = "open the page in your browser [no]"
     parser.add_argument("--open", action=BooleanOptionalAction, help=opened)
-    parser.add_argument("--port", type=port, default=0, metavar="N", help="the port [a free one]")
-    more = "a folder whose files inputs may name, too"
+    parser.add_argument("--port", type=port, default=0, metavar="N", help="port of the server "
+        "[any free port]")
+    more = "further folder from which inputs may read files"
     parser.add_argument("--files", type=Path, action="append", default=[], metavar="DIR", help=more)
     args = parser.parse_args()
     for path in args.inputs:
         if path.suffix != ".nml" or not path.is_file():
-            raise RunError(f"{path}: is no input file, whose name ends in .nml")
-    names = {path.stem for path in args.inputs}  # a name counts once
+            raise RunError(f"{path}: is not an input file; the name must end in .nml")
+    names = {path.stem for path in args.inputs}  # each name is listed once
     inputs = [path for path in sorted(INPUTS.glob("*.nml")) if path.stem not in names]
     folders = [INPUTS, *(path.parent for path in args.inputs), *args.files]
     command = [sys.executable, "-c", WORKER.format(str(Path(__file__).parent))]
     asyncio.run(open_lab(Lab(args.inputs + inputs, folders, command), args.port, args.open))
-    print("stopped, with all runs")
+    print("stopped the server and all runs")
 
 
 if __name__ == "__main__":

@@ -2,13 +2,14 @@
 
     python post/lyapunov.py runs/pairs/*.h5 -o lyapunov.png --csv lyapunov.csv
 
-Takes the runs two by two in the order given: the same experiment started twice, almost at the same
-point, with frames at the same times.  The distance of a pair is that of all positions, through
-periodic sides too.  It grows as exp(lambda t) until it is as large as the billiard; a straight line
-is fitted to its logarithm for each pair, over a time that is the same for all: it ends when the
-first pair is --largest apart, and begins at the share --fit-from of that time (before, the
-separation turns into the direction that grows).  lambda is the mean of the slopes, with its error.
-A gas that cools has no such rate.
+The runs are paired in the given order.  The two runs of a pair start from almost the same state and
+have frames at the same times.  Their distance is the Euclidean distance of the positions of all
+disks, with the nearest images at periodic sides.  This distance grows as exp(lambda t) until it
+reaches the size of the billiard.  A straight line is fitted to its logarithm for each pair, in the
+same interval of time for all pairs.  The interval ends when the first pair reaches the distance
+--largest and begins at the fraction --fit-from of that time.  Before, the separation still turns
+into the direction of fastest growth.  lambda is the mean of the slopes, with its error. Gases that
+cool are refused, because they have no constant rate of divergence.
 """
 
 from typing import NamedTuple
@@ -24,7 +25,7 @@ import numpy as np
 
 
 class Divergence(NamedTuple):
-    """Logarithms of the distances of pairs, and lines through them from `begin` to `end`."""
+    """Logarithms of the distances of pairs, and lines fitted to them from `begin` to `end`."""
 
     time: np.ndarray  # (T,)
     logarithm: np.ndarray  # (P, T)
@@ -35,7 +36,7 @@ class Divergence(NamedTuple):
 
 
 def distance(one: Run, other: Run) -> np.ndarray:
-    """Return the distance (T,) of two runs in the space of the positions of all disks."""
+    """Return the Euclidean distance (T,) of two runs in the space of all positions."""
     frames = min(one.n_frames, other.n_frames)
     if one.n_disks != other.n_disks or not np.array_equal(one.time[:frames], other.time[:frames]):
         raise RunError(f"{other.path}: not the same disks at the same times as in {one.path}")
@@ -44,14 +45,18 @@ def distance(one: Run, other: Run) -> np.ndarray:
 
 
 def divergence(time: np.ndarray, apart: np.ndarray, largest: float, begin: float) -> Divergence:
-    """Fit the distances (P, T) of P pairs; `begin` is a share of the time up to `largest`."""
+    """Fit the distances (P, T) of P pairs.
+
+    `begin` is a fraction of the time at which a distance reaches `largest`.
+    """
     with np.errstate(divide="ignore"):
         logarithm = np.log(apart)
     far = np.any(apart > largest, axis=0)
     last = int(np.argmax(far)) if far.any() else len(time)
     first = int(np.ceil(begin * last))
     if last - first < 3 or not np.all(np.isfinite(logarithm[:, first:last])):
-        raise RunError("nothing to fit: starts equal or too far apart, or too few frames")
+        raise RunError("no fit is possible: the starts are equal or too far apart, or there are "
+            "too few frames")
     fitted = time[first:last]
     slope = np.polyfit(fitted, logarithm[:, first:last].T, 1)[0]
     ends = float(fitted[0]), float(fitted[-1])
@@ -59,7 +64,7 @@ def divergence(time: np.ndarray, apart: np.ndarray, largest: float, begin: float
 
 
 def draw(found: Divergence, units: Units) -> plt.Figure:
-    """Draw each pair thin, and their geometric mean thick with the fitted line."""
+    """Draw each pair as a thin line, and the geometric mean thick with the fitted line."""
     figure, axes = plt.subplots(figsize=(7, 5))
     for track in found.logarithm:
         axes.semilogy(found.time, np.exp(track), color=COLOURS[0], lw=0.6, alpha=0.4)
@@ -80,16 +85,18 @@ def draw(found: Divergence, units: Units) -> plt.Figure:
 def main() -> None:
     parser = command_line(__doc__, "lyapunov.png")
     parser.set_defaults(paired=True)
-    parser.add_argument("--largest", type=float, default=0.01, help="distance at the end [0.01]")
+    parser.add_argument("--largest", type=float, default=0.01, help="distance at which the fit "
+        "ends [0.01]")
     parser.add_argument(
-        "--fit-from", type=float, default=0.2, metavar="SHARE", help="of the time [0.2]"
+        "--fit-from", type=float, default=0.2, metavar="SHARE", help="fraction of that time at "
+            "which the fit begins [0.2]"
     )
     args = parser.parse_args()
     if len(args.runs) % 2:
-        raise RunError(f"{len(args.runs)} runs: not pairs")
+        raise RunError(f"{len(args.runs)} runs: an even number is required")
     for run in args.runs:
         fading = {"changed", "collapsed", *({"inelastic"} if run.nature.cooling else ())}
-        allow(run, "it has no one rate of divergence", *TRAITS.keys() - fading)
+        allow(run, "its rate of divergence is not constant", *TRAITS.keys() - fading)
     apart = [distance(*pair) for pair in zip(args.runs[::2], args.runs[1::2], strict=True)]
     frames = min(map(len, apart))
     apart = np.array([track[:frames] for track in apart])

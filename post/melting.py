@@ -2,12 +2,13 @@
 
     python post/melting.py runs/melting/*/*.h5 -o melting.png --csv melting.csv
 
-P* = P d^2 / kT by the virial, d the diameter, in equilibrium: from where nothing drifts any more,
-or after --equilibration.  Equal disks, periodic boxes.  Between liquid (to 0.700) and hexatic (from
-0.716) both are there, at P* = 9.185.  In a finite box the pressure has a loop instead, made by the
-line between the two, which flattens as N grows.  For comparison: Engel et al., Phys. Rev. E 87,
-042134 (2013); N = 128^2: Li et al., J. Chem. Phys. 157, 234111 (2022).  Memory is long here: mind
-the warnings.
+P* = P d^2 / kT follows from the virial, where d is the diameter.  It is a mean in equilibrium,
+which begins after --equilibration or, without that option, when no observable drifts any longer.
+The disks must be equal and the box periodic.  Between the packing fractions 0.700 and 0.716 liquid
+and hexatic phase coexist at P* = 9.185.  In a finite box the pressure has a loop instead, which is
+caused by the interface between the phases and flattens as N grows.  For comparison: Engel et al.,
+Phys. Rev. E 87, 042134 (2013); N = 128^2: Li et al., J. Chem. Phys. 157, 234111 (2022).
+Correlation times are long near melting, so that the warnings about errors are important.
 """
 
 from ricochet import Run
@@ -34,7 +35,7 @@ def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
 
 
 def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
-    """Draw points with error bars, and published values as lines."""
+    """Draw the measured points with error bars and the published values as lines."""
     figure, axes = plt.subplots(figsize=(8, 5.5))
     for (name, points), style in zip(MELTING.items(), (":", "--", "-"), strict=True):
         axes.plot(*np.transpose(points), ls=style, color="0.4", lw=1, label=name)
@@ -53,7 +54,7 @@ def main() -> None:
     for run in args.runs:
         allow(
             run,
-            "melting is that of equal disks in a periodic box",
+            "the melting curve is for equal disks in a periodic box",
             "thermostatted",
             "rough",
             "rotating",

@@ -1,25 +1,26 @@
-"""How many collisions do time steps miss?
+"""Fraction of collisions that time-stepped runs miss.
 
     python post/missed.py runs/gravity/rates/*.h5 -o missed.png --csv missed.csv
 
-Needs event-driven runs, and runs by time steps with the same seeds.  For each step dt: the share of
-pair collisions that is missing against the event-driven run of the same seed, after the first
---equilibration collisions per disk, averaged over the seeds; and the share expected from the rule.
-With a single pair of runs the error is from the fluctuations of both collision rates in time, which
-are larger than the share that small steps miss: take several seeds.
+The script requires event-driven runs and time-stepped runs with the same seeds.  For each time step
+dt it computes the fraction of pair collisions that are missing relative to the event-driven run of
+the same seed.  The first --equilibration collisions per disk are left out, and the fraction is
+averaged over the seeds.  It is compared with the fraction expected from the rule below. With a
+single pair of runs the error follows from the fluctuations of both collision rates in time.  These
+exceed the fraction that small steps miss: use several seeds.
 
 Two disks with the relative speed g and the impact parameter b overlap on a chord of length 2 l,
-l = sqrt(s^2 - b^2), s their diameter.  They approach on its first half only, for the time l / g:
-noticed later they recede already and do not collide.  Steps come at any phase, so a collision is
-missed with the probability 1 - l / (g dt) if that is positive.  With b uniform in -s..s and
-q = g dt / s the mean is
+l = sqrt(s^2 - b^2), where s is their diameter.  They approach on the first half of the chord only,
+for the time l / g.  An overlap that is detected later is ignored, because the disks already
+separate.  The phase of the steps is random, so that a collision is missed with the probability 1 -
+l / (g dt) if that is positive.  With b uniform in -s..s and q = g dt / s the mean is
 
     P(q) = 1 - sqrt(1 - q^2) - (asin q - q sqrt(1 - q^2)) / (2 q)    for q < 1,
     P(q) = 1 - pi / (4 q)                                            beyond; q^2 / 6 for small q.
 
-Colliding pairs have relative speeds of density ~ g^2 exp(-mu g^2 / 2 kT), mu their reduced mass;
-pairs of species i and j collide at a rate ~ N_i N_j / (h_i + h_j) / sqrt(mu), where h = kT / (m g)
-are their scale heights.
+The relative speeds of colliding pairs have a density ~ g^2 exp(-mu g^2 / 2 kT) with the reduced
+mass mu; pairs of species i and j collide at a rate ~ N_i N_j / (h_i + h_j) / sqrt(mu), where h = kT
+/ (m g) are their scale heights.
 """
 
 from itertools import combinations_with_replacement
@@ -37,7 +38,7 @@ SPEEDS = np.linspace(0, 12, 2001)  # in units of sqrt(kT / mu)
 
 
 def missed_share(q: np.ndarray) -> np.ndarray:
-    """Return P(q), the share of collisions missed at the relative speed g, q = g dt / s."""
+    """Return P(q), the fraction of collisions missed at the relative speed g, with q = g dt / s."""
     q = np.asarray(q, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         short = np.minimum(q, 1)
@@ -48,7 +49,7 @@ def missed_share(q: np.ndarray) -> np.ndarray:
 
 
 def expected_share(run: Run, step: float, temperature: float) -> float:
-    """Return P averaged over all kinds of pairs of a dilute gas in equilibrium."""
+    """Return the mean of P over all pairs of species of a dilute gas in equilibrium."""
     shares, rates = [], []
     pull = float(np.linalg.norm(run.gravity))
     for a, b in combinations_with_replacement(kinds_of_disks(run), 2):
@@ -62,7 +63,7 @@ def expected_share(run: Run, step: float, temperature: float) -> float:
 
 
 def rate_and_temperature(run: Run, skip: float | None) -> tuple[SeriesMean, float]:
-    """Return pair collisions per disk and time, and kT, in equilibrium."""
+    """Return the pair collisions per disk and time and the temperature kT in equilibrium."""
     time, tau = run.collisions_per_disk
     first = int(np.searchsorted(time, start_of_equilibrium(run, skip)))
     if first >= len(time) - 1:
@@ -72,9 +73,10 @@ def rate_and_temperature(run: Run, skip: float | None) -> tuple[SeriesMean, floa
 
 
 def missed_of_pairs(rates: list[SeriesMean], exact: list[SeriesMean]) -> Estimate:
-    """Return the share of collisions that time steps miss, over pairs of runs of one seed.
+    """Return the fraction of collisions that time steps miss, from pairs of runs of one seed.
 
-    Its error is over the pairs; of a single pair it is from the fluctuations of both rates.
+    The error follows from the scatter of the pairs or, for a single pair, from the fluctuations of
+    both rates.
     """
     shares = [1 - one.mean / other.mean for one, other in zip(rates, exact, strict=True)]
     if rates == exact:
@@ -86,10 +88,10 @@ def missed_of_pairs(rates: list[SeriesMean], exact: list[SeriesMean]) -> Estimat
 
 
 def compare(runs: list[Run], skip: float | None) -> list[dict]:
-    """Return a row for each time step, in percent; event-driven runs come first, with dt = 0."""
+    """Return a row for each time step, in percent, after the event-driven runs (dt = 0)."""
     groups = grouped(runs, lambda run: run.time_step)
     if groups[0][0] != 0 or len(groups) < 2:
-        raise RunError("event-driven runs and runs by time steps are needed")
+        raise RunError("event-driven and time-stepped runs are required")
     exact = {run.seed: rate_and_temperature(run, skip)[0] for run in groups[0][1]}
     rows = []
     for step, members in groups:
@@ -108,14 +110,14 @@ def compare(runs: list[Run], skip: float | None) -> list[dict]:
 
 
 def draw(runs: list[Run], rows: list[dict]) -> plt.Figure:
-    """Draw the missed share against dt, measured and expected."""
+    """Draw the measured and the expected fraction of missed collisions against dt."""
     figure, axes = plt.subplots(figsize=(6.5, 4.5))
     names = ("dt", "missed_percent", "missed_percent_error")
     dt, share, error = (np.array([row[name] for row in rows[1:]]) for name in names)
     kt, size = float(np.mean([row["kT"] for row in rows[1:]])), rows[1]["runs"]
     curve = np.geomspace(dt.min() / 1.5, dt.max() * 1.5, 50)
     expected = [100 * expected_share(runs[0], step, kt) for step in curve]
-    label = "expected: noticed only after the closest approach"
+    label = "expected: overlap detected after the closest approach"
     axes.plot(curve, expected, color="black", lw=1.2, label=label)
     label = f"measured, {size} pair{'s' * (size > 1)} of runs"
     style = {"ls": "", "marker": "o", "color": COLOURS[0], "capsize": 3, "label": label}
@@ -133,7 +135,7 @@ def main() -> None:
     rows = compare(args.runs, args.equilibration)
     seeds = {run.seed for run in args.runs if run.time_step == 0}
     alone = ", ".join(str(run.path) for run in args.runs if run.seed not in seeds)
-    notes = [f"left out, as no event-driven run has their seeds: {alone}"] if alone else []
+    notes = [f"left out, because no event-driven run has the same seed: {alone}"] if alone else []
     report(args, draw(args.runs, rows), rows, notes=notes)
 
 

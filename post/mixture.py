@@ -1,13 +1,14 @@
-"""A mixture before and in equilibrium: speeds per species, mean speed and mean energy.
+"""Speeds, mean speed and mean energy of each species of a mixture, initially and in equilibrium.
 
     python post/mixture.py runs/mixture/*.h5 -o mixture.png --csv mixture.csv
 
-Equilibrium is found, or begins after --equilibration; it takes the frames of --frames that are at
-least --min-separation collisions per disk from each other.  Errors are those over the runs (of a
-single run: from the autocorrelation over its frames). Theory: each species has <K> = kT and <v> =
-sqrt(pi kT / 2 m); in a periodic box <K> is smaller by the share of the disk in the mass of all.  kT
-is exact where the kinetic energy is kept; where walls or kicks heat, or disks turn, it is the mean
-over all disks in equilibrium, with its error.
+Equilibrium begins after --equilibration or, without that option, when no observable drifts any
+longer.  Of the frames selected by --frames only those are used that are at least --min-separation
+collisions per disk apart.  Errors follow from the scatter of the runs or, for a single run, from
+the autocorrelation over its frames.  In theory each species has <K> = kT and <v> = sqrt(pi kT / 2
+m).  In a periodic box <K> is smaller by the ratio of the disk's mass to the total mass.  kT is
+exact if the kinetic energy is conserved.  With thermal walls, driving or rotation it is the
+measured mean over all disks in equilibrium, with an error.
 """
 
 from ricochet import Run
@@ -31,13 +32,13 @@ BINS = 60  # bins of a histogram
 
 
 def pooled(runs: list[Run], frames: list[list[int]], name: str) -> np.ndarray:
-    """Return all speeds of a species in these frames."""
+    """Return the speeds of all disks of a species in these frames."""
     each = zip(runs, frames, strict=True)
     return np.concatenate([run.speed(k)[run.of_species(name)] for run, own in each for k in own])
 
 
 def table(runs: list[Run], frames: list[list[int]], skip: float | None = None) -> list[dict]:
-    """Return mean speed and energy of each species at the start and in equilibrium, and theory."""
+    """Return mean speed and energy of each species, initially and in equilibrium, with theory."""
     rows = []
     for kind in kinds_of_disks(runs[0]):
         name, mass = kind.name, kind.mass
@@ -65,7 +66,7 @@ def table(runs: list[Run], frames: list[list[int]], skip: float | None = None) -
 
 
 def speed_bins(start: np.ndarray, top: float) -> np.ndarray:
-    """Return about 60 bins up to `top`; a common first speed is the centre of a bin."""
+    """Return about 60 bins up to `top`; a common initial speed is the centre of a bin."""
     speed, width = float(np.mean(start)), top / BINS
     if 0 < speed < top and np.ptp(start) < 1e-9 * speed:
         width = speed / max(1, round(speed / width))
@@ -73,7 +74,7 @@ def speed_bins(start: np.ndarray, top: float) -> np.ndarray:
 
 
 def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Figure:
-    """Draw a row for each species: start and equilibrium."""
+    """Draw a row of two panels for each species: the start and equilibrium."""
     names = runs[0].names
     figure, panels = plt.subplots(
         len(names), 2, sharex=True, squeeze=False, figsize=(10, 3.2 * len(names))
@@ -117,12 +118,13 @@ def main() -> None:
     runs = args.runs
     for run in runs:
         if run.names != runs[0].names or len(run.names) < 2 or run.n_disks < 3:
-            what = "needs a mixture of three disks or more, the same in all runs; see speeds.py"
+            what = "needs a mixture of at least three disks, the same in all runs; see speeds.py"
             raise Refused(f"{run.path}: {what}")
-        allow(run, "its species do not come to one temperature", *SETTLED)
+        allow(run, "its species do not reach a common temperature", *SETTLED)
         tracks = [run.observable(f"{name}/kinetic_energy").value for name in run.names]
         if not any(np.ptp(track) > 1e-9 * np.max(track) for track in tracks):
-            raise Refused(f"{run.path}: its species have not met: each has the energy of its start")
+            raise Refused(f"{run.path}: its species have not collided with each other: each still "
+                "has its initial energy")
     frames = [late_frames(run, args) for run in runs]
     result = table(runs, frames, args.equilibration)
     report(args, draw(runs, frames, result), result)

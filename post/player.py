@@ -1,19 +1,20 @@
-"""Make a film to play with: one HTML file, which any browser opens, without a network.
+"""Write an interactive film: one HTML file, which any browser opens without a network.
 
     python post/player.py runs/gas.h5 -o gas.html
     python post/player.py runs/crater.h5 --colour displacement
-    python post/player.py runs/brownian.h5 --disks 2001       with the trace of a disk
-    python post/player.py runs/gas.h5.part --live             while the run goes on
+    python post/player.py runs/brownian.h5 --disks 2001       with the trace of one disk python
+    post/player.py runs/gas.h5.part --live             while the run continues
 
-Disks of true size with walls and obstacles, in true time: between two frames they fly along their
-paths, and colours, energies and counts follow them, if the run has an event log; else the film
-shows frames.  Play, step to the next frame, or event of the log, speed, zoom;
-colour by species, speed, displacement or collisions; a click on a disk shows its trace, and the
-camera follows it; speeds, energies, and for up to 20 disks the events to come.  Without --count a
-film has as many frames, evenly spread, as fit into 30 MB.
+The film shows disks, walls and obstacles to scale.  If the run has an event log, disks move along
+their exact paths between frames, and colours, energies and numbers of collisions change at each
+event.  Without an event log the film shows frames only.  The controls play, step to the next frame
+or event, set the speed, and zoom.  Disks are coloured by species, speed, displacement or
+collisions.  A click on a disk shows its trace, and the camera follows the disk.  Panels show
+speeds, energies and, for up to 20 disks, the next events.  Without --count a film has as many
+evenly spread frames as fit into 30 MB.
 
---live shows a run on this computer, at an address that is printed, until the run ends.  --open
-opens what is shown in the browser.
+--live serves a page that follows a running simulation on this computer until the run ends, and
+prints its address.  --open opens the film or that page in the browser.
 """
 
 import base64
@@ -44,19 +45,19 @@ SCRIPTS = ("film", "camera", "stage", "panels", "controls", "stream", "live")
 SWING = ("amplitude", "period", "phase")  # variables of an oscillating side
 STROKE = ("velocity", "start_time", "end_time")
 LAWS = ("motion", *SWING, *STROKE, "temperature", "surface_velocity")
-ROOM = 29e6  # bytes of base64 for the disks
-LIVE_ROOM = 6e6  # the same of a film that is renewed while its run goes on
-TURN = (16 + 8) * 4 / 3  # bytes of a turn of a disk between two frames, and of half an event
+ROOM = 29e6  # largest size of the data of the disks [bytes of base64]
+LIVE_ROOM = 6e6  # the same for the film of an unfinished run, which is sent repeatedly
+TURN = (16 + 8) * 4 / 3  # bytes per velocity change between two frames, and per half of an event
 MOST_FRAMES = 20000
-MOST_RADII = 256  # different radii in a film
-FEW_DISKS = 20  # up to here every digit is in the page, and the events to come
-MOST_SAMPLES = 2000  # samples of a plot
+MOST_RADII = 256  # largest number of different radii in a film
+FEW_DISKS = 20  # most disks to show all digits and next events
+MOST_SAMPLES = 2000  # largest number of samples of a plot
 ENERGIES = ("kinetic", "potential", "rotational")
-MOST_AT_ONCE = 200000  # disks of the frames that are read together
+MOST_AT_ONCE = 200000  # number of disks, over all frames, that are read together
 
 
 def frames_that_fit(run: Run, room: float) -> int:
-    """Return how many frames the file can hold.
+    """Return the number of frames that fit into the file.
 
     Each disk needs two 16-bit positions and velocities, 8 bits of collisions, 32 bits of an angle.
     Up to half of the size is for collisions between frames.
@@ -64,13 +65,13 @@ def frames_that_fit(run: Run, room: float) -> int:
     more = (run.event_count is not None) + (run.image is not None)
     more += 4 * ("orientation" in run.disk_data)
     one = run.n_disks * (8 + more) * 4 / 3
-    fixed = run.n_disks * (2 + 1 + 4 + 8) * 4 / 3  # species, size, mass and origin
+    fixed = run.n_disks * (2 + 1 + 4 + 8) * 4 / 3  # for species, size, mass and first position
     turns = 0 if run.event_count is None else TURN * float(run.event_count[-1].sum())
     return int(np.clip((room - fixed - min(turns, room / 2)) / (one + 50), 2, MOST_FRAMES))
 
 
 def quantities(run: Run) -> list[str]:
-    """Return the quantities that can colour disks, besides their species."""
+    """Return the quantities other than the species by which disks can be coloured."""
     return ["speed", "displacement"] + ["collisions"] * (run.event_count is not None)
 
 
@@ -95,7 +96,7 @@ def sides(run: Run) -> list[dict]:
 
 
 def thinned(count: int, most: int) -> np.ndarray:
-    """Return at most so many of the numbers 0 to `count` - 1, evenly spread."""
+    """Return the numbers 0 to `count` - 1, or at most a given number of them, evenly spread."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
 
@@ -107,11 +108,12 @@ def laws_of(run: Run, group: str) -> list[dict]:
 
 
 def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
-    """Return the arrays that change from frame to frame, of all disks, read in parts.
+    """Return the arrays that change from frame to frame for all disks; they are read in parts.
 
-    Positions are 16-bit integers in units of the visible region, velocities in units of the fastest
-    component in the frame; of few disks they keep every digit.  Collisions are places 0 to 255 on
-    their scale up to `top`; periods crossed along x and y since the last frame take four bits each.
+    Positions are stored as 16-bit integers in units of the visible region, velocities in units of
+    the largest component in the frame.  For few disks both are stored with all digits.  Collisions
+    are stored as values from 0 to 255 on a scale up to `top`.  The numbers of periods crossed along
+    x and y since the last frame are stored in four bits each.
     """
     found: dict[str, bytearray] = defaultdict(bytearray)
     at_once = max(1, MOST_AT_ONCE // run.n_disks)
@@ -139,15 +141,16 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
 
 
 def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[str, np.ndarray]]:
-    """Return collisions per disk in each frame, events and paths, from a log that is not too long.
+    """Return collisions per disk in each frame, events and paths, if the log is not too long.
 
-    Events are times and partners.  Each interval between frames has a number of collisions; each
-    collision has a disk, a share of the interval, and the velocity afterwards.
+    An event consists of its time and its two partners.  A path consists of velocity changes: their
+    number in each interval between frames, and for each of them the disk, the fraction of the
+    interval that has passed, and the new velocity.
     """
     exact, facts = run.n_disks <= FEW_DISKS, {"known": False, "events": False}
     try:
         log = run.event_log()
-    except RunError:  # a film needs no event log
+    except RunError:  # a film can be made without an event log
         facts["collisions"] = run.collisions_per_disk_at(run.time)[frames].tolist()
         return facts | {"note": "output.event_log tells the paths between"}, {}
     ends, pairs = seen(run, log, frames), np.append(0, np.cumsum(log.j > 0))
@@ -171,7 +174,7 @@ def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[st
 
 
 def species(run: Run) -> list[dict]:
-    """Return the common properties of the disks of each species."""
+    """Return the properties that all disks of a species share, for each species."""
     colours = [c if c != "#000000" else "#8a8a8a" for c in map(to_hex, COLOURS)]
     return [
         {
@@ -187,7 +190,7 @@ def species(run: Run) -> list[dict]:
 
 
 def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Return at most 256 different radii, and the number of the radius of each disk."""
+    """Return at most 256 different radii, and for each disk the index of its radius."""
     radii = np.unique(run.radius)
     if len(radii) > MOST_RADII:
         radii = np.geomspace(radii[0], radii[-1], MOST_RADII)
@@ -195,10 +198,10 @@ def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
 
 
 def curves(run: Run) -> dict:
-    """Return time, energies of each species and pressure, with as many samples as a plot can show.
+    """Return time, energies of each species and pressure, with as many samples as a plot shows.
 
-    Observables are more frequent than frames.  Missing values are None, and so is the pressure
-    before the first collision.
+    The values are observables, which are sampled more often than frames.  Missing values are None;
+    the pressure is None before the first collision.
     """
     series, found = {}, {}
     for name in (
@@ -228,9 +231,9 @@ def curves(run: Run) -> dict:
 
 
 def scene(run: Run) -> tuple[dict, dict]:
-    """Return the constant part of a film: box, obstacles, species, properties of disks.
+    """Return the constant data of a film: box, obstacles, species, properties of disks.
 
-    `run` may be any object with these attributes of a run.
+    `run` may be any object with the attributes of `Run` that are used here.
     """
     radii, own = radii_of(run)
     facts = {
@@ -247,7 +250,7 @@ def scene(run: Run) -> tuple[dict, dict]:
         "species": species(run),
         "radii": radii.tolist(),
         "surfaces": [
-            *(f"the {side} side" for side in SIDES),  # names of the partners j <= 0 in the log
+            *(f"the {side} side" for side in SIDES),  # names of partners j <= 0
             *(f"obstacle {k + 1}" for k in range(len(run.obstacles))),
             *(f"wall {k + 1}" for k in range(len(run.walls))),
         ],
@@ -267,12 +270,12 @@ def film(
     traced: list[int],
     room: float = ROOM,
 ) -> tuple[dict, dict]:
-    """Return the facts for the page, and the arrays that change as name -> bytes."""
+    """Return the values for the page, and the arrays that change as a dictionary name -> bytes."""
     tops = {name: scale_top(run, frames, name) for name in quantities(run)}
     told, blocks = told_by_log(run, frames, room / 2 // TURN)
     blocks = {name: block.tobytes() for name, block in blocks.items()}
     blocks |= moving(run, frames, tops.get("collisions", 1))
-    # Where displacements count from, without jumps until the first frame of the film.
+    # Reference positions of the displacements, continuous until the first frame of the film.
     origin = run.unwrapped(0) + run.position[frames[0]] - run.unwrapped(frames[0])
     blocks["origins"] = in_room(run, origin).astype("<f4").tobytes()
     facts, own = scene(run)
@@ -288,12 +291,12 @@ def film(
 
 
 def texts(facts: dict, blocks: dict) -> dict:
-    """Return the film as text, for a page or for the server of --live."""
+    """Return the film as text for a page or for the server of --live."""
     return {"facts": facts, "blocks": {k: base64.b64encode(v).decode() for k, v in blocks.items()}}
 
 
 def page(run: Run, film: dict | None) -> str:
-    """Return the whole page; without a film it asks the server of --live for one."""
+    """Return the complete page; without a film, the page requests it from the server of --live."""
     title = str(run.parameter("run", "title", "")) or run.path.stem
     commit = run.provenance.get("git_commit", "unknown")
     words = {
@@ -311,7 +314,7 @@ def view() -> str:
 
 
 def paged(film: dict | None, words: dict[str, str]) -> str:
-    """Return the page with these texts; without a film it may ask its server."""
+    """Return the page with these texts; without a film, the page may request it from its server."""
     style = text_of("style.css")
     script = "\n".join(text_of(f"{name}.js") for name in SCRIPTS)
     fillings = {name: html.escape(text) for name, text in words.items()} | {
@@ -324,7 +327,10 @@ def paged(film: dict | None, words: dict[str, str]) -> str:
 
 
 def lab_page(data: dict) -> str:
-    """Return the page of the laboratory; `data` has its number, the variables, the inputs."""
+    """Return the page of the laboratory.
+
+    `data` contains its number, the table of variables and the inputs.
+    """
     style, script = text_of("style.css") + text_of("lab.css"), text_of("lab.js")
     more = "connect-src 'self'", "img-src data:", "frame-src 'self'"
     fillings = {"policy": policy(style, script, *more), "style": style, "script": script}
@@ -332,7 +338,7 @@ def lab_page(data: dict) -> str:
 
 
 def chooser(paths: list[Path]) -> list[dict]:
-    """Return the entry of each input in the laboratory: title, text, sliders, picture."""
+    """Return title, text, sliders and picture of each input for the laboratory."""
     known = json.loads((INPUTS / "chooser.json").read_text(encoding="utf-8"))
     found = []
     for path in paths:
@@ -359,17 +365,17 @@ def filled(name: str, fillings: dict[str, str]) -> str:
 
 
 def text_of(name: str) -> str:
-    """Return a part of the page."""
+    """Return the text of a file of the page."""
     return (PAGE / name).read_text(encoding="utf-8")
 
 
 def enclosed(data: object) -> str:
-    """Return data as a script element can contain it, without an opening tag."""
+    """Return data as JSON that is safe inside a script element (without the start of a tag)."""
     return json.dumps(data, allow_nan=False).replace("<", "\\u003c")
 
 
 def policy(style: str, script: str, *more: str) -> str:
-    """Return the content security policy: own script and style only, and no requests but `more`."""
+    """Return the content security policy: only the page's script and style, and `more` requests."""
     rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'", *more]
     for tag, own in (("script", script), ("style", style)):
         digest = base64.b64encode(hashlib.sha256(own.encode()).digest()).decode()
@@ -378,14 +384,14 @@ def policy(style: str, script: str, *more: str) -> str:
 
 
 def chosen_film(run: Run, args: Namespace, room: float) -> tuple[list[int], tuple[dict, dict]]:
-    """Return the film that the options request, and its frames."""
+    """Return the film that the command-line options request, and its frames."""
     frames = chosen_frames(run, args.frames, args.count or frames_that_fit(run, room))
     traced = chosen_disks(run, args.disks or [])
     return frames, film(run, frames, chosen_colour(run, args.colour), traced, room)
 
 
 def whole(run: Run, colour: str | None = None) -> str:
-    """Return the page with a film of the whole run, coloured as on the command line."""
+    """Return the page with a film of the whole run, with the default of --colour."""
     args = Namespace(frames=None, count=None, colour=colour, disks=None)
     return page(run, texts(*chosen_film(run, args, ROOM)[1]))
 
@@ -394,8 +400,10 @@ def main() -> None:
     parser = command_line(
         __doc__, "RUN.html", one=True, csv=False, frames=None, count=None, colour=None, disks=None
     )
-    parser.add_argument("--live", action="store_true", help="show the run while it goes on")
-    parser.add_argument("--open", action="store_true", help="open the film in the browser")
+    parser.add_argument("--live", action="store_true", help="show an unfinished run while it "
+        "continues")
+    parser.add_argument("--open", action="store_true", help="open the film or the page in the "
+        "browser")
     args = parser.parse_args()
     (run,) = args.runs
     if args.colour in ("psi6", "spin"):
@@ -403,7 +411,7 @@ def main() -> None:
     if args.live:
         if args.output:
             raise RunError("--live writes no file: leave out -o")
-        from ricochet.pages.live import serve  # films need no server
+        from ricochet.pages.live import serve  # a film is opened without the server
 
         def newest(now: Run) -> dict:
             return texts(*chosen_film(now, args, LIVE_ROOM)[1])
@@ -412,7 +420,7 @@ def main() -> None:
         return
     path = args.output or Path(run.path.name).with_suffix(".html")
     if path.suffix != ".html":
-        raise RunError(f"{path}: a player ends in .html")
+        raise RunError(f"{path}: the name of a player must end in .html")
     frames, parts = chosen_film(run, args, ROOM)
     text = page(run, texts(*parts))
     destination(path).write_text(text, encoding="utf-8")

@@ -2,24 +2,27 @@
 
     python post/rates.py runs/bulk.h5 -o rates.png --csv rates.csv
 
-Runs are combined; all must be of one system, without gravity.  Means are taken in equilibrium,
-which is found or begins after --equilibration.  Errors include the autocorrelation of each
-quantity, `samples` is the number of independent samples that it is worth, and warnings give reasons
-to doubt an error.  Runs of a fixed kinetic energy have an exact kT, and are scaled to its mean.
-Other runs, with thermal walls or a thermostat of one temperature or rotating disks, have a kT with
-an error.
+All runs must be of the same system, without gravity, and are combined.  Means are taken in
+equilibrium, which begins after --equilibration or, without that option, when no observable drifts
+any longer.  Errors include the autocorrelation of each quantity, and `samples` is its effective
+number of independent samples.  Warnings explain why an error may be unreliable.  If the kinetic
+energy is conserved, kT of each run is exact, and the results of all runs are scaled to the mean kT.
+With thermal walls, a thermostat of one temperature or rotating disks, kT is a measured mean with an
+error.
 
-The pressure is measured by the virial of the pair collisions, and by the impulses on each side; the
-latter is a little larger, because centres stay a radius away from sides.  With an event log the
-table also has w_ij, the collisions of a disk of species i with disks of species j per time, and
-there are the free paths: in a frame each disk is on one, as long as its speed times the time
-between its collisions before and after.  Long paths occur in more frames; therefore each counts 1
-over its duration.  Errors are from the scatter of runs, or of a single run's frames in blocks.  The
-line is for equal disks under molecular chaos (Boltzmann, Enskog).  Kicked disks have no free paths.
+The pressure is measured from the virial of the pair collisions and from the momentum transfer to
+each side.  The pressure on the sides is slightly larger, because centres stay at least a radius
+away from sides.  With an event log the table also contains w_ij, the rate at which a disk of
+species i collides with disks of species j, and the free paths are analysed.  The free path of a
+disk in a frame is its speed times the time between its last collision before and its first
+collision after the frame.  Long paths occur in more frames; therefore each path is weighted with 1
+over its duration.  The errors follow from the scatter of runs or, for a single run, of blocks of
+frames.  The line is for equal disks under molecular chaos (Boltzmann, Enskog).  Free paths are not
+defined for driven disks, whose velocities change between collisions.
 
-Of runs that lose energy, or have walls of different temperature, only the free paths are found: in
-the frames after --equilibration, or else where nothing drifts, or 15 collisions per disk after the
-start of a gas that cools.
+For runs that lose energy, or whose walls differ in temperature, only the free paths are analysed.
+The frames used are those after --equilibration; without that option they are the frames without
+drift or, in a gas that cools, those later than 15 collisions per disk.
 """
 
 from ricochet import Run, RunError, statistics, thermodynamics as td
@@ -32,8 +35,8 @@ from ricochet.script import command_line, launch, points, report
 import numpy as np
 
 BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
-BLOCKS = 8  # blocks of the frames of a single run
-#: With which disks fly straight and at one speed, in all parts of the box alike.
+BLOCKS = 8  # number of blocks of frames of a single run
+# : Properties that leave free flights straight, of constant speed, and equal everywhere in the box.
 STRAIGHT = {
     "walls",
     "mixture",
@@ -47,26 +50,26 @@ STRAIGHT |= {"thermal_walls", "unequal_temperatures", "sliding_surfaces"}
 
 
 def check(runs: list[Run]) -> None:
-    """Refuse runs with obstacles or gravity, and runs of different systems."""
+    """Raise an error for runs with obstacles or gravity, and for runs of different systems."""
     first = runs[0]
     for run in runs:
-        allow(run, "rates are those of a gas in an empty box", *td.FLUID, *STRAIGHT)
+        allow(run, "rates are those of a gas without obstacles and gravity", *td.FLUID, *STRAIGHT)
         if not run.nature.in_equilibrium and not td.has_log(run):
-            needs = "it has free paths only, and those need output.event_log = .true."
+            needs = "only free paths are defined for it, and they require output.event_log = .true."
             allow(run, needs, *td.FLUID)
         if run.names != first.names or run.n_disks != first.n_disks:
             raise RunError(f"{run.path}: not the same system as {first.path}")
 
 
 def scales(runs: list[Run]) -> np.ndarray:
-    """Return the factors that bring the kT of runs of fixed energy to their mean."""
+    """Return the factors that scale kT of runs with conserved energy to the mean kT."""
     kept = all(run.nature.keeps_kinetic_energy for run in runs)
     kts = np.array([td.kt_at_start(run) if kept else 1.0 for run in runs])
     return kts.mean() / kts
 
 
 def over_all(runs: list[Run], skip: float | None, notes: list[str]) -> dict[str, SeriesMean]:
-    """Return the numbers with errors, all scaled to one temperature."""
+    """Return the results with errors, all scaled to one temperature."""
     kts = scales(runs)
     found = [td.rates(run, skip) for run in runs]
     means = {}
@@ -79,7 +82,7 @@ def over_all(runs: list[Run], skip: float | None, notes: list[str]) -> dict[str,
 
 
 def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
-    """Return the mean pressure over the runs in time, by the virial and by four walls."""
+    """Return the pressure against time, averaged over the runs, from virial and sides."""
     cuts = np.linspace(0, min(run.collisions_per_disk.time[-1] for run in runs), FINE + 1)
 
     def growth(*parts: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -105,8 +108,8 @@ def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
 
 
 def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lengths of the free paths at all frames, and their weights."""
-    allow(run, "free paths are those of disks that fly freely in an empty box", *STRAIGHT)
+    """Return the lengths and weights of the free paths in all frames."""
+    allow(run, "free paths require disks whose velocities change in collisions only", *STRAIGHT)
     log = run.event_log()
     disk = np.concatenate([log.i, log.j[log.j > 0]])
     time = np.concatenate([log.time, log.time[log.j > 0]])
@@ -126,9 +129,10 @@ def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndar
 def mean_and_density(
     runs: list[Run], skip: float | None = None
 ) -> tuple[Estimate, Estimate] | None:
-    """Return the mean free path and the density of paths in units of it; None without a log.
+    """Return the mean free path and the density of reduced free paths, or None without a log.
 
-    Errors are from the scatter of the runs, or of a single run's frames in blocks.
+    The unit of a reduced path is the mean free path.  Errors follow from the scatter of the runs
+    or, for a single run, of blocks of frames.
     """
     parts = [free_paths(run, skip) for run in runs if td.has_log(run)]
     if not parts or sum(len(path) for path, _ in parts) == 0:
@@ -149,7 +153,7 @@ def mean_and_density(
 
 
 def draw_pressure(axes: plt.Axes, curves: dict[str, Curve], mean: SeriesMean, start: float) -> None:
-    """Draw the pressure in time with its error, and its mean in equilibrium."""
+    """Draw the pressure against time with its error, and its mean in equilibrium."""
     x = curves["virial"].x
     end = x[-1] + x[0]
     for (way, curve), colour in zip(curves.items(), COLOURS, strict=False):
@@ -160,12 +164,12 @@ def draw_pressure(axes: plt.Axes, curves: dict[str, Curve], mean: SeriesMean, st
     axes.axvspan(0, start, color="0.9", lw=0, zorder=0, label="left out")
     axes.set_xlim(0, end)
     low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.4 * (high - low))  # room for the legend above what it names
+    axes.set_ylim(low, high + 0.4 * (high - low))  # space for the legend above the curves
     axes.legend(loc="upper right")
 
 
 def draw_paths(axes: plt.Axes, paths: tuple[Estimate, Estimate], equal: bool) -> None:
-    """Draw the free paths, and those of molecular chaos."""
+    """Draw the distribution of free paths and the one expected for molecular chaos."""
     mean, height = paths
     label = f"measured, $\\ell$ = {' ± '.join(statistics.rounded_to_error(*mean))}"
     bars(axes, height, BINS, color=COLOURS[0], label=label)
@@ -178,7 +182,7 @@ def draw_paths(axes: plt.Axes, paths: tuple[Estimate, Estimate], equal: bool) ->
 
 
 def table(runs: list[Run], start: float, means: dict, path: Estimate | None) -> list[dict]:
-    """Return a row for each quantity: exact ones first, then those with an error."""
+    """Return a row for each quantity: first the exact ones, then those with an error."""
     begin = "equilibrium_from" if means else "from_time"
     exact = {"packing": td.packing(runs[0]), begin: start}
     momentum = np.mean([td.drift(run) * run.mass.sum() for run in runs], axis=0)

@@ -1,14 +1,15 @@
-"""Cooling of rough disks: temperatures of translation and of rotation against theory.
+"""Cooling of rough disks: translational and rotational temperature against theory.
 
     python post/rough.py runs/rough.h5 -o rough.png --csv rough.csv
 
 The left panel shows T = m <v^2> / 2 and T_rot = I <omega^2> against collisions per disk; the dashed
 curves are the theory for Maxwell's velocities (Luding et al. 1998).  The right panel shows T_rot /
-T with its steady value in that theory, and in direct simulations of the Boltzmann equation where it
-is known; the latter is up to 6 % lower.  Both apply while a dilute gas of equal disks without
-Coulomb friction stays homogeneous.  The flow that develops as a gas cools contributes to T and
-lowers the ratio: at packing 0.02 by 3.8 to 4.6 %, at 0.0025 by 0.3 to 0.5 %, more for faster
-cooling.  The runs are of one input, in a periodic box.
+T and two values of its steady state: the prediction of that theory and, where available, the result
+of direct simulations of the Boltzmann equation, which is up to 6 % lower.  Both apply to a
+homogeneous dilute gas of equal disks without Coulomb friction.  The flow that develops in a cooling
+gas contributes to T and lowers the ratio: by 3.8 to 4.6 % at a packing fraction of 0.02 and by 0.3
+to 0.5 % at 0.0025, and by more if the gas cools faster.  All runs must be of the same input, in a
+periodic box.
 """
 
 from ricochet import Run, RunError, theory
@@ -18,7 +19,7 @@ from ricochet.script import command_line, launch, measured, report, spread
 
 
 def draw(runs: list[Run], law: tuple, exact: float | None, found: Curves) -> plt.Figure:
-    """Draw both temperatures, logarithmic, and their ratio."""
+    """Draw both temperatures on logarithmic axes, and their ratio."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 5))
     tau, start = found["collisions_per_disk"], (found["T"].mean[0], found["T_rot"].mean[0])
     expected = theory.rough_temperatures(tau, start, *law)
@@ -47,7 +48,7 @@ def main() -> None:
     args = command_line(__doc__, "rough.png").parse_args()
     laws = {rough_law(run) for run in args.runs}
     if len(laws) > 1:
-        raise RunError("the runs are not of one contact law")
+        raise RunError("the runs differ in their contact law")
     (law,) = laws
     found = rough(args.runs)
     exact = theory.ROUGH_RATIOS.get(law[:2]) if law[2] == 0.5 else None
@@ -56,7 +57,8 @@ def main() -> None:
     row |= {"maxwellian": theory.rough_ratio(*law), "boltzmann": exact}
     notes = []
     if exact is None:
-        notes = ["the law is for Maxwell's velocities; the Boltzmann equation has up to 6 % less"]
+        notes = ["the theory assumes Maxwell's velocities; the Boltzmann equation yields up to 6 "
+            "% less"]
     figure = draw(args.runs, law, exact, found)
     report(args, figure, [row], data=spread({"": found}), notes=notes)
 

@@ -1,10 +1,11 @@
-"""How much faster a run is on several cores.
+"""Speedup of a run on several cores.
 
     build/ricochet gas.nml -o runs/t2_1.h5 --set run.threads=2
     python post/scaling.py runs/t*.h5 -o scaling.png --csv scaling.csv
 
-Wall time of whole runs that differ in `run.threads` alone, the median over equal ones with the
-least and the largest.  runs/scaling.sh does it all.
+The script compares wall times of complete runs that differ in `run.threads` only.  For repeated
+runs it shows the median, the smallest and the largest time.  runs/scaling.sh performs the runs and
+calls this script.
 """
 
 from ricochet import Run, RunError
@@ -21,7 +22,7 @@ def table(runs: list[Run]) -> list[dict]:
     rows = []
     for (disks, threads), times in walls.items():
         if (disks, 1) not in walls:
-            raise RunError(f"no run of {disks} disks has one thread to compare the others with")
+            raise RunError(f"no run of {disks} disks has one thread, which the comparison requires")
         alone = np.median(walls[disks, 1])
         row = {"disks": disks, "threads": threads, "runs": len(times)}
         row |= {"seconds": float(np.median(times)), "gain": float(alone / np.median(times))}
@@ -30,7 +31,7 @@ def table(runs: list[Run]) -> list[dict]:
 
 
 def draw(rows: list[dict]) -> plt.Figure:
-    """Draw the speedup against threads; perfect sharing is dotted."""
+    """Draw the speedup against the number of threads; ideal speedup is dotted."""
     figure, axes = plt.subplots(figsize=(7, 5.5))
     for (disks, own), colour in zip(grouped(rows, lambda row: row["disks"]), COLOURS, strict=False):
         threads, y, low, high = (
@@ -45,7 +46,7 @@ def draw(rows: list[dict]) -> plt.Figure:
     axes.set_yscale("log", base=2)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter("{x:g}")
-    axes.set(xlabel="threads", ylabel="times as fast as one", title="Gain by several cores")
+    axes.set(xlabel="threads", ylabel="speedup over one thread", title="Speedup on several cores")
     axes.legend()
     return figure
 

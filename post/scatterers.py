@@ -1,11 +1,11 @@
-"""A file of circles at random places, for `file` of an &obstacle: a random Lorentz gas.
+"""Write a file of randomly placed circles for obstacle.file: a random Lorentz gas.
 
     python post/scatterers.py 100000 0.01 --radius 0.9 --seed 1 -o scatterers.txt
 
-The centres are uniform in a square from (0, 0) to (L, L) and independent, so that circles overlap.
-The density is their number per unit of area, L = sqrt(number / density) is printed: it belongs into
-`box.upper`, with periodic sides.  For a tracer of radius r the density n R^2 of the theory has
-R = r + radius.
+The centres are independent and uniformly distributed in a square from (0, 0) to (L, L), so that
+circles may overlap.  The density is the number of circles per unit of area.  The script prints L =
+sqrt(number / density), which is the value for both components of `box.upper`; the sides must be
+periodic.  For a tracer of radius r the reduced density n R^2 of the theory has R = r + radius.
 """
 
 import argparse
@@ -26,10 +26,11 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("number", type=int, help="number of circles")
-    parser.add_argument("density", type=float, help="their number per unit of area")
+    parser.add_argument("density", type=float, help="number of circles per unit of area")
     parser.add_argument("--radius", type=float, default=0.9, help="radius of each circle [0.9]")
     parser.add_argument("--seed", type=int, default=1, help="seed of the random numbers [1]")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="text file to be written")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="name of the text file "
+        "to be written")
     args = parser.parse_args()
     if args.number < 1 or not args.density > 0 or not args.radius > 0:
         parser.error("number, density and radius must be positive")

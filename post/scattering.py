@@ -1,11 +1,12 @@
-"""Scattering angle against impact parameter, on the exact curve.
+"""Scattering angle against impact parameter, compared with the exact curve.
 
     python post/scattering.py runs/scattering/*.h5 -o scattering.png --csv scattering.csv
 
-Each run holds two disks, one at rest; b is the distance of the line of flight from the rest disk's
-centre, positive on its left, R12 = r1 + r2.  The angle is that between the moving disk's first and
-last velocity.  Exact for a finite mass ratio M = m1 / m2 and restitution xi, kappa =
-(1 + xi) / 2 * M / (1 + M), s = b / R12, c^2 = 1 - s^2:
+Each run contains two disks, one of them at rest.  The impact parameter b is the distance of the
+line of flight from the centre of the disk at rest, positive on the left of that disk, and R12 = r1
++ r2.  The scattering angle is the angle between the first and the last velocity of the moving disk.
+The exact result for a finite mass ratio M = m1 / m2 and restitution xi, with kappa = (1 + xi) / 2 *
+M / (1 + M), s = b / R12 and c^2 = 1 - s^2, is
     tan theta = 2 kappa s c / (1 - 2 kappa c^2);   M infinite and xi = 1:  theta = 2 acos(s).
 """
 
@@ -19,7 +20,7 @@ import numpy as np
 
 
 def moving_and_resting(run: Run) -> tuple[int, int]:
-    """Return which disk moves at the start, and which does not."""
+    """Return the index of the disk that moves at the start and that of the disk at rest."""
     moving = np.flatnonzero(run.speed(0))
     if run.n_disks != 2 or len(moving) != 1:
         raise Refused(f"{run.path}: needs two disks, one of them at rest")
@@ -27,8 +28,8 @@ def moving_and_resting(run: Run) -> tuple[int, int]:
 
 
 def scattering(run: Run) -> dict[str, float]:
-    """Return impact parameter and deflection of the moving disk."""
-    law = "the law is for two smooth disks that meet freely"
+    """Return the impact parameter and the scattering angle of the moving disk."""
+    law = "the exact law is for two smooth disks without gravity and driving"
     allow(run, law, "walls", "inelastic", "rotating", "mixture")
     i, k = moving_and_resting(run)
     v, w = run.velocity[0][i], run.velocity[-1][i]
@@ -46,7 +47,7 @@ def scattering(run: Run) -> dict[str, float]:
 
 
 def draw(rows: list[dict], ratio: float, restitution: float) -> plt.Figure:
-    """Draw the angle, and its deviation from the exact one for this `ratio` of masses."""
+    """Draw the angle and its deviation from the exact one for this mass ratio."""
     names = ("b_over_R12", "angle_degrees", "error_degrees")
     s, angle, error = (np.array([row[name] for row in rows]) for name in names)
     figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(6, 6), height_ratios=(3, 1))
@@ -75,7 +76,7 @@ def main() -> None:
     moving, resting = moving_and_resting(first)
     figure = draw(rows, first.mass[resting] / first.mass[moving], first.restitution)
     notes = [
-        f"{run.path.name}: hits of sides are in the angle; stop the run before"
+        f"{run.path.name}: a collision with a side changed the angle; stop the run before"
         for run in args.runs
         if run.observable("side_collisions").value[-1].any()
     ]

@@ -1,15 +1,16 @@
-"""Draw frames of a run: disks of true size, walls, obstacles.
+"""Draw frames of a run: disks, walls and obstacles to scale.
 
     python post/snapshot.py runs/gas.h5 -o gas.png                     the last frame
     python post/snapshot.py runs/gas.h5 --frames 0,10,-1 -o gas.png    chosen frames side by side
     python post/snapshot.py runs/gravity.h5 --count 12 --quiver        twelve frames, evenly spread
 
-Colour: species, speed, displacement from the first frame, collisions so far, spin (the angular
-velocity of disks that can rotate), or psi6, the direction of the order of the bonds against that of
-the mean over all disks.  One scale holds for all frames, from 0, unless --per-frame; with --log it
-is logarithmic.  Where colours mean a quantity, all species but the first are outlined.  A disk that
-reaches across a periodic side is drawn on both.  Disks that can rotate have a radius at their
-orientation.  Small disks far apart are drawn larger than they are, and the title says so.
+--colour is species, speed, displacement from the first frame, number of collisions so far, spin
+(the angular velocity of disks that can rotate), or psi6 (the phase of the bond-orientational order
+parameter relative to that of the mean over all disks).  All frames share one colour scale that
+starts at 0, unless --per-frame is given; with --log the scale is logarithmic.  If colours show a
+quantity, all species except the first are outlined.  A disk that overlaps a periodic side is drawn
+on both sides of the box.  A line from the centre shows the orientation of disks that can rotate.
+Small disks far apart are drawn enlarged, and the title states the factor.
 """
 
 import argparse
@@ -26,7 +27,7 @@ from matplotlib.colors import LogNorm, Normalize, to_rgba_array
 
 
 def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
-    """Return a colour scale without the few largest values; a logarithmic one starts above 0."""
+    """Return a colour scale that clips the few largest values; a logarithmic one starts above 0."""
     if colour in ("psi6", "spin"):
         top = np.quantile(np.abs(values), 0.995) or 1.0
         return Normalize(*drawing.limits_of(colour, top))
@@ -38,7 +39,7 @@ def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
 
 
 def draw_key(axes: plt.Axes, run: Run, arrows: Quiver, longest: float) -> None:
-    """Draw an arrow of a round speed above a panel, as the scale of all arrows."""
+    """Draw the scale of the arrows above a panel: an arrow of a round speed."""
     power = 10.0 ** np.floor(np.log10(longest))
     speed = max(step * power for step in (1, 2, 5) if step * power <= longest)
     unit = run.units.name("speed")
@@ -48,7 +49,7 @@ def draw_key(axes: plt.Axes, run: Run, arrows: Quiver, longest: float) -> None:
 
 
 def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> plt.Figure:
-    """Draw one panel for each frame."""
+    """Draw a panel for each frame."""
     aspect = drawing.aspect_of(run)
     rows, columns = drawing.panel_grid(len(frames), aspect)
     width = min(10.5, (6.0 if len(frames) == 1 else 3.4) * columns) / columns
@@ -61,10 +62,10 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
         beyond = {"psi6": "neither", "spin": "both"}.get(colour, "both" if args.log else "max")
         bar = {"label": drawing.label_of(run, colour), "extend": beyond}
     longest = max(float(np.max(run.speed(frame))) for frame in frames) or 1.0
-    # The longest arrow is a tenth of the box.
+    # The longest arrow is as long as a tenth of the box.
     arrows = {"angles": "xy", "scale_units": "xy", "scale": longest / (0.1 * run.edges.max())}
     arrows |= {"width": 0.005, "zorder": 4, "color": "0.2"}
-    if colour == "species":  # the same hues, darker, to stand out against them
+    if colour == "species":  # darker shades of the colours of the disks, for contrast
         darker = (0.6, 0.6, 0.6, 1)
         arrows["color"] = to_rgba_array(drawing.species_colours(run)) * darker
     for k, axes in enumerate(panels.flat):
@@ -76,7 +77,7 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
             style = {"facecolors": drawing.species_colours(run)}
         else:
             norm = scale(values[k], args.log, colour) if args.per_frame else whole
-            # A logarithmic scale has no 0.
+            # A logarithmic scale cannot show 0.
             seen = np.maximum(values[k], norm.vmin) if args.log else values[k]
             style = {"array": seen, "norm": norm, "cmap": drawing.colour_map(colour)}
         disks = drawing.disk_collection(axes, run, run.position[frames[k]], **style)
@@ -102,9 +103,10 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
 
 def main() -> None:
     parser = command_line(__doc__, "snapshot.png", one=True, frames=None, count=None, colour=None)
-    parser.add_argument("--quiver", action="store_true", help="velocities as arrows")
-    parser.add_argument("--log", action="store_true", help="logarithmic colour scale")
-    parser.add_argument("--per-frame", action="store_true", help="a colour scale for each frame")
+    parser.add_argument("--quiver", action="store_true", help="draw velocities as arrows")
+    parser.add_argument("--log", action="store_true", help="use a logarithmic colour scale")
+    parser.add_argument("--per-frame", action="store_true", help="use a separate colour scale for "
+        "each frame")
     args = parser.parse_args()
     (run,) = args.runs
     which = args.frames or (None if args.count else frame_list("-1"))

@@ -1,23 +1,25 @@
-"""Speed distribution: first frame, last frame, equilibrium, and the way there.
+"""Speed distributions in the first frame, the last frame and equilibrium, and the relaxation.
 
     python post/speeds.py runs/gas/*.h5 -o speeds.png --csv speeds.csv
 
-Speeds are given in u = v / sqrt(2 kT / m), kT = mean kinetic energy of the species, so that
-equilibrium is P(u) = 2 u exp(-u^2) for any mass; with m = 1 and all speeds 1 at the start u is v
-itself; --unscaled draws v in units of the input.  Runs of the same N are combined.  Equilibrium, or
-the steady state of a driven gas, is found, or begins after --equilibration; it takes the frames of
---frames that are at least --min-separation collisions per disk from each other, and their mean kT.
-In a sheared box speeds are relative to its flow.  A gas that only loses energy has no steady state:
-its histogram is of the frames after --equilibration, or else 15 collisions per disk, with the kT of
-each frame for itself.
-So is that of a gas whose sides move, or whose kT drifts; `kT_first` and `kT_last` say how far.
-Each species of a mixture has a row and a curve of its own, with its kT and those of both
-components of its velocities, kT_x and kT_y.  Tests: Kolmogorov-Smirnov (KS) and chi-square, of
-speeds scaled by the energy of their own frame, against the law that applies: that of N disks that
-share a fixed kinetic energy, where it is fixed, otherwise Maxwell's.  The p-values are those of
-drawn samples that are scaled in the same way (docs/theory.md).  Frames that are close in time count
-less: `independent` speeds follow from the statistical inefficiency.  Disks that keep their angular
-momentum in a round container have no test.  a2 = <v^4> / (2 <v^2>^2) - 1.
+The reduced speed is u = v / sqrt(2 kT / m), where kT is the mean kinetic energy of the species, so
+that the equilibrium distribution is P(u) = 2 u exp(-u^2) for any mass.  If m = 1 and all initial
+speeds are 1, u equals v.  --unscaled draws v in units of the input.  Runs of the same N are
+combined.  Equilibrium, or the steady state of a driven gas, begins after --equilibration or,
+without that option, when no observable drifts any longer.  Of the frames selected by --frames only
+those are used that are at least --min-separation collisions per disk apart, with their mean kT. In
+a sheared box speeds are relative to the flow.  A gas that only loses energy has no steady state.
+Its histogram contains the frames after --equilibration (by default after 15 collisions per disk),
+and the speeds of each frame are scaled with kT of that frame. The same scaling is used for a gas
+whose sides move or whose kT drifts; `kT_first` and `kT_last` show the change. Each species of a
+mixture has its own row and curve, with its kT and the temperatures kT_x and kT_y of both velocity
+components.  Kolmogorov-Smirnov (KS) and chi-square tests compare the speeds, scaled by the energy
+of their own frame, with the expected distribution: that of N disks that share a fixed kinetic
+energy if this energy is conserved, otherwise Maxwell's.  The p-values follow from random samples
+that are scaled in the same way (docs/theory.md).  Frames that are close in time have a smaller
+weight: the number of `independent` speeds follows from the statistical inefficiency.  The tests do
+not apply if disks conserve their angular momentum in a round container. a2 = <v^4> / (2 <v^2>^2) -
+1.
 """
 
 from typing import NamedTuple
@@ -50,8 +52,8 @@ from ricochet.script import command_line, grouped, late_frames, launch, measured
 
 import numpy as np
 
-BINS = np.linspace(0, 3, 51)  # u = 1 lies inside a bin
-#: State of the late frames of all runs, in words; the first two have one kT.
+BINS = np.linspace(0, 3, 51)  # u = 1 is the centre of a bin
+# : Titles for the possible states of the late frames of all runs; the first two have one kT.
 EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
 COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each frame at its own kT"
 UNSTEADY = "No steady kT yet: each frame at its own"
@@ -59,17 +61,18 @@ A2 = "second Sonine coefficient $a_2$"
 ABOUT_A2 = (
     "$a_2 = \\langle v^4 \\rangle\\,/\\,2\\langle v^2 \\rangle^2 - 1$: "
     "0 for Maxwell's speeds, $-1/2$ for equal speeds.\n"
-    "A point is one frame; a deviation lasts for some 2 collisions per disk,\n"
-    "so neighbouring points may lie outside the band together."
+    "Each point is one frame. Deviations last for about 2 collisions per disk,\n"
+    "so that neighbouring points may lie outside the band together."
 )
 
 
 def state_of(run: Run) -> str:
-    """Return the state of the late frames: equilibrium, steady, or one that changes."""
+    """Return the state of the late frames: equilibrium, a steady state, or a changing state."""
     if run.n_disks < 3:
-        raise Refused(f"{run.path}: needs three disks and more, whose collisions make a law")
+        raise Refused(f"{run.path}: needs at least three disks, whose collisions establish a "
+            "distribution of speeds")
     known = set(TRAITS) - {"changed", "collapsed", "sliding_surfaces"}
-    allow(run, "its speeds are of no single state; see fields.py", *known)
+    allow(run, "its speed distribution depends on the position; see fields.py", *known)
     if run.nature.cooling or "moving_sides" in run.nature:
         return COOLING if run.nature.cooling else MOVING
     return EQUILIBRIUM if run.nature.in_equilibrium else STEADY
@@ -78,7 +81,7 @@ def state_of(run: Run) -> str:
 def temperature(
     runs: list[Run], picked: list[list[int]], species: str | None = None
 ) -> tuple[SeriesMean, list[float], bool]:
-    """Return kT over these frames, that of the first and the last, and whether it drifts."""
+    """Return the mean kT over these frames, kT of the first and the last one, and if it drifts."""
     tracks = tracks_of(runs, picked, species)
     kt = combine_runs([correlated_mean(track) for track in tracks])
     alone = species is None or len(runs[0].names) == 1
@@ -91,7 +94,7 @@ def temperature(
 def tracks_of(
     runs: list[Run], picked: list[list[int]], species: str | None, component: int | None = None
 ) -> list[np.ndarray]:
-    """Return kT of all frames from the first to the last of those picked, of each run."""
+    """Return kT of all frames between the first and the last selected one, for each run."""
     spans = [slice(frames[0], frames[-1] + 1) for frames in picked]
     return [
         kt_of_frames(run, own, species, component) for run, own in zip(runs, spans, strict=True)
@@ -101,7 +104,7 @@ def tracks_of(
 def pooled(
     runs: list[Run], picked: list[list[int]], state: str, name: str
 ) -> tuple[Estimate, dict]:
-    """Return density (B,) and tests of the speeds of a species in late frames of runs of one N."""
+    """Return the density (B,) and tests of a species' speeds in late frames of runs of equal N."""
     own, each = zip(runs, picked, strict=True), state not in (EQUILIBRIUM, STEADY)
     u = np.concatenate([reduced_speeds(*one, each=each, species=name) for one in own])
     test, several = speed_test(runs, picked, name), len(runs[0].names) > 1
@@ -132,21 +135,21 @@ def pooled(
 
 
 class Scale(NamedTuple):
-    """Return the value at which the reduced speed u = 1 is drawn, and the label of the axis."""
+    """Value at which the reduced speed u = 1 is drawn, and label of the axis."""
 
     thermal: float = 1.0  # sqrt(2 kT / m), or 1
     label: str = "speed $u = v\\,/\\,\\sqrt{2kT/m}$"
 
     @property
     def law(self) -> str:
-        """Maxwell's density, for a legend."""
+        """Return Maxwell's density as text for a legend."""
         if self.thermal == 1.0 and "u" in self.label:
             return "Maxwell, $P(u)=2u\\,e^{-u^2}$"
         return "Maxwell, $P(v)=(mv/kT)\\,e^{-mv^2/2kT}$"
 
 
 def scale_of(run: Run, kt: float, unscaled: bool) -> Scale:
-    """Return the scale of speeds at a temperature, in units of the input if `unscaled`."""
+    """Return the scale of speeds at a temperature: units of the input if `unscaled`, else u."""
     if not unscaled:
         return Scale()
     return Scale(float(np.sqrt(2 * kt / run.mass[0])), run.units.label("speed v", "speed"))
@@ -155,7 +158,7 @@ def scale_of(run: Run, kt: float, unscaled: bool) -> Scale:
 def draw_histogram(
     axes: plt.Axes, heights: list[Estimate], labels: list[str], scales: list[Scale]
 ) -> None:
-    """Draw step histograms over the Maxwell curve of each scale."""
+    """Draw histograms as steps, and the Maxwell curve of each scale."""
     style = {"fill": True, "alpha": 0.45} if len(heights) == 1 else {"fill": False}
     each = zip(heights, labels, scales, colours(len(labels)), strict=True)
     for height, label, scale, colour in each:
@@ -171,7 +174,7 @@ def draw_histogram(
 
 
 def draw_relaxation(axes: plt.Axes, groups: list) -> None:
-    """Draw a2 against collisions per disk, mean and error over the runs."""
+    """Draw the mean and the error of a2 over the runs against collisions per disk."""
     equal = True
     for (count, runs), colour in zip(groups, colours(len(groups)), strict=True):
         tracks = [relaxation(run) for run in runs]
@@ -191,13 +194,13 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
     axes.set(xlabel="collisions per disk", ylabel=A2)
     low, high = axes.get_ylim()
-    axes.set_ylim(low - 0.25 * (high - low), high)  # room for the explanation
+    axes.set_ylim(low - 0.25 * (high - low), high)  # space for the explanation
     axes.text(0.98, 0.02, ABOUT_A2, ha="right", va="bottom", fontsize=8, transform=axes.transAxes)
     axes.legend(loc="center right")
 
 
 def cooling(row: dict) -> str:
-    """Return by how much a gas has cooled; under gravity it may have become hotter."""
+    """Return the change of the temperature of a gas as text; under gravity kT may increase."""
     goes = "falls" if row["kT_last"] < row["kT_first"] else "goes"
     if row["frames"] == row["runs"]:
         return f"kT is {row['kT_last']:.4g}"
@@ -205,28 +208,28 @@ def cooling(row: dict) -> str:
 
 
 def label_of(row: dict, state: str) -> str:
-    """Return temperature and tests as text."""
+    """Return the temperature and the results of the tests as text."""
     size, free = row["speeds"], row["independent"]
     words = ", ".join(filter(None, (f"N = {row['N']}", row.get("species")))) + f": {size} speeds"
     words += f", {free} independent" if free < size else ""
     steady = state in (STEADY, MOVING)
     words += f"\nkT = {' ± '.join(rounded_to_error(row['kT'], row['kT_error']))}" if steady else ""
     words += f"\n{cooling(row)}" if state in (COOLING, UNSTEADY) else ""
-    laws = {"Maxwell": "Maxwell", "fixed_energy": "N disks of fixed energy"}
+    laws = {"Maxwell": "Maxwell", "fixed_energy": "N disks that share a fixed energy"}
     if row["law"] not in laws:
         return words
     return f"{words}\nKS test: {chance(row['KS_p'])} for {laws[row['law']]}"
 
 
 def chance(p: float) -> str:
-    """Return a probability as text, never as 0 or 1."""
+    """Return a probability as text that is never 0 or 1."""
     return "p < 0.0001" if p < 1e-4 else f"p = {min(p, 0.9999):.4f}"
 
 
 def draw(
     runs: list[Run], groups: list, pools: list, state: str, unscaled: bool = False
 ) -> plt.Figure:
-    """Draw four panels: start, last frame, late frames, relaxation."""
+    """Draw four panels: first frame, last frame, late frames, relaxation."""
     figure, ((first, last), (late, way)) = plt.subplots(2, 2, figsize=(10, 7))
     largest = groups[-1][1][0]
     for axes, frame, when in ((first, 0, "first frame"), (last, -1, f"t = {largest.time[-1]:.4g}")):
@@ -257,27 +260,29 @@ def draw(
 
 
 def check_unscaled(runs: list[Run], state: str) -> None:
-    """Refuse --unscaled where the speeds of late frames are of several masses or temperatures."""
+    """Raise an error for --unscaled if the late frames have several masses or temperatures."""
     for run in runs:
         if np.ptp(run.mass) > 0:
             raise RunError(
-                f"{run.path}: has several masses; mixture.py draws each in its own speeds"
+                f"{run.path}: its disks have several masses; mixture.py draws unscaled speeds of "
+                "each species"
             )
         if state not in (EQUILIBRIUM, STEADY):
-            raise RunError(f"{run.path}: has no steady kT; --unscaled draws speeds of a single one")
+            raise RunError(f"{run.path}: its kT is not steady, which --unscaled requires")
 
 
 def main() -> None:
     parser = command_line(
         __doc__, "speeds.png", frames=None, equilibration=None, min_separation=5.0
     )
-    meaning = "draw speeds v in units of the input instead of u; of disks of one mass"
+    meaning = "draw speeds v in units of the input instead of u; all disks must have the same mass"
     parser.add_argument("--unscaled", action="store_true", help=meaning)
     args = parser.parse_args()
     state, *others = map(state_of, args.runs)
     if any(other != state for other in others):
         odd = args.runs[1 + [other != state for other in others].index(True)]
-        raise RunError(f"{odd.path}: is not of the kind of {args.runs[0].path}: draw them apart")
+        raise RunError(f"{odd.path}: differs in kind from {args.runs[0].path}: draw them "
+            "separately")
     groups = grouped(args.runs, lambda run: run.n_disks)
     for _, runs in groups:
         refuse_others(runs)

@@ -1,10 +1,10 @@
-"""Draw the paths of disks through the frames of a run.
+"""Draw the trajectories of disks through the frames of a run.
 
     python post/trajectory.py runs/sinai.h5 -o sinai.png               all disks (at most 12)
     python post/trajectory.py runs/sinai.h5 --disks 1,5 --frames :200  two of them, 200 frames
 
-With a frame at every event (output.frames_every_events = 1) the straight lines between frames
-are the exact path of flight without gravity.  Several runs are drawn side by side.
+Without gravity, and with a frame at every event (output.frames_every_events = 1), the straight
+lines between frames are the exact trajectories.  Several runs are drawn side by side.
 """
 
 from ricochet import Run
@@ -26,8 +26,8 @@ from matplotlib.patches import Circle
 def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
     """Return the positions (T', 2) of each disk in these frames.
 
-    A path that crosses a periodic side is continued beyond it and re-enters on the other side; a
-    row of NaN separates the two pieces.
+    A path that crosses a periodic side is extended beyond that side and enters again at the
+    opposite side.  A row of NaN separates the two pieces.
     """
     paths = list(np.moveaxis(run.position[frames][:, disks], 1, 0))
     if run.image is None:
@@ -37,7 +37,7 @@ def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
 
 
 def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return the path (T, 2) with each step over a side repeated in every cell it may touch."""
+    """Return the path (T, 2); a step across a side is repeated in every cell it may touch."""
     rows = [path[:1]]
     gap = np.full((1, 2), np.nan)
     for start, end, jump in zip(path[:-1], path[1:], np.diff(image, axis=0), strict=True):
@@ -50,7 +50,7 @@ def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarra
 
 
 def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) -> None:
-    """Draw paths, with each disk at its last position; the other disks are grey."""
+    """Draw trajectories, with each disk at its last position; the other disks are grey."""
     draw_box(axes, run, run.time[frames[-1]])
     others = np.full(run.n_disks, "0.85")
     others[disks] = "none"
@@ -67,7 +67,7 @@ def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) ->
         f"t = {run.time[frames[0]]:.4g} (crosses) to {run.time[frames[-1]]:.4g} (disks)"
         f"{note_on_size(axes, run)}",
         parse_math=False,
-        pad=18,  # above what is said of a wall
+        pad=18,  # above the labels of the walls
     )
 
 

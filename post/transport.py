@@ -2,26 +2,27 @@
 
     python post/transport.py runs/driven/transport_*/*.h5 -o transport.png --csv transport.csv
 
-The disks are elastic, in a periodic box.  Runs are combined by packing fraction.  They need the
-Helfand moments of momentum and energy (output.helfand), about four samples of the observables in a
-mean free time (output.observables_every_time), and, for D, equally spaced frames.  Of mixtures only
-the viscosities are found: diffusing species transport energy, too, and each species has a D of its
-own, in correlations.py.
+The disks must be elastic and the box periodic.  Runs are combined by packing fraction.  The files
+must contain the Helfand moments of momentum and energy (output.helfand), about four samples of the
+observables per mean free time (output.observables_every_time) and, for D, equally spaced frames.
+For mixtures only the viscosities are computed: the diffusion of the species also transports energy,
+and D differs between species (see correlations.py).
 
-The small panels show half the slope of the mean square of a moment between neighbouring lags, over
-Enskog's coefficient; bands are errors over the runs.  For D it is half the integral of
-<v(0) v(s)> from 0 to t.  On the right, and in the table, are the means between half a lag and that
-lag, with errors from the series of their values.  The lag is 20 mean free times, more where heavy
-disks decorrelate slowly, and at most an eighth of the run.  For D it is the time in which sound
-crosses the box, as in correlations.py.
+The small panels show half the slope of the mean square of a moment between neighbouring lags,
+divided by Enskog's coefficient; for D they show half the integral of <v(0) v(s)> from 0 to t.
+Bands are errors over the runs.  The right panel and the table contain means over the lags between
+half of a lag t and t, with errors that include the autocorrelation.  This lag t is 20 mean free
+times, longer if heavy disks decorrelate slowly, and at most an eighth of the run.  For D it is the
+time in which sound crosses the box, as in correlations.py.
 
 Enskog's coefficients (Gass 1971; for mixtures after Lopez de Haro, Cohen and Kincaid 1983) use the
-pair correlation at contact of Henderson, for mixtures of Jenkins and Mancini 1987.  In the table
-their units are the mean mass, the mean diameter and kT.  The theory assumes that the velocities of
-colliding disks are independent.  Unless the gas is dense this is accurate to some per cent for
-viscosity and conductivity, not for D.  In two dimensions no coefficient has a limit for late times
-in large boxes.  N disks that share a fixed energy have a conductivity that is lower by about 6 / N
-of it, a bulk viscosity by 5 / N, a viscosity by 2 / N (docs/theory.md).
+pair correlation at contact of Henderson or, for mixtures, of Jenkins and Mancini 1987.  In the
+table the units of all coefficients are the mean mass, the mean diameter and kT.  The theory assumes
+that the velocities of colliding disks are independent.  Unless the gas is dense, viscosities and
+conductivity are accurate to a few per cent, whereas D is less accurate.  In two dimensions no
+coefficient converges for long times in large boxes.  If N disks share a fixed energy, the relative
+decrease of the conductivity is about 6 / N, that of the bulk viscosity 5 / N and that of the
+viscosity 2 / N (docs/theory.md).
 """
 
 from ricochet.analysis.statistics import combine_runs
@@ -30,8 +31,8 @@ from ricochet.figures.drawing import COLOURS, band, caption, colours, plt
 from ricochet.script import by_packing, command_line, launch, measured, over_runs, points, report
 
 NO_CONDUCTIVITY = (
-    "no conductivity and D of a mixture: its energy goes with the species that diffuse, too; "
-    "D by species: correlations.py"
+    "no conductivity and no D for a mixture: diffusing species also transport energy; "
+    "correlations.py computes D of each species"
 )
 LABELS = {
     "viscosity": "shear viscosity",
@@ -43,7 +44,7 @@ Results = list[tuple[float, dict[str, Found]]]
 
 
 def table(results: Results) -> tuple[list[dict], list[str]]:
-    """Return a row for each packing fraction and coefficient, and the notes."""
+    """Return a row for each packing fraction and coefficient, and the warnings."""
     rows, unsettled, notes = [], [], []
     for eta, found in results:
         for name in filter(found.get, LABELS):
@@ -61,14 +62,14 @@ def table(results: Results) -> tuple[list[dict], list[str]]:
 
 
 def draw(results: Results, rows: list[dict]) -> plt.Figure:
-    """Draw all coefficients over Enskog's, against the lag and against packing."""
+    """Draw the ratios of all coefficients to Enskog's, against lag and packing fraction."""
     there = set().union(*(found for _, found in results))
     layout, height = [[*filter(there.__contains__, LABELS), "all"]], 4.5
     if "D" in there:
         layout, height = [["viscosity", "conductivity", "all"], ["bulk_viscosity", "D", "all"]], 7
     widths = [1] * (len(layout[0]) - 1) + [1.3]
     figure, panels = plt.subplot_mosaic(layout, figsize=(13, height), width_ratios=widths)
-    scale = colours(len(results), len(COLOURS))  # packing; at the right colours are coefficients
+    scale = colours(len(results), len(COLOURS))  # colours show packing
     for (eta, found), colour in zip(results, scale, strict=True):
         line = {"color": colour, "lw": 1, "marker": ".", "ms": 3, "label": f"η = {eta:.3g}"}
         for name, one in found.items():

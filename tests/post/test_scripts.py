@@ -162,7 +162,7 @@ def test_a_gas_that_cools_is_not_called_equilibrium(tmp_path, rng, capsys, figur
     assert falls in words_on(figures[1]) and falls in said and said.count("\n") == 1
     tests = cells(printed)
     assert float(tests["KS_p"]) > 0.001 and float(tests["kT_last"]) == 0.0676676
-    assert "cool.h5: is not of the kind" in refusal(capsys, "speeds", calm, cool)
+    assert "cool.h5: differs in kind from" in refusal(capsys, "speeds", calm, cool)
 
 
 def test_fewer_frames_than_asked_for_are_said(tmp_path, rng, capsys):
@@ -451,7 +451,7 @@ def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
     said = capsys.readouterr().err.splitlines()
     unfitted = [line for line in said if line.startswith("warning: no fit against ")]
     assert len(unfitted) == 2, "equal notes on two curves are one"
-    assert "no fit against mass: 1 of 3 points are cut short; the crater reaches" in unfitted[0]
+    assert "no fit against mass: time or walls limit 1 of 3 points; the crater reaches" in unfitted[0]
     said = [line for line in said if line not in unfitted]
     for line, mass, xi, count in zip(said, (30, 40), (0.6, 0.5), (2, 1), strict=True):
         assert f"mass {mass},  speed 7,  radius 5,  restitution {xi} (runs: {count})" in line
@@ -588,7 +588,7 @@ def test_runs_with_equal_seeds_are_compared_and_others_named(tmp_path, rng, caps
     assert rows[1]["rate"] == pytest.approx(12.5 * 2 / 60 * 49 / 100)
     paths = [run.path for run in (*events, *steps)]
     drawn(tmp_path, "missed", *paths, "--equilibration", 2)
-    assert capsys.readouterr().err.endswith(f"left out, as no event-driven run has their seeds: {paths[-1]}\n")  # fmt: skip  # noqa: E501
+    assert capsys.readouterr().err.endswith(f"left out, because no event-driven run has the same seed: {paths[-1]}\n")  # fmt: skip  # noqa: E501
     for runs, problem in ((steps, "event-driven"), ([events[2], steps[0]], "no seed")):
         with pytest.raises(RunError, match=problem):
             missed.compare(runs, 2.0)
