@@ -27,7 +27,8 @@ function lookAtAll() {
   Object.assign(camera, { zoom: 1, x: film.lower[0] + film.edges[0] / 2, y: film.lower[1] + film.edges[1] / 2, follow: -1 });
 }
 
-// Zooms by a factor. The position below the point (px, py) of the canvas stays there.
+// Zooms by a factor. The position of the box that is shown at the point (px, py) of the canvas
+// stays there.
 function zoom(factor, px = page.width / 2, py = page.height / 2) {
   const x = backAcross(px), y = backUp(py);
   camera.zoom = Math.max(1, Math.min(mostZoom(), camera.zoom * factor));
@@ -43,7 +44,8 @@ function pan(dx, dy) {
   camera.y += dy / view.unit;
 }
 
-// The first and the last number of periods by which an object from `low` to `high` must be shifted to be visible.
+// Returns the smallest and the largest number of periods by which an object that extends from `low`
+// to `high` must be shifted to be visible.
 function firstCopy(axis, high) {
   return film.periodic[axis] ? Math.ceil(((axis ? view.y : view.x) - high) / film.edges[axis]) : 0;
 }

@@ -15,14 +15,15 @@ function begin() {
   prepareFilm();
 }
 
-// The pace lets the film last at least 15 seconds, and lets a disk of usual speed cross at most half of the box in a second.
+// The pace is limited in two ways: the film lasts at least 15 seconds, and a disk of typical speed
+// crosses at most half of the box in a second.
 function usualPace() {
   const most = Math.min((last() - first()) / 15 || Infinity, 0.5 * Math.max(...film.edges) / film.scales.speed[1]) || 1;
   const power = 10 ** Math.floor(Math.log10(most));
   return power * Math.floor(most / power);
 }
 
-// Prepares everything that depends on the frames available so far.
+// Prepares the controls and scales that depend on the frames available so far.
 function prepareFilm() {
   sums = null;
   const alike = s => kinds[s].count >= FEWEST && kinds[s].alike;
@@ -42,7 +43,7 @@ let told = 0;  // when texts and plots were last drawn
 function show(time, anew = false) {
   move(time);
   drawStage();
-  if (state.playing && !anew && performance.now() - told < (disks > 4000 ? 250 : 90)) return;  // texts and plots are drawn less often than disks
+  if (state.playing && !anew && performance.now() - told < (disks > 4000 ? 250 : 90)) return;  // texts and plots are updated less often than the disks
   told = performance.now();
   if (source.grows) drawEnergies();
   $('cursor').style.transform = `translateX(${Math.min(cursorAt(moment.time), $('energy').width / page.dots - 4)}px)`;
@@ -64,7 +65,7 @@ function layout() {
   tellLimits();
   layOutStage();
   for (const canvas of ['histogram', 'energy', 'pressure'].map($)) {
-    const { clientWidth, clientHeight } = canvas;  // read once, because it forces a layout
+    const { clientWidth, clientHeight } = canvas;  // read once, because reading it forces a layout
     Object.assign(canvas, { width: Math.round(clientWidth * page.dots), height: Math.round(clientHeight * page.dots) });
   }
   layTableOut();
@@ -130,7 +131,7 @@ const back = () => step(frameTime(moment.frame) < moment.time ? moment.frame : m
 const next = () => { if (!source.goOn?.('step')) step(moment.frame + 1); };
 const toEvent = () => { if (!$('event').hidden && !source.goOn?.('event')) go(source.nextEvent()); };
 
-// The address of a paused film contains its time, so that it can be sent as a link.
+// The address of a paused film contains the time shown, so that the address can be sent as a link.
 let remembering;
 function remember() {
   clearTimeout(remembering);
@@ -179,7 +180,7 @@ function pointerMoved(event) {
   look();
 }
 
-// Traces the disk nearest to a point of the canvas, or none if no disk is near.
+// Shows the trace of the disk nearest to a point of the canvas, or no trace if no disk is near.
 function pick(px, py) {
   let nearest = [], least = 12 * page.dots;
   for (let i = 0; i < disks; i++) {

@@ -34,7 +34,7 @@ function setScene(facts, blocks) {
 const first = () => past[0].time, last = () => past.at(-1).time;
 const clamp = (value, low, high) => Math.max(low, Math.min(high, value));
 
-// The number of elements of an ascending list that are not larger than a value (binary search).
+// Returns the number of elements of an ascending list that do not exceed a value (binary search).
 function upTo(values, value, number = one => one) {
   let low = 0, high = values.length;
   while (low < high) {
@@ -47,7 +47,8 @@ function upTo(values, value, number = one => one) {
 const frameAt = time => Math.max(0, upTo(past, time, frame => frame.time) - 1);  // the last frame that is not later
 const frameTime = k => past[clamp(k, 0, past.length - 1)].time;
 
-// Adds to a frame the periods that disks have crossed since the first one, x1 y1 x2 y2 .... `moved` returns those since the last frame.
+// Stores in a frame the numbers of periods that the disks have crossed since the first frame, x1 y1
+// x2 y2 .... `moved` returns the numbers since the previous frame.
 function cross(frame, moved) {
   const before = past.at(-1);
   if (film.periodic.some(Boolean)) frame.crossed = new Int16Array(2 * disks).map((_, k) => before ? before.crossed[k] + moved(before, k) : 0);
@@ -56,9 +57,10 @@ function cross(frame, moved) {
 
 // ---------- motion between frames ----------
 
-// Between two frames a disk flies from its position in the first one, and its velocity changes at the events of the log. Each flight is
-// straight, or a parabola under gravity. Without an event log disks stay at their positions of the frame. Frames of a worker need no
-// log, because they are close enough.
+// Between two frames a disk moves from its position in the earlier frame, and its velocity changes
+// at the events of the log. Each flight is straight, or a parabola under gravity. Without an event
+// log disks are shown at their positions in the last frame. Frames of a worker need no log, because
+// their intervals are short enough.
 let ways;    // velocity changes: the first one after each frame (start); of each its disk, its share of the interval and the new velocity (turns)
 let events;  // events of the log: time (when), partners (i, j), number of collisions of two disks so far (pairs)
 
@@ -106,7 +108,8 @@ function move(time) {
   Object.assign(moment, { kinetic: kinetic.map(mean), potential: potential.map(mean) });
 }
 
-// Positions of the left, right, bottom and top side at a time. They are for drawing only; the engine computes the events.
+// Returns the positions of the left, right, bottom and top side at a given time. They are used for
+// drawing only; the engine computes the events.
 function sidesAt(time) {
   return past[moment.frame].sides ?? film.sides.map(({ place, motion, amplitude, period, phase, velocity, start_time: start, end_time: end, way }, k) => {
     if (way?.[0].length > 1) {
@@ -126,8 +129,9 @@ function displacement(i) {
   return Math.hypot(UX[i] + x - origins[2 * i], UY[i] + y - origins[2 * i + 1]);
 }
 
-// The flights of a disk between two times: from, to, and the offset of the control point of a parabola (0, 0 if straight). Without an
-// event log the flights are straight lines from frame to frame.
+// Returns the flights of a disk between two times. Each flight consists of its start, its end, and
+// the offset of the control point of a parabola (0, 0 if straight). Without an event log the
+// flights are straight lines from frame to frame.
 function flights(i, from, to) {
   const result = [], plus = (a, b) => a.map((one, axis) => one + b[axis]);
   for (let k = frameAt(from); k < past.length - 1 && past[k].time < to; k++) {
@@ -147,7 +151,8 @@ function flights(i, from, to) {
   return result;
 }
 
-// Calls `action` for the speed of each disk in the frames so far, or in some of them if there are very many. Returns the number of frames.
+// Calls `action` for the speed of each disk in all frames so far, or in a part of the frames if
+// there are very many. Returns the number of frames used.
 function eachSpeed(action) {
   const some = Math.ceil((moment.frame + 1) * disks / 2e6);
   let samples = 0;

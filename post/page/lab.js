@@ -1,6 +1,6 @@
 'use strict';
 
-// ---------- the laboratory: a form and several films, each with a worker of its own ----------
+// ---------- the laboratory: a form and several films, each of which has its own worker ----------
 
 const $ = id => document.getElementById(id);
 const lab = JSON.parse($('data').textContent);  // the table of variables by group, and the inputs to choose from
@@ -13,7 +13,8 @@ const state = {
   boxes: [],                 // kept runs { figure, frame, letter, words, run, shown }, and the present one at the end
   paused: false,
 };
-// Variables that can change in a running simulation. All others start a new run.
+// Variables that can be changed in a running simulation. A change of any other variable starts a
+// new run.
 const acts = key => /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|surface_velocity|velocity|mass|force))/.test(key);
 const MEASURED = { 'all/kinetic_energy': 'mean kinetic energy', 'all/mean_speed': 'mean speed', virial_pressure: 'pressure', dissipated_energy: 'energy lost per time', collisions: 'collisions per time' };
 const MOST_KEPT = 3, FULL = 0.5;  // number of kept runs; packing fraction that random placement reaches easily
@@ -47,7 +48,7 @@ const shownOf = key => state.waiting[key]?.text ?? textOf(key);
 function set(key, text) {
   const old = textOf(key);
   delete state.waiting[key];
-  delete state.settings[key];  // so that the newest setting is the last one
+  delete state.settings[key];  // so that the newest setting is the last in the list
   if (text !== givenAs(key)) state.settings[key] = text;
   sync();
   if (text !== old) changed(key);
@@ -71,7 +72,8 @@ function sliderOf([name, text, from, to, log]) {
 
 const textWith = ({ key, at }, text) => at < 0 ? text : split(valueOf(key)).map((one, k) => k === at ? text : one).join(',');
 
-// The largest value of a slider with which all disks fill at most a certain share of their region.
+// Returns the largest value of a slider at which the disks cover at most a given fraction of their
+// region.
 function mostOf({ key, to = Infinity }) {
   const [kind, name, variable] = key.split('.');
   if (kind !== 'species' || !['count', 'radius'].includes(variable) || textOf(`species.${name}.placement`)) return to;
@@ -88,7 +90,7 @@ function mostOf({ key, to = Infinity }) {
   return isFinite(most) ? Math.min(to, most) : to;
 }
 
-// Rounded values from one end of a slider to the other, without repetitions.
+// Returns rounded values from one end of a slider to the other, without repetitions.
 function valuesOf(spec, steps) {
   const { key, from, to, log } = spec, top = mostOf(spec), whole = variableOf(key).type === 'integer';
   const unit = whole ? 1 : 10 ** Math.floor(Math.log10((to - from) / 100));
@@ -174,7 +176,7 @@ function addGroup(kind, name) {
 
 // ---------- choosing an input ----------
 
-// The run starts before the form is complete.
+// The run starts before the form is complete, so that disks appear early.
 async function choose(name) {
   const input = lab.inputs.find(one => one.name === name);
   Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: [], settings: {}, has: {}, waiting: {}, added: [] });
@@ -220,7 +222,7 @@ function newBox() {
   return box;
 }
 
-// Only one run starts at a time. Values that change meanwhile belong to the next start.
+// Only one run starts at a time. Changes of values during a start take effect in the next run.
 const PLACING = 2000;  // time [ms] after which a placement of disks is given up for newer settings
 let busy = 0, again = false, timer, latest = {};
 function run() {
@@ -242,7 +244,8 @@ function run() {
   if (isThere(box)) begin(); else box.frame.addEventListener('load', begin, { once: true });
 }
 
-// Changes that a running simulation allows act at once, while the slider moves. Others start a new run.
+// Changes that a running simulation allows take effect at once, while the slider moves. All other
+// changes start a new run.
 function changed(key) {
   if (busy || !acts(key) || !current()?.run) { run(); return; }
   latest[key] = state.settings[key] ?? givenAs(key);
@@ -276,8 +279,9 @@ function hear(source, news) {
 
 function ready() { busy = 0; if (again) run(); }
 
-// Shows each problem once, at its variable or else at the one that changed last. The refused text waits, its old value stays, and the
-// other changes act.
+// Shows each problem once, beside its variable or, if it has none, beside the variable that changed
+// last. The refused text remains in the form, the variable keeps its old value, and all other
+// changes take effect.
 function showProblems(problems) {
   const changes = () => Object.keys({ ...state.has, ...state.settings }).filter(differs), before = changes();
   for (const { place, text } of problems) {
@@ -296,7 +300,7 @@ function showProblems(problems) {
 
 function keep() {
   if (!current()?.run) return;
-  if (state.boxes.length > MOST_KEPT) { tell(`${MOST_KEPT} runs are kept, which is all that may be: remove one`, true); return; }
+  if (state.boxes.length > MOST_KEPT) { tell(`${MOST_KEPT} runs are kept, which is the largest number: remove one`, true); return; }
   newBox();
   arrangeAll();
   run();
@@ -328,7 +332,8 @@ function tellShelf() {
   state.boxes.forEach(box => { box.figure.firstChild.textContent = `${box.letter}: ${whatIs(box)}`; });
 }
 
-// Arranges boxes of one size side by side. The newest has all plots, which contain the curves of the others.
+// Arranges boxes of equal size side by side. The box of the newest run contains all plots, and
+// these plots include the curves of the kept runs.
 function arrangeAll() {
   const boxes = shownBoxes(), many = boxes.length > 1, { clientWidth, clientHeight } = $('runs');
   const upright = clientWidth < 560, count = many ? boxes.length : 1, width = Math.floor(clientWidth / count);
@@ -357,7 +362,7 @@ function overlayAll() {
 }
 setInterval(() => { if (shownBoxes().length > 1) overlayAll(); }, 1000);
 
-// Repeats an action on one film in all films beside it.
+// Repeats an action on one film in all other films.
 function played(source, on) {
   if (source === filmOf(current())) state.paused = !on;
   for (const one of films()) if (one !== source && one.inside().film) one.play(on);
@@ -369,7 +374,7 @@ function paced(source) {
   for (const one of films()) if (one !== source) one.choices({ pace, speed });
 }
 
-// ---------- a scan: one variable, five values, one curve that grows ----------
+// ---------- a scan: a curve of measured values for five values of one variable ----------
 
 let scan, scanner;  // the measured quantity and values; the worker that measures
 function beginScan() {
@@ -383,7 +388,7 @@ function beginScan() {
 
 function drawScan() { if (scan && isThere(current()) && filmOf(current()).inside().film) filmOf(current()).showScan(scan); }
 
-function addToScan({ is, index, mean, error, problems }) {  // values that cannot be measured leave a gap
+function addToScan({ is, index, mean, error, problems }) {  // values that cannot be measured appear as a gap
   if (problems) scan.said = (is === 'scan' ? `${short(scan.values[index])}: ` : '') + problems[0].text;
   else scan.points.push([scan.values[index], mean, error]);
   drawScan();
@@ -400,7 +405,7 @@ function bare(on) {
   arrangeAll();
 }
 
-// All films have the theme of the page.
+// All films use the theme (dark or light) of the page.
 function dress() {
   for (const one of state.boxes.filter(isThere).map(filmOf)) {
     one.document.documentElement.classList.toggle('larger', document.documentElement.classList.contains('larger'));
@@ -420,7 +425,8 @@ const actions = {
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());
 const keys = { r: 'run', p: 'pause', k: 'keep', s: 'settings', l: 'larger' };
 
-// Keys of the laboratory act wherever the focus is. The other keys act on all films while none of them has the focus.
+// Keyboard shortcuts of the laboratory work whichever element has the focus. The shortcuts of a
+// film apply to all films unless one of the films has the focus.
 function typed(event) {
   const { key, target } = event, own = target.ownerDocument === document;
   if (target.matches('input:not([type=range]), select') || event.ctrlKey || event.metaKey || event.altKey || $('inputs').open) return;

@@ -1,8 +1,9 @@
 // ---------- unfinished runs ----------
 
-// A page without a film asks the server of `player.py --live` for one, again and again until the run has ended. The film plays at the
-// pace that reaches the newest frame when the next answer is due, unless the user goes to another time. Inside the laboratory it shows
-// the run of a worker.
+// A page without a film repeatedly requests the film of an unfinished run from the server of
+// `player.py --live`, until the run has ended. The film plays at such a pace that it reaches the
+// newest frame when the next answer is expected, unless the user moves to another time. Inside the
+// laboratory the page shows the run of a worker.
 const enclosed = JSON.parse($('film').textContent);
 const isPart = parent !== window && !enclosed;
 const live = { on: false, stamp: '', newest: true, heard: 0, pace: 0 };

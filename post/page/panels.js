@@ -47,7 +47,8 @@ function chip(kind, text) {
 
 const PATTERN_WORDS = ['', ', striped', ', striped upright', ', chequered'];
 
-// The name of the pattern of a species, if its disks are large enough for it at zoom 1.
+// Returns the name of the pattern of a species, if the disks are large enough for a pattern at zoom
+// 1.
 function patternOf(s) {
   const radius = Math.max(leastRadius(), page.unit * film.radii[sizeOf[speciesOf.indexOf(s)]]);
   return isStriped(s, radius) ? PATTERN_WORDS[s % PATTERN_WORDS.length] : '';
@@ -68,7 +69,7 @@ function drawLegend() {
   if (notes.length) legend.append(Object.assign(document.createElement('p'), { textContent: notes.join('; ') }));
 }
 
-// Says below the controls what the picture does not show truly.
+// Writes a note below the controls if the picture is not to scale or not exact.
 function tellLimits() {
   const tiny = angles && film.radii.every(radius => Math.max(leastRadius(), radius * page.unit) < LEAST_TO_TURN * page.dots);
   $('between').textContent = [film.note && `Frames only: ${film.note}.`, enlarged() && 'Small disks are drawn larger than they are.',
@@ -85,7 +86,8 @@ function prepare(canvas) {
   return { pen, size, left: 42 * size, right: width - 4, top: 6, bottom: height - 26 * size };
 }
 
-// Draws axes from (x0, y0) to (x1, y1) with about three round numbers each. Returns the maps from values to pixels.
+// Draws axes from (x0, y0) to (x1, y1) with about three round numbers each. Returns the functions
+// that convert values to pixels.
 function axes(plot, [x0, x1], [y0, y1], words, name = short, nameOfY = name) {
   const { pen, size, left, right, top, bottom } = plot;
   const x = value => left + (value - x0) / (x1 - x0) * (right - left);
@@ -114,8 +116,8 @@ function round(low, high) {
   return values;
 }
 
-// Plots lines { time, values, colour, dash, letter }. The axis of the values includes 0. The part after `now` is pale, and null makes a
-// gap. Returns the map from times to pixels.
+// Plots lines { time, values, colour, dash, letter }. The axis of the values includes 0. Lines are
+// pale after the time `now`, and null values are gaps. Returns the map from times to pixels.
 function plotLines(canvas, lines, now) {
   const range = lines.map(({ time }) => [time[0], time.at(-1)]), start = Math.min(...range.map(([t]) => t));
   const end = Math.max(...range.map(([, t]) => t)), plot = prepare(canvas), { pen } = plot;
@@ -149,15 +151,16 @@ const FEWEST = 10;  // least number of disks of a species for a histogram
 let counted;        // species that have a histogram
 let sums;           // the histograms of all frames so far, and the number of the last of these frames
 
-// Sets the bins of the histogram up to a speed. Where many disks rest the axis is logarithmic, because a single bar of resting disks
-// beside Maxwell's curve would show nothing.
-const RESTING = 0.02;  // share of the disks at rest from which the axis is logarithmic
+// Defines the histogram bins from zero to a given maximum speed. If many disks are at rest the axis
+// is logarithmic, because on a linear axis the bar of the resting disks would hide all others.
+const RESTING = 0.02;  // fraction of disks at rest above which the axis is logarithmic
 function setBins(most, resting) {
   const rest = resting > RESTING && resting < 1;
   film.speeds = { rest, edges: Array.from({ length: 41 }, (_, k) => rest ? most * 10 ** (k / 10 - 4) : most * k / 40) };
 }
 
-// Share of the disks of each species in each bin, at the present moment or in all frames so far.
+// Returns the fraction of the disks of each species in each bin, at the time shown or in all frames
+// so far.
 function speedsNow() {
   const { edges, rest } = film.speeds, bins = edges.length - 1, width = edges[1] - edges[0];
   const bin = speed => rest ? speed > 0 ? Math.max(1, upTo(edges, speed)) : 0 : Math.floor(speed / width);
@@ -211,7 +214,7 @@ function drawHistogram() {
   pen.restore();
 }
 
-// Where many disks are at rest, both axes are logarithmic and there is no Maxwell curve.
+// If many disks are at rest, both axes are logarithmic and no Maxwell curve is drawn.
 function drawSpeedsAndRest(plot, counts) {
   const edges = film.speeds.edges.map(Math.log10), most = Math.log10(1.5 * Math.max(10, ...kinds.map(kind => kind.count)));
   const { pen } = plot, power = value => short(+(10 ** value).toPrecision(1));
@@ -276,7 +279,7 @@ function tellEnergies() {
   }));
 }
 
-// ---------- measured values of a worker with errors, and theory ----------
+// ---------- measured values of a worker with their errors, and theoretical values ----------
 
 function withError({ value, error }) {  // rounded to two digits of the error
   const last = Math.floor(Math.log10(error)) - 1, rounded = one => (Math.round(one / 10 ** last) * 10 ** last).toFixed(Math.max(0, -last)).replace('-', '−');
@@ -292,7 +295,7 @@ function tellNumbers() {
     + Object.entries({ temperature, 'mean speed': speed, pressure }).filter(([, one]) => one && one.value !== null).map(row).join('');
 }
 
-// ---------- the next events of few disks ----------
+// ---------- list of the next events, if there are few disks ----------
 
 const meeting = ([, i, j]) => `disk ${i + 1} and ${j < 0 ? film.surfaces[-1 - j] : `disk ${j + 1}`}`;
 

@@ -11,8 +11,9 @@ const dark = () => document.documentElement.dataset.theme === 'dark';
 const cssColour = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
 const css = rgb => `rgb(${rgb})`;
 
-// Colours of disks have a contrast of at least 3:1 with the ground in both themes. The luminance of a scale grows from end to end, and
-// species differ in luminance, so that both can be distinguished in grey.
+// Colours of disks have a contrast of at least 3:1 to the background in both themes. The luminance
+// increases along each colour scale and differs between species, so that values and species can be
+// distinguished in greyscale.
 const VIRIDIS = [[68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141], [39, 173, 129], [92, 200, 99], [170, 220, 50], [253, 231, 37]];
 const LIGHTS = { false: [0.02, 0.29, [0.11, 0.28, 0.04, 0.2, 0.07]], true: [0.14, 0.85, [0.27, 0.5, 0.14, 0.38, 0.2]] };
 const toLinear = part => part <= 10.3 ? part / 3294.6 : ((part / 255 + 0.055) / 1.055) ** 2.4;
@@ -34,7 +35,8 @@ function scaleColour(place) {
   return withLuminance(VIRIDIS[k].map((part, c) => part + (at - k) * (VIRIDIS[k + 1][c] - part)), low + (high - low) * place / 255);
 }
 
-// Values of the disks on the scale of a quantity at the present moment, from 0 to 1. There is none for species.
+// Functions that return the value of a quantity for a disk at the time shown, on a scale from 0 to
+// 1. The colouring by species needs no such function.
 const quantities = {
   speed: i => Math.sqrt(VX[i] * VX[i] + VY[i] * VY[i]) / film.scales.speed[1],
   displacement: i => displacement(i) / film.scales.displacement[1],
@@ -68,22 +70,24 @@ function layOutStage() {
   groundShown = '';
 }
 
-// Space of the stage in CSS pixels: beside the controls on a flat screen, else above them. On a telephone the histogram stands between
-// disks and controls.
+// Returns the space for the stage in CSS pixels: beside the controls on a wide screen, above the
+// controls otherwise. On a telephone the histogram is between the disks and the controls.
 function roomOfStage() {
   if (boxSize) return boxSize;
   const full = document.fullscreenElement === $('view'), bare = getComputedStyle($('view')).display === 'contents';
   const frame = bare ? $('main') : $('view'), style = getComputedStyle(frame);
   const inner = size => parseFloat(style[size]) || 0;
   const width = frame.clientWidth - inner('paddingLeft') - inner('paddingRight');
-  // clientHeight, because the inner height of a telephone grows while something is too wide for it.
+  // clientHeight is used because innerHeight of a telephone increases while the page is wider than
+  // the screen.
   const height = document.documentElement.clientHeight - (full ? 0 : $('top').offsetHeight) - inner('paddingTop') - inner('paddingBottom') - 2;
   if (cssColour('flat')) return { width: width - Math.max(260, 0.45 * width), height };
   const between = bare ? $('speeds').offsetHeight : 0;
   return { width, height: Math.max(full ? 100 : isPart ? 200 : 300, height - $('controls').offsetHeight - between - 16) };
 }
 
-// Small disks far apart could not be seen. They are drawn larger than they are, and the page says so.
+// Small disks far apart would be invisible. They are drawn enlarged, and a note on the page states
+// this.
 const leastRadius = () => clamp(0.06 * Math.sqrt(film.edges[0] * film.edges[1] / disks) * page.unit, 1.1, 3 * page.dots);
 const enlarged = () => film.radii.some(radius => radius * page.unit < leastRadius());
 
@@ -97,8 +101,9 @@ function drawStage() {
   drawMarks();
 }
 
-// Sets the style of a side or an obstacle: thermal ones have a colour, hot or (beside a hotter one) cold; sliding ones have dashes that
-// move. Returns whether it is thermal or slides.
+// Sets the style of a side or an obstacle. Thermal boundaries have a colour: hot, or cold if
+// another boundary is hotter. Sliding boundaries have moving dashes. Returns true if the boundary
+// is thermal or slides.
 const actsOn = law => !!(law && (law.temperature || law.surface_velocity));
 const laws = () => [...film.sides, ...film.laws.obstacle, ...film.laws.wall];
 const slides = () => laws().some(law => law?.surface_velocity);
@@ -140,7 +145,7 @@ function drawGround() {
       ground.stroke(new Path2D(`M${across(a + dx)},${up(b + dy)}L${across(c + dx)},${up(d + dy)}`));
     }));
   });
-  // The sides are dashed where they are periodic. Thermal and sliding sides have a band outside.
+  // Periodic sides are dashed. Thermal and sliding sides have a coloured band outside the box.
   copies([x0, x1], [y0, y1], (dx, dy) => {
     const left = across(x0 + dx), right = across(x1 + dx), bottom = up(y0 + dy), top = up(y1 + dy);
     [[left, bottom, left, top], [right, bottom, right, top], [left, bottom, right, bottom], [left, top, right, top]].forEach(([a, b, c, d], k) => {
@@ -159,7 +164,8 @@ function drawGround() {
   ground.setLineDash([]);
 }
 
-// Left, top, right and bottom of the visible part of the box and of its periodic images [pixels].
+// Returns left, top, right and bottom of the visible part of the box and its periodic images
+// [pixels].
 function seenBox() {
   const [x0, y0] = film.lower, [width, height] = film.edges, [wrapX, wrapY] = film.periodic;
   return [wrapX ? 0 : Math.max(0, across(x0)), wrapY ? 0 : Math.max(0, up(y0 + height)),
@@ -178,11 +184,12 @@ function inBox(brush, action) {
 
 // ---------- disks ----------
 
-// Disks are drawn pixel by pixel into an array, which is far faster than thousands of arcs. The disks of a species are plain, or striped
-// if they are large enough: across (1), upright (2) or both (3). The ground shows between the stripes.
+// Disks are drawn pixel by pixel into an array, which is far faster than thousands of arcs. The
+// disks of a species are plain or, if they are large enough, striped: horizontally (1), vertically
+// (2) or both (3). The background is visible between the stripes.
 const SMALLEST_PATTERN = 3.5, PATTERNS = [0, 1, 2, 3];
 const isStriped = (kind, radius) => PATTERNS[kind % PATTERNS.length] > 0 && radius >= SMALLEST_PATTERN * page.dots;
-const bare = share => share - Math.floor(share) > 0.66;  // the last third of a period is without colour
+const bare = share => share - Math.floor(share) > 0.66;  // the last third of each period of the stripes is transparent
 
 function drawDisks() {
   const code = codesNow(state.colour), [width, height] = film.edges, wraps = film.periodic.some(Boolean);
@@ -214,8 +221,8 @@ function drawDisk(x, y, radius, colour, stripes, [left, top, right, bottom]) {
   }
 }
 
-// The new value of a pixel `old` on the rim of a disk, of which the disk covers a part (0 to 255). Colours of several disks are mixed,
-// and their parts are added.
+// Returns the new value of a pixel `old` at the rim of a disk that covers a part of the pixel (0 to
+// 255). The colours of several disks are mixed, and the covered parts are added.
 function painted(old, colour, covered) {
   const there = old >>> 24;
   if (there === 0) return colour & 0xffffff | covered << 24;
@@ -242,7 +249,8 @@ function drawMarks() {
   if (state.arrows) drawArrowKey();
 }
 
-// Draws a radius at the orientation of each disk that is large enough.
+// Draws a line from the centre to the rim of each disk that is large enough, which shows its
+// orientation.
 const LEAST_TO_TURN = 2;
 function drawRadii() {
   marks.strokeStyle = ink.stage;
@@ -260,7 +268,8 @@ function drawRadii() {
   marks.stroke();
 }
 
-// Draws the recent path of a disk. The older part is pale, and paths without an event log are dotted.
+// Draws the recent path of a disk. The older part of the path is pale, and paths are dotted without
+// an event log.
 function drawTrace(i) {
   const [old, recent] = [300, 30].map(k => frameTime(moment.frame - k));
   for (const [from, to, colour, width] of [[old, recent, ink.soft, 0.9], [recent, moment.shown, ink.ink, 1.6]]) {
@@ -272,7 +281,8 @@ function drawTrace(i) {
   ring(X[i], Y[i], Math.max(radii[sizeOf[i]], 3 * page.dots) + 2 * page.dots);
 }
 
-// Draws the free flights of the partners of the next event, and their positions at that time.
+// Draws the free flights of the partners of the next event, and the partners' positions at the
+// event.
 function drawNextEvent() {
   const [when, ...both] = source.coming().next[0] ?? [], after = when - moment.time, g = film.gravity;
   marks.strokeStyle = ink.accent;
@@ -294,7 +304,7 @@ function ring(x, y, radius) {
   });
 }
 
-// Draws flights; those through periodic sides appear in each image of the box.
+// Draws flights. A flight through a periodic side is drawn in each periodic image of the box.
 function drawPath(list, colour, width) {
   marks.strokeStyle = colour;
   marks.lineWidth = width * page.dots;
@@ -313,7 +323,7 @@ function drawPath(list, colour, width) {
   marks.stroke();
 }
 
-// The arrow of a usual speed is as long as the mean distance of disks.
+// The arrow of a typical speed is as long as the mean distance between disks.
 const arrowScale = () => Math.sqrt(film.edges[0] * film.edges[1] / Math.max(10, disks)) * view.unit / film.scales.speed[1] / Math.sqrt(camera.zoom);
 
 function drawArrows() {
@@ -323,7 +333,7 @@ function drawArrows() {
     const vx = VX[i] * length, vy = -VY[i] * length, size = Math.hypot(vx, vy);
     if (size < 1) continue;
     const head = Math.min(6 * page.dots, 0.5 * size) / size, reach = size / view.unit;
-    const r = radii[sizeOf[i]], hidden = r < 5 * page.dots ? Math.max(head, 1 - r / size) : 1;  // arrows do not cover small disks
+    const r = radii[sizeOf[i]], hidden = r < 5 * page.dots ? Math.max(head, 1 - r / size) : 1;  // starts at the rim of a small disk
     copies([X[i] - reach, X[i] + reach], [Y[i] - reach, Y[i] + reach], (dx, dy) => {
       const x = across(X[i] + dx) + vx, y = up(Y[i] + dy) + vy;
       marks.moveTo(x - hidden * vx, y - hidden * vy);
@@ -333,7 +343,7 @@ function drawArrows() {
       marks.lineTo(x - head * (vx - 0.5 * vy), y - head * (vy + 0.5 * vx));
     });
   }
-  for (const [colour, width] of [[ink.stage, 3.2], [ink.ink, 1.4]]) {  // with a light rim, so that arrows can be seen on dark disks
+  for (const [colour, width] of [[ink.stage, 3.2], [ink.ink, 1.4]]) {  // a light rim makes arrows visible on dark disks
     marks.strokeStyle = colour;
     marks.lineWidth = width * page.dots;
     marks.lineCap = marks.lineJoin = 'round';
@@ -341,7 +351,7 @@ function drawArrows() {
   }
 }
 
-// Draws an arrow of a round speed in the upper left corner, as the scale of all arrows.
+// Draws the scale of the arrows in the upper left corner: an arrow of a round speed.
 function drawArrowKey() {
   const speed = +film.scales.speed[1].toPrecision(1), size = speed * arrowScale(), { dots } = page, words = `speed ${short(speed)}`;
   marks.font = `${12 * dots}px system-ui, sans-serif`;
@@ -353,7 +363,7 @@ function drawArrowKey() {
   marks.fillText(words, x + 6 * dots, y);
 }
 
-// Draws the ids of disks inside them, or beside them if they are too small.
+// Draws the number of each disk inside the disk, or beside it if the disk is too small.
 function drawNumbers() {
   const code = codesNow(state.colour), least = 7 * page.dots;
   marks.textAlign = 'center';

@@ -1,7 +1,8 @@
 // ---------- a run of the laboratory: frames from a worker ----------
 
-// The page draws the newest frame. Earlier frames are kept up to a limit of memory, so that the user can go back. After going back the
-// film plays the kept frames first, and the worker continues afterwards.
+// The page draws the newest frame. Earlier frames are kept up to a limit of memory, so that the
+// user can go back. After going back, the film first plays the kept frames; then the worker
+// continues.
 const PAST_ROOM = 6e7, HEAD = 6, MOST_CURVE = 3000;  // memory for frames [bytes]; numbers before the positions of a message; samples of a plot
 const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, numbers: {}, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
 
@@ -19,7 +20,8 @@ function talk(wish, heard) {
 function starts(on) { document.documentElement.classList.toggle('starting', on); }
 const isStarting = () => document.documentElement.classList.contains('starting');
 
-// Starts the run that the laboratory requests, over the same connection as earlier runs of this film.
+// Starts the run that the laboratory requests. The connection is that of the earlier runs of this
+// film.
 function start(run) {
   const same = stream.wish?.input === run.input, wish = { do: 'start', ...run, pace: same ? stream.sent : null, playing: !parent.isPaused() };
   if (!same) [stream.sent, usual] = [0, usual || !!stream.wish];
@@ -33,7 +35,7 @@ function start(run) {
   });
 }
 
-// Gives up a worker that cannot place its disks soon. The next run has another one.
+// Stops a worker that does not place its disks in time. The next run uses a new worker.
 function leave() { stream.socket.leave(); }
 
 const hear = {
@@ -48,7 +50,7 @@ const hear = {
       refresh();
       return;
     }
-    stream.scene = { facts, blocks, run };  // the scene is shown together with its first frame
+    stream.scene = { facts, blocks, run };  // the new scene is shown together with its first frame
   },
   numbers(news) {
     const { curves } = stream, { time } = news;
@@ -70,11 +72,11 @@ const hear = {
     if (!state.playing && source) show(moment.time, true);
   },
   state({ playing, ended }) {
-    if (isStarting()) return;  // the message is about the run before
+    if (isStarting()) return;  // the message belongs to the previous run
     stream.ended = ended;
     if (!playing && state.playing && stream.live && past.length) play(false);
   },
-  problems({ change }) { if (!change) starts(false); },  // a refused change belongs to the run before
+  problems({ change }) { if (!change) starts(false); },  // a refused change belongs to the previous run
   gone: () => starts(false),
 };
 
@@ -108,10 +110,10 @@ function take(buffer) {
   const head = new Float64Array(buffer, 0, HEAD), pairs = from => new Float32Array(buffer, 8 * HEAD + 8 * from * disks, 2 * disks);
   const frame = { time: head[0], collisions: head[1], sides: [...head.slice(2)], place: pairs(0), velocity: pairs(1) };
   if (film.turning) frame.angle = new Float32Array(buffer, 8 * HEAD + 16 * disks, disks);
-  // No disk crosses half of the box between two frames, because they are so close.
+  // No disk crosses half of the box between two frames, because the interval between them is short.
   cross(frame, ({ place }, k) => film.periodic[k % 2] ? Math.round((place[k] - frame.place[k]) / film.edges[k % 2]) : 0);
   const isFirst = !past.length, follows = stream.live && moment.time === past.at(-1)?.time;
-  if (past.at(-1)?.time === frame.time) past.pop();  // a start and a change repeat a time
+  if (past.at(-1)?.time === frame.time) past.pop();  // at a start or a change the same time occurs again
   past.push(frame);
   while (past.length > 2 && past.length * buffer.byteLength > PAST_ROOM) past.shift();
   stream.fresh++;
@@ -119,7 +121,7 @@ function take(buffer) {
     document.documentElement.classList.remove('empty');
     origins = frame.place;
     const squares = Array.from({ length: disks }, (_, i) => frame.velocity[2 * i] ** 2 + frame.velocity[2 * i + 1] ** 2).filter(Boolean);
-    setTop(1.5 * Math.sqrt(2 * squares.reduce((sum, one) => sum + one, 0) / squares.length) || 1);  // mean over the disks that move
+    setTop(1.5 * Math.sqrt(2 * squares.reduce((sum, one) => sum + one, 0) / squares.length) || 1);  // mean over the moving disks
     move(frame.time);
     begin();
     refresh();
@@ -175,7 +177,7 @@ const fromWorker = {
 
 // ---------- a film inside the laboratory ----------
 
-// The functions that the laboratory calls in its films.
+// These functions are called by the laboratory for each of its films.
 function inside() { return { film, source, state, moment, kinds, stream, overlaid }; }
 
 function overlay(list) {
@@ -194,7 +196,7 @@ function choices(wish) {
   return { pace, speed: $('pace').value, state: { colour, arrows, sofar, total } };
 }
 
-// Plays again from the first kept frame, while another run starts beside this one.
+// Plays again from the first kept frame when another run starts beside this run.
 function replay() {
   if (!film) return;
   show(first(), true);
@@ -203,7 +205,8 @@ function replay() {
   play(true);
 }
 
-// Shows the film as one of several boxes with a stage of `size`, or without `size` as the whole page.
+// Shows the film as one of several boxes with a stage of the given size or, without `size`, as the
+// whole page.
 let boxSize = null;
 function arrange(size, bare) {
   boxSize = size;
