@@ -1,9 +1,10 @@
-"""Draw the pictures of the laboratory's chooser, input/pictures/NAME.png, of a few kB each.
+"""Draw the pictures of the inputs that the laboratory offers: input/pictures/NAME.png.
 
     python docs/chooser_pictures.py [NAME...]
 
-Each shows its input at the time that input/chooser.json says; few disks with their paths.  A
-picture holds the digest of the input that it shows, by which a test sees whether it is of now.
+Each picture shows its input at the time given in input/chooser.json, with the paths of the disks if
+there are few disks.  A picture contains a digest of its input, so that a test can detect that the
+input has changed.
 """
 
 import hashlib
@@ -21,7 +22,7 @@ from PIL import Image, PngImagePlugin
 INPUTS = Path(__file__).resolve().parents[1] / "input"
 PIXELS, FEW = 144, 20
 SPECIES = ("#0072b2", "#d55e00", "#009e73")
-#: The only colours of a picture: greys, and the disks' with what is between them and white.
+# : The palette of a picture: greys, and mixtures of the colours of disks with white.
 PALETTE = [g for grey in (77, 130, 204, 255) for g in (grey,) * 3] + [
     round(255 + share * (int(colour[k : k + 2], 16) - 255))
     for colour in SPECIES
@@ -31,13 +32,13 @@ PALETTE = [g for grey in (77, 130, 204, 255) for g in (grey,) * 3] + [
 
 
 def digest(path: Path, at: float) -> str:
-    """Of what the program reads of an input, without comments, and of the time."""
+    """Return a digest of the time and of the input as the program reads it, without comments."""
     lines = [line.split("!")[0].strip() for line in path.read_text(encoding="utf-8").splitlines()]
     return hashlib.sha256("\n".join([*filter(None, lines), repr(float(at))]).encode()).hexdigest()
 
 
 def picture(path: Path, at: float) -> bytes:
-    """The disks at a time, as PNG."""
+    """Return a picture of the disks at a given time, as PNG."""
     from ricochet import Simulation
     from ricochet.reading.reader import SIDES, obstacles_of, walls_of
 

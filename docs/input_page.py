@@ -1,4 +1,4 @@
-"""Write docs/input.md from what the program says of its variables.
+"""Write docs/input.md from the program's table of variables.
 
 python docs/input_page.py build/ricochet > docs/input.md
 """
@@ -57,14 +57,14 @@ on the laboratory page). All other variables are fixed during a run.
 
 
 def said(program: Path, *words: str) -> str:
-    """Return the answer of the program to an option."""
+    """Return the output of the program for an option."""
     return subprocess.run([program, *words], check=True, capture_output=True, text=True).stdout
 
 
 def variables(program: Path) -> dict[str, dict[str, dict]]:
-    """Return for each group of `GROUPS` its variables, with numbers as the program writes them.
+    """Return the variables of each group of `GROUPS`, with numbers as the program writes them.
 
-    The variables that all kinds of boundaries share are a group of their own.
+    The variables that all kinds of boundaries share form a separate group.
     """
     table = json.loads(said(program, "--print-variables"), parse_float=str, parse_int=str)
     walls = [table[group] for group in ("side", "obstacle", "wall")]
@@ -76,7 +76,7 @@ def variables(program: Path) -> dict[str, dict[str, dict]]:
 
 
 def written(entry: dict) -> str:
-    """The default of a variable, or its example, as an input file has it."""
+    """Return the default of a variable, or its example, in the format of an input file."""
     value = entry["example"] if entry["default"] is None else entry["default"]
     words = value if isinstance(value, list) else [value]
     words = [str(word).lower() if isinstance(word, bool) else word for word in words]
@@ -85,14 +85,14 @@ def written(entry: dict) -> str:
 
 
 def shared(walls: list[dict[str, dict]], name: str) -> bool:
-    """Whether all kinds of boundaries have the variable, with the same meaning."""
+    """Return whether all kinds of boundaries have the variable with the same meaning."""
     return len({wall[name]["help"] for wall in walls if name in wall}) == 1 and all(
         name in wall for wall in walls
     )
 
 
 def condition(group: str, entry: dict) -> str:
-    """The choice with which a variable applies; empty if it always does."""
+    """Return the choice with which a variable applies; empty if the variable always applies."""
     if not entry["goes_with"]:
         return ""
     [(choice, words)] = entry["goes_with"].items()
@@ -103,7 +103,7 @@ def condition(group: str, entry: dict) -> str:
 
 
 def facts(group: str, entry: dict) -> list[str]:
-    """Statements about a variable: allowed values, default, condition, exclusions, changes."""
+    """Return facts about a variable: allowed values, default, condition, exclusions, changes."""
     allowed = [f"Allowed: {entry['allowed']}" + f" [{entry['unit']}]" * bool(entry["unit"])]
     if entry["default"] is not None:
         default = f"Default: `{written(entry)}`"
@@ -123,7 +123,7 @@ def facts(group: str, entry: dict) -> list[str]:
 
 
 def section(group: str, name: str, entry: dict) -> str:
-    """The section of one variable."""
+    """Return the section of the page about one variable."""
     title = name if group == LAW else f"{group}.{name}"
     meanings = (entry["meanings"] or {}).items()
     lines = [f"### `{title}`", "", plain(entry["help"]), ""]
@@ -133,12 +133,12 @@ def section(group: str, name: str, entry: dict) -> str:
 
 
 def plain(text: str) -> str:
-    """Text in which Markdown sees no emphasis."""
+    """Return the text with the marks of emphasis of Markdown escaped."""
     return text.replace("**", "^")
 
 
 def page(program: Path) -> str:
-    """The whole page."""
+    """Return the whole page."""
     lines = [HEAD]
     for group, entries in variables(program).items():
         lines += [f"## {group}" if group == LAW else f"## &{group}", "", GROUPS[group], ""]

@@ -1,8 +1,8 @@
-"""Write the manual page of a command from what it says of itself: ricochet, ricochet-ensemble.
+"""Write the manual page of a command (ricochet, ricochet-ensemble) from the output of --help.
 
 python docs/manual_page.py build/ricochet PREFIX > ricochet.1
 
-The program, which knows its version, is ricochet in the same folder.
+The version is that of the program `ricochet` in the same folder.
 """
 
 import re
@@ -20,7 +20,7 @@ SECTIONS = {
     "exit": "EXIT STATUS",
     "examples": "EXAMPLES",
 }
-LINK = r"\[\w+\]\(([\w.]+)[^)]*\)"  # to another page of docs/
+LINK = r"\[\w+\]\(([\w.]+)[^)]*\)"  # a link to another page of docs/
 FILES = """\
 .SH FILES
 .ad l
@@ -49,13 +49,13 @@ Results, in the format H5MD. Until the run has finished: OUT.h5.part.
 
 
 def roff(text: str) -> str:
-    """Text with everything escaped that roff would take for its own."""
+    """Return the text with all characters escaped that are special in roff."""
     text = text.replace("\\", "\\e").replace("-", "\\-")
     return "\n".join("\\&" + line if line[:1] in {".", "'"} else line for line in text.split("\n"))
 
 
 def section(paragraph: str) -> list[str]:
-    """A paragraph of --help."""
+    """Return a paragraph of --help as a section in roff."""
     found = re.match(r"(\w+):( *)", paragraph)
     word = found[1] if found else "" if paragraph.startswith(" ") else None
     heading = SECTIONS.get(word, "DESCRIPTION")
@@ -65,7 +65,7 @@ def section(paragraph: str) -> list[str]:
 
 
 def inputs(program: Path) -> list[str]:
-    """The groups of the input and their variables."""
+    """Return the groups of the input and their variables in roff."""
     lines = [
         ".SH INPUT",
         "A file consists of groups",
@@ -86,7 +86,7 @@ def inputs(program: Path) -> list[str]:
 
 
 def page(command: Path, prefix: str) -> str:
-    """The whole page."""
+    """Return the whole page."""
     program = command.with_name("ricochet")
     version = said(program, "--version").split()[1]
     headline, *paragraphs = said(command, "--help").rstrip().split("\n\n")

@@ -1,4 +1,4 @@
-"""Print the queues that docs/how-it-works.md shows, and draw them with the disks.
+"""Print the event queues that docs/how-it-works.md shows, and draw them with the disks.
 
     python docs/queue_page.py build/tests/four_disks                   the queues
     python docs/queue_page.py build/tests/four_disks docs/queue.png    and the figure
@@ -23,7 +23,7 @@ BOX, RADIUS = 4.0, 0.3
 
 @dataclass(frozen=True)
 class Expected:
-    """A disk at its clock, and the event that it expects."""
+    """The state of a disk at its own time, and its predicted event."""
 
     disk: int
     place: np.ndarray
@@ -39,7 +39,7 @@ class Expected:
 
     @property
     def what(self) -> str:
-        """In words."""
+        """Return the event in words."""
         if self.kind == "side":
             return f"hits the {SIDES[-self.partner]}"
         return "leaves its cell" if self.kind == "crossing" else f"hits disk {self.partner}"
@@ -59,7 +59,7 @@ def expected(record: dict) -> Expected:
 
 
 def states(program: Path) -> list[tuple[float, list[Expected]]]:
-    """The moment, and the queue in order of time, at the start and after each turn."""
+    """Return time and queue, in order of time, at the start and after each event."""
     text = subprocess.run([program], check=True, capture_output=True, text=True).stdout
     found, decoder = [], json.JSONDecoder()
     while text := text.lstrip():
@@ -71,7 +71,7 @@ def states(program: Path) -> list[tuple[float, list[Expected]]]:
 
 
 def table(now: float, queue: list[Expected]) -> str:
-    """The queue as the page shows it."""
+    """Return the queue in the format of the page."""
     lines = [f"t = {now:.4f}", "   due   disk"]
     for event in queue:
         stale = f"   stale: disk {event.partner} has collided since" if event.stale else ""
@@ -80,7 +80,7 @@ def table(now: float, queue: list[Expected]) -> str:
 
 
 def draw(axes: plt.Axes, now: float, queue: list[Expected]) -> None:
-    """Disks with their velocities; the next event as a line; where it will happen as outlines."""
+    """Draw disks with velocities, the next event as a line, and the positions then as outlines."""
     first, disks = queue[0], {event.disk: event for event in queue}
     axes.add_patch(Rectangle((0, 0), BOX, BOX, fill=False, clip_on=False, **WALL))
     for line in axes.axvline, axes.axhline:

@@ -1,10 +1,10 @@
-"""Write the results of the textbook tasks into docs/getting-started.md, from the studies' tables.
+"""Write the results of the textbook tasks into docs/getting-started.md, from the tables of runs/.
 
     make figures                     or runs/mixture.sh, cooling.sh, crater.sh, gravity.sh alone
     python docs/tasks_page.py        reads runs/figures into docs/tasks.json, and writes the page
 
-docs/tasks.json keeps each number of the page with its error; the text stands between comments with
-its name in the page.
+docs/tasks.json stores each number of the page with its error.  In the page, each text is enclosed
+by comments that contain the name of the text.
 """
 
 import csv
@@ -17,8 +17,8 @@ from ricochet.analysis.statistics import fit_power_law, rounded_to_error
 
 DOCS = Path(__file__).resolve().parent
 TABLES = DOCS.parent / "runs" / "figures"
-BLANK = re.compile(r"{(\S+?)}")  # in a text, for a number
-Numbers = dict[str, tuple[float, float | None]]  # with the error, if there is one
+BLANK = re.compile(r"{(\S+?)}")  # placeholder of a number in a text
+Numbers = dict[str, tuple[float, float | None]]  # value and error (None without an error)
 
 TEXTS = {
     "exam": """\
@@ -56,19 +56,19 @@ TEXTS = {
 
 
 def table(name: str) -> list[dict[str, str]]:
-    """The rows of a table."""
+    """Return the rows of a table."""
     with (TABLES / f"{name}.csv").open(newline="") as file:
         return list(csv.DictReader(file))
 
 
 def value(row: dict[str, str], name: str, error: str = "") -> tuple[float, float | None]:
-    """A number of a row, with its error if there is a column for it."""
+    """Return a number of a row, with its error if the table has a column for the error."""
     error = error or f"{name}_error"
     return float(row[name]), float(row[error]) if error in row else None
 
 
 def mixture() -> Numbers:
-    """Energies and speeds in equilibrium."""
+    """Return the energies and speeds of the mixture in equilibrium."""
     return {
         f"{name}_{row['species']}{end}": value(row, name + end)
         for row in table("mixture")
@@ -78,7 +78,7 @@ def mixture() -> Numbers:
 
 
 def cooling() -> Numbers:
-    """Temperature ratios at the end."""
+    """Return the temperature ratios at the end of cooling."""
     end = table("cooling_velocity")[-1]
     return {
         f"ratio_{xi}": value(end, f"ratio_xi{xi}", f"ratio_error_xi{xi}")
@@ -87,7 +87,7 @@ def cooling() -> Numbers:
 
 
 def crater() -> Numbers:
-    """The crater of the task, and how it grows."""
+    """Return the crater of the task, and the exponents of its growth."""
     rows = [row for row in table("crater_scan") if row["in_fit"] == "1"]
     (base,) = (row for row in rows if row["scan"] == "mass" and float(row["mass"]) == 25)
     found = {name: value(base, name) for name in ("hit", "displaced", "width", "depth")}
@@ -100,7 +100,7 @@ def crater() -> Numbers:
 
 
 def gravity() -> Numbers:
-    """Energy, missed collisions, equipartition, laws."""
+    """Return the results under gravity: energy, missed collisions, equipartition, distributions."""
     changes = [float(row["largest_change"]) for row in table("gravity_energy")]
     times = [value(row, "T_therm") for row in table("gravity_equipartition")]
     found = {"energy_change": (max(changes), None), "T_first": min(times), "T_last": max(times)}
@@ -116,7 +116,7 @@ def gravity() -> Numbers:
 
 
 def words(number: tuple[float, float | None]) -> str:
-    """A number of the page."""
+    """Return a number in the format of the page."""
     mean, error = number
     if error is None:
         return f"{mean:.1g}" if mean < 1e-6 else f"{mean:.4g}"
@@ -124,7 +124,7 @@ def words(number: tuple[float, float | None]) -> str:
 
 
 def filled(page: str, numbers: Numbers) -> str:
-    """The page with the texts in their places."""
+    """Return the page with all texts replaced."""
     for name, template in TEXTS.items():
         text = BLANK.sub(lambda blank: words(numbers[blank[1]]), template)
         items = [" ".join(item.split()) for item in re.split(r"\n(?=- )", text)]

@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
-# Cost of a collision, and of everything around it. docs/performance.md explains the results.
+# Benchmarks: cost of a collision, of the start and of the output. docs/performance.md explains the results.
 #
 #   runs/bench.sh            1e3 to 1e5 disks at four packings; gravity, restitution, sizes, samples
 #   runs/bench.sh --full     1e6 disks as well: rates, random start, memory; runs and threads on two cores
 #   runs/bench.sh --check    instructions per collision against what is promised (needs valgrind)
 #
-# Rates are million collisions per second of processor time of one run with observables on; medians
-# of RUNS=5 on one core. All runs start from a state that was mixed before. Nothing else should run
-# meanwhile. RICOCHET=build/ricochet is measured; for --check it must not contain AVX-512 code.
+# A rate is the number of collisions, in millions, per second of processor time of one run that samples observables. Each rate is
+# the median of RUNS=5 runs on one core. All runs start from a state without correlations to its initial state. No other program
+# should run at the same time. The measured program is RICOCHET=build/ricochet; for --check it must not contain AVX-512 code.
 set -euo pipefail
-export LC_ALL=C # so that awk reads and writes 0.5, whatever the language
+export LC_ALL=C # awk then reads and writes 0.5 with a point in every language
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 
 program=$(realpath "${RICOCHET:-build/ricochet}")
@@ -22,16 +22,16 @@ if command -v taskset >/dev/null; then one_core=(taskset -c $(($(nproc) - 1))); 
 
 # --- One state, one run ---------------------------------------------------------------------------
 
-# input FILE START SPECIES...: writes an input file; every species starts as START says.
+# input FILE START SPECIES...: writes an input file; START contains the variables of the start of every species.
 input() {
   local file=$1 start=$2 species
   shift 2
   for species; do echo "&species $species, $start /"; done >"$file"
 }
 
-# state NAME SPECIES...: mixes the disks of these species and writes $work/NAME.nml, which goes on
-# from there. Mixing takes 20 collisions per disk, from random places or, beyond what random
-# insertion reaches, from a lattice. A lattice of 1e5 disks or more has not melted by then.
+# state NAME SPECIES...: simulates these species for 20 collisions per disk and writes $work/NAME.nml, an input that starts from the
+# result. The initial positions are random or, at packing fractions too high for random insertion, a lattice. A lattice of 1e5 disks
+# or more has not melted after this time.
 state() {
   local name=$1 placement=random
   shift
@@ -43,24 +43,24 @@ state() {
   input "$work/$name.nml" "placement = 'file', file = '$work/$name.h5', velocities = 'file'" "$@"
 }
 
-# gas DISKS PACKING: the state of equal disks.
+# gas DISKS PACKING: makes the state of equal disks.
 gas() { state "gas_$1_$2" "name = 'gas', count = $1, packing_fraction = $2"; }
 
-# polydisperse DISTRIBUTION DISKS PACKING: the state of disks whose radii differ by up to a factor of 9.9.
+# polydisperse DISTRIBUTION DISKS PACKING: makes the state of disks whose radii differ by up to a factor of 9.9.
 polydisperse() {
   local spread=0.472
   [ "$1" = lognormal ] && spread=0.398
   state "$1_$2_$3" "name = 'gas', count = $2, packing_fraction = $3, polydispersity = $spread, radius_distribution = '$1', mass_scaling = 'area'"
 }
 
-# run NAME COLLISIONS [OPTION...]: one run from a state.
+# run NAME COLLISIONS [OPTION...]: performs one run from a state.
 run() {
   local name=$1 collisions=$2
   shift 2
   "${run_by[@]}" "$program" "$work/$name.nml" -o "$work/bench.h5" --force --quiet --set "stop.collisions=$collisions" "$@"
 }
 
-# rate NAME COLLISIONS [OPTION...]: million collisions per second of one run.
+# rate NAME COLLISIONS [OPTION...]: prints the million collisions per second of one run.
 rate() {
   run_by=("${one_core[@]}")
   run "$@" | awk '$1 == "collisions_per_second" { print $3/1e6 }'
@@ -72,7 +72,7 @@ repeated() { local k; for ((k = 0; k < repeats; k++)); do "$@"; done; }
 
 # --- Rates by number and packing -------------------------------------------------------------------
 
-samples() { echo "output.observables_every_collisions=$((5 * $1))"; }      # for so many disks
+samples() { echo "output.observables_every_collisions=$((5 * $1))"; }      # for this number of disks
 
 table() {
   local packing disks sizes=(1000 10000 100000)
@@ -90,10 +90,10 @@ table() {
     "$(repeated rate gas_1000_0.5 20000 --set run.search=pairs | median)"
 }
 
-# --- Rates with something more, interleaved with rates without -----------------------------------------
+# --- Rates with one more option, interleaved with rates without it -----------------------------------------
 
-# beside WHAT LEAST NAME OTHER COLLISIONS [OPTION...]: the rate from state OTHER with options,
-# relative to the one from state NAME without.
+# beside WHAT LEAST NAME OTHER COLLISIONS [OPTION...]: prints the rate from state OTHER with the options, and its ratio to the rate
+# from state NAME without options.
 beside() {
   local what=$1 least=$2 name=$3 other=$4 collisions=$5 k
   shift 5
@@ -108,7 +108,7 @@ beside() {
 
 costs() {
   local g=gas_10000_0.5 frames="output.frames_every_collisions=50000" disks
-  printf '\n%-52s%8s%10s%10s%10s\n' 'with something more (packing 0.5)' without with ratio 'at least'
+  printf '\n%-52s%8s%10s%10s%10s\n' 'with one more option (packing 0.5)' without with ratio 'at least'
   gas 10000 0.5
   gas 100000 0.5
   beside 'gravity' 0.87 $g $g 6000000 --set box.gravity=0,-1
@@ -131,7 +131,7 @@ costs() {
   beside '1e5 disks, packing 0.45: a disk of 100 radii' 0.90 gas_100000_0.45 brownian 6000000
 }
 
-# Five species with radii 1, 1.1, ... 1.4 and together a packing of 0.5.
+# Five species with radii 1, 1.1, ... 1.4 and a total packing fraction of 0.5.
 sizes=()
 for tenths in 10 11 12 13 14; do
   sizes+=("name = 'r$tenths', count = 2000, packing_fraction = $(awk -v r=$tenths 'BEGIN { print r*r/1460 }')")
@@ -139,7 +139,7 @@ done
 
 # --- Whole processes ---------------------------------------------------------------------------------
 
-# process COMMAND...: seconds of processor time and bytes of a whole process.
+# process COMMAND...: prints the processor time in seconds and the memory in bytes of a complete process.
 process() {
   python3 -c 'import os, sys
 child = os.spawnvp(os.P_NOWAIT, sys.argv[1], sys.argv[1:])
@@ -148,7 +148,7 @@ print("used", use.ru_utime + use.ru_stime, 1024*use.ru_maxrss)
 sys.exit(status != 0)' "$@" | awk '$1 == "used" { print $2, $3 }'
 }
 
-# seconds COMMAND...: how long it takes by the wall clock.
+# seconds COMMAND...: prints the wall time of the command in seconds.
 seconds() {
   local TIMEFORMAT=%R
   { time "$@" >/dev/null 2>&3; } 3>&2 2>&1
@@ -173,7 +173,7 @@ processes() {
   printf '%-52s%8.2f times as fast, at least 1.9\n' 'four runs on two cores' "$(awk -v one="$one" -v two="$two" 'BEGIN { print one/two }')"
 }
 
-# faster WHAT LEAST NAME COLLISIONS [OPTION...]: how many times as fast two threads are, by the wall clock, start included.
+# faster WHAT LEAST NAME COLLISIONS [OPTION...]: prints the speedup of two threads in wall time, including the start.
 faster() {
   local what=$1 least=$2 k threads
   shift 2
@@ -202,7 +202,7 @@ threads() {
   faster 'gravity, 100000 disks, packing 0.5' 1.6 gas_100000_0.5 6000000 --set box.gravity=0,-1
 }
 
-# ensemble JOBS: four runs of several seconds, so many at a time.
+# ensemble JOBS: performs four runs of several seconds each, JOBS at a time.
 ensemble() {
   RICOCHET=$program runs/ensemble.sh "$work/gas_10000_0.5.nml" -d "$work/ensemble$1" --seeds 1-4 -j "$1" \
     --set stop.collisions=20000000
@@ -210,8 +210,9 @@ ensemble() {
 
 # --- The gate ------------------------------------------------------------------------------------------
 
-# instructions RADII PACKING COLLISIONS [OPTION...]: of the event loop and of what begins an epoch: what else starts and writes
-# a run depends on the clock. 1000 equal disks, or 4000 of many sizes.
+# instructions RADII PACKING COLLISIONS [OPTION...]: counts the instructions of the event loop and of the start of epochs. The rest
+# of a run (start, output) is left out, because its instructions depend on the clock. The runs have 1000 equal disks, or 4000 disks
+# of many sizes.
 instructions() {
   local radii=$1 packing=$2 collisions=$3 name
   shift 3
@@ -225,7 +226,7 @@ instructions() {
   counted run "$name" "$collisions" "$@"
 }
 
-# counted COMMAND...: instructions of the program that a command runs by `run_by`.
+# counted COMMAND...: prints the number of instructions of the program that COMMAND runs through `run_by`.
 counted() {
   run_by=(valgrind --tool=callgrind --callgrind-out-file=/dev/null)
   run_by+=(--toggle-collect=__{event_driven_MOD_{advance,start,renew},epochs_MOD_move_epoch,kicks_MOD_kick}'*')
@@ -233,8 +234,8 @@ counted() {
   awk '/Collected/ { print $4 }' "$work/count"
 }
 
-# obstacles NAME: writes $work/NAME.nml, one disk among 1225 scatterers, one per unit of area; on a board with so many pegs; or
-# the Lorentz gas.
+# obstacles NAME: writes $work/NAME.nml, an input with one disk among 1225 obstacles: random scatterers with a density of one per
+# unit of area, the pegs of a board, or the scatterers of a Lorentz gas.
 obstacles() {
   local file=$work/$1.nml kind=${1%_*} number=${1#*_}
   case $kind in
@@ -254,19 +255,21 @@ obstacles() {
   echo '&stop events = 1 /' >>"$file"
 }
 
-# events NAME NUMBER: so many events of one disk among obstacles.
+# events NAME NUMBER: runs one disk among obstacles for NUMBER events.
 events() {
   "${run_by[@]}" "$program" "$work/$1.nml" -o "$work/bench.h5" --force --quiet --set "stop.events=$2"
 }
 
-# piston DISKS: writes $work/piston_DISKS.nml, a gas at a packing of 0.2 that a piston of a tenth of its mass balances.
+# piston DISKS: writes $work/piston_DISKS.nml, a gas at a packing fraction of 0.2 in mechanical equilibrium with a piston, whose
+# mass is a tenth of the mass of the gas.
 piston() {
   gas "$1" 0.2
   { echo "&side name = 'right' motion = 'piston' mass = $(($1/10)) force = $((3*$1/2)) /" && cat "$work/gas_$1_0.2.nml"; } \
     >"$work/piston_$1.nml"
 }
 
-# kicked NUMBER: a periodic gas of 1000 disks, all of which get a new velocity ten times per collision time, so many times.
+# kicked NUMBER: runs a periodic gas of 1000 disks with NUMBER thermostat kicks, each of which changes all velocities, ten times per
+# collision time.
 kicked() {
   local interval=8.5e-4
   "${run_by[@]}" "$program" "$work/gas_1000_0.3.nml" -o "$work/bench.h5" --force --quiet --set box.boundary=periodic,periodic \
@@ -330,7 +333,7 @@ conditions() {
   echo "load      $(cut -d ' ' -f 1-3 /proc/loadavg) at $(date -u +%FT%RZ)"
   echo "program   $("$program" --version | sed 1q), commit $(git describe --always --dirty 2>/dev/null || echo unknown)"
   [ ! -e "$flags" ] || echo "built by  $(cat "$flags")"
-  awk '$1 > 0.5 { print "Other programs are running: these figures say little." }' /proc/loadavg
+  awk '$1 > 0.5 { print "Other programs are running: these results are unreliable." }' /proc/loadavg
 }
 
 case ${1:-} in

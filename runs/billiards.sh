@@ -7,7 +7,7 @@ for name in sinai lorentz container; do
   runs/ensemble.sh "input/$name.nml" -d "$data/$name" --seeds 1 --set output.event_log=.true. "$@"
 done
 
-# Sinai's disk from 64 places in 64 directions, each twice, 1e-12 apart; until they are far apart.
+# Sinai's billiard from 64 positions and directions, each in a pair of runs whose starts differ by 1e-12.
 mkdir -p "$data/sinai_pairs"
 for k in {1..64}; do
   for shift in 0 1e-12; do

@@ -1,14 +1,14 @@
 # shellcheck shell=bash
-# Common part of the scripts of the systems; the first line of each reads it. It sets python, data (the
-# folder of the runs), figures (that of the figures) and `replace`. Options of ensemble.sh, such as
-# -j 4, go through.
+# Common part of the scripts of the systems, which each script sources in its first line. It defines the variables python, data
+# (folder of the runs) and figures (folder of the figures), and the function `replace`. Options of ensemble.sh, such as -j 4, are
+# passed on.
 set -euo pipefail
 if [[ " $* " == *' -h '* || " $* " == *' --help '* ]]; then
   sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"
-  printf 'Figures in runs/figures; options as those of ensemble.sh, such as -j 4, go through.\n'
+  printf 'The figures are written to runs/figures; options are passed to ensemble.sh, for example -j 4.\n'
   exit 0
 fi
-export LC_ALL=C # so that awk writes 0.5, whatever the language
+export LC_ALL=C # awk then writes 0.5 with a point in every language
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 python=${PYTHON:-.venv/bin/python} data=runs/$(basename -- "$0" .sh) figures=runs/figures
 command -v "$python" >/dev/null || {
@@ -17,7 +17,7 @@ command -v "$python" >/dev/null || {
 }
 mkdir -p -- "$data" "$figures"
 
-# FILE becomes what comes in; a link in its place goes, and nothing is written through it.
+# replace FILE: writes standard input to FILE. If FILE is a link, the link is replaced and its target is not changed.
 replace() {
   rm -f -- "$1" && (set -C && cat >"$1")
 }

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# L2: time per collision against the number of disks for the three ways of finding the next one.
-# One run at a time, for the clock's sake; remove runs/cost to measure anew.
+# L2: time per collision against the number of disks for the three methods of finding the next event. The runs are performed one at
+# a time, so that they do not disturb each other's timing; remove runs/cost to repeat the measurement.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# Packing fraction 0.3 whatever the number; no output on the way. Collisions enough that the first
-# predictions, one per disk, do not count: 10 per disk, 5 of a million disks; with `rescan`, which
-# predicts all disks at each collision, some hundreds at all.
-measure() { # collisions, collisions per disk, power of N to divide the first by, search, counts
+# The packing fraction is 0.3 for every number of disks, and no output is written during a run. The number of collisions is large
+# enough to make the cost of the first predictions (one per disk) negligible: 10 per disk, or 5 per disk for a million disks. A few
+# hundred collisions in total suffice for `rescan`, which predicts the events of all disks at each collision.
+measure() { # columns: collisions, collisions per disk, power of N by which the collisions are divided, search, numbers of disks
   local collisions=$1 per_disk=$2 power=$3 search=$4 count number radius
   shift 4
   for count; do
@@ -21,7 +21,7 @@ measure() { # collisions, collisions per disk, power of N to divide the first by
     printf '\n'
   done
 }
-for repeat in 1 2 3; do # the best of three counts: a disturbance can only add
+for repeat in 1 2 3; do # the fastest of three runs is used, because other processes can only slow a run down
   measure 200000000 0 2 rescan 16 32 64 128 256 512 1024
   measure 100000000 10 1 pairs 16 32 64 128 256 512 1024 2048 4096 8192
   measure 1000000 10 0 cells 16 32 64 128 256 512 1024 2048 4096 8192 16384 65536 262144

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# How often an error bar holds the truth: 200 short runs of a gas, a liquid, and near freezing.
+# Fraction of error bars that contain the true value: 200 short runs of a gas, of a liquid, and of a liquid near freezing.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 while read -r packing placement; do

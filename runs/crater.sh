@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# S5: one crater in pictures, then its size against mass, speed, radius and restitution.
+# S5: pictures of one crater, and the crater size against mass, speed, radius and restitution.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# Eight beds (seeds) for each of ten values of each parameter, the other three at the base
-# mass 25, speed 5, radius 5, restitution 0.5.  There is no energy scale, so the speed must not
-# matter: the contact time goes with 1/speed to keep that exact.
+# Each parameter has ten values, with eight beds (seeds) for each value. The other three parameters have their base values: mass 25,
+# speed 5, radius 5, restitution 0.5. Without an energy scale the result cannot depend on the speed; the contact time is
+# proportional to 1/speed, so that this remains exact.
 member() { # mass speed radius restitution seed
   local contact_time
   contact_time=$(awk -v v="$2" 'BEGIN { printf "%.17g", 5e-5 / v }')

@@ -1,7 +1,6 @@
 #!/usr/bin/env bash
-# Gases that walls heat and shear, rough disks, transport in equilibrium, and what pistons, shaking,
-# kicks and swimming do to disks: Leidenfrost, Maxwell's demon, the Brazil nut, noise, active disks;
-# four seeds each.
+# Gases that are heated or sheared by walls, rough disks, transport coefficients in equilibrium, and driven disks: the Leidenfrost
+# effect, Maxwell's demon, the Brazil nut effect, compression by a piston, white-noise driving and active disks; four seeds each.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 for system in fourier couette rough; do
@@ -13,7 +12,7 @@ done
   -o "$figures/couette.png" --csv "$figures/couette.csv"
 "$python" post/rough.py "$data"/rough/*.h5 -o "$figures/rough.png" --csv "$figures/rough.csv"
 
-# Viscosity, conductivity, diffusion: some mean free times from frame to frame, packing by packing.
+# Viscosity, conductivity and diffusion: the interval between frames is several mean free times at each packing fraction.
 transport=()
 while read -r packing interval samples placement; do
   runs/ensemble.sh input/bulk.nml -d "$data/transport_$packing" --seeds 1-4 \
@@ -32,7 +31,7 @@ TABLE
 "$python" post/transport.py "${transport[@]}" -o "$figures/transport.png" \
   --csv "$figures/transport.csv"
 
-# SYSTEM, what to show of it, its member for the film, and what sets its runs apart.
+# Arguments: the system, the quantity to show, the member run for the film, and the options that define the member runs.
 while read -r system show film scan; do
   runs/ensemble.sh "input/$system.nml" -d "$data/$system" --seeds 1-4 ${scan:+--scan "$scan"} "$@"
   "$python" post/driven.py "$data/$system"/*.h5 --show "$show" -o "$figures/$system.png" \

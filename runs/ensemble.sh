@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Run many members of an ensemble or a scan: seeds x values, all cores, safe to stop and repeat.
+# Performs the member runs of a sweep (seeds x values) on all cores. The same command continues after an interruption.
 set -euo pipefail
 me=${0##*/}
 ((BASH_VERSINFO[0]*100 + BASH_VERSINFO[1] >= 404)) || { echo "bash 4.4 or newer is needed, this is $BASH_VERSION" >&2; exit 2; }
-export OMP_NUM_THREADS=1 # a core for each member; run.threads still decides
+export OMP_NUM_THREADS=1 # default of one core for each member; run.threads has priority
 
 usage() {
   cat <<TEXT
@@ -45,7 +45,7 @@ exit:   0 all finished; 1 some failed; 2 wrong usage; 3 the folder cannot be use
 TEXT
 }
 
-# CODE TEXT...: one line and the end.
+# fail CODE TEXT...: prints one line and exits with CODE.
 fail() {
   local code=$1
   shift
@@ -55,7 +55,7 @@ fail() {
 
 die() { fail 2 "$@"; }
 
-# "; did you mean --seeds?", if one of the words behind the first is like it (and Python is there)
+# nearest WORD CHOICE...: prints "; did you mean --seeds?" if WORD is similar to one of the choices (requires Python).
 nearest() {
   python3 -c 'import difflib, sys
 for near in difflib.get_close_matches(sys.argv[1], sys.argv[2:], 1): print(f"; did you mean {near}?")' \
@@ -68,7 +68,7 @@ most=100000
 names=()
 overrides=()
 
-# 1-4,11 -> run.seed=1,2,3,4,11 among the scans
+# Adds run.seed=1,2,3,4,11 to the scans if the argument is 1-4,11.
 scan_seeds() {
   local part first last parts list=()
   mapfile -t -d , parts < <(printf '%s,' "$1")
@@ -86,8 +86,8 @@ scan_seeds() {
   scans+=("run.seed=${list%,}")
 }
 
-# Every combination of the scans (first varies slowest) and the seeds. The values become the name, without blanks and
-# slashes: ball.mass_5 of species.ball.mass=5, gravity_2_-5 of box.gravity(2)=-5.
+# Adds a member for every combination of the scans (the first one varies slowest) and the seeds. The name of a member is built from
+# its values, without blanks and slashes: ball.mass_5 for species.ball.mass=5, gravity_2_-5 for box.gravity(2)=-5.
 generate_members() {
   local scan variable list values separator value k short old_names old_overrides known=' '
   names=("") overrides=("")
@@ -149,9 +149,9 @@ check_names() {
   done
 }
 
-# --- the folder: nothing is written through a link, into a FIFO, or into a file of something else ---
+# --- the folder: the script never writes through a link, into a FIFO, or into a file that it did not create ---
 
-# Is FILE absent or ordinary?
+# ordinary FILE: succeeds if FILE does not exist or is an ordinary file.
 may_be_ours() { [[ ! -L $1 && (! -e $1 || -f $1) ]]; }
 
 check_ordinary() {
@@ -159,7 +159,8 @@ check_ordinary() {
     fail 3 "$1 is not an ordinary file: remove it, or choose another folder"
 }
 
-# FILE becomes what comes in, whole or not at all; what was there is replaced, not written to.
+# replace FILE: writes standard input to FILE, completely or not at all. An existing file is replaced by a new one, so that its
+# links keep the old content.
 put() {
   local new=$folder/.new.$$.${HOSTNAME:-} reason
   check_ordinary "$1"
@@ -169,17 +170,18 @@ put() {
   fi
 }
 
-# The last line in the log of member NAME.
+# Prints the last line of the log of member NAME.
 last_words() { ! may_be_ours "$folder/$1.log" || tail -n 1 -- "$folder/$1.log" 2>/dev/null || true; }
 
-goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line of a member that has not failed
+goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line in the log of a member that has not failed
 
-# Does member NAME have data, finished or to go on from? One that broke off has said why.
+# Succeeds if member NAME has data: a finished output or one from which it can continue. The log of a member that failed states the
+# reason.
 has_data() { [[ -e $folder/$1.h5 || -e $folder/$1.h5.part && $(last_words "$1") =~ $goes_on ]]; }
 
 has_failed() { [[ ! -e $folder/$1.h5 && ! $(last_words "$1") =~ $goes_on ]]; }
 
-# The log of an earlier attempt of member NAME says nothing about the next: an empty line ends it.
+# Appends an empty line to the log of member NAME, so that its last line is not attributed to the next attempt.
 forget_failure() {
   local lock
   has_failed "$1" && open_log "$folder/$1.log" || return 0
@@ -187,11 +189,12 @@ forget_failure() {
   exec {lock}>&-
 }
 
-# Members of an earlier command on the folder must mean the same: results are told apart by name.
+# Checks that the members of an earlier command in this folder have the same settings, because results are identified by their
+# names.
 remember() {
   local line name k door='' changed='' mended=''
   local -A before=() linked=()
-  if { exec {door}<"$folder"; } 2>/dev/null; then # one command at a time, where folders have locks
+  if { exec {door}<"$folder"; } 2>/dev/null; then # one command at a time, if the file system supports locks
     flock -w 60 -E 75 "$door" 2>/dev/null || (($? != 75)) ||
       fail 3 "$folder is locked by another command: try again later"
   fi
@@ -234,7 +237,7 @@ remember() {
 
 # --- workers ---
 
-# The overrides of member k behind what is in `arguments`.
+# Appends the overrides of member k to `arguments`.
 add_overrides() {
   local rest=${overrides[$1]}
   while [[ $rest == '--set '* ]]; do
@@ -244,13 +247,13 @@ add_overrides() {
   done
 }
 
-# Run member k; what became of it goes through the pipe to the parent.
+# Runs member k and reports the result to the parent through the pipe.
 run_member() {
   local base=$folder/${names[$1]} status resume='' said
   said=$(last_words "${names[$1]}")
   local arguments=("$input" -o "$base.h5" --quiet)
   add_overrides "$1"
-  [[ -z $said ]] || echo >&"$lock" # of an attempt before
+  [[ -z $said ]] || echo >&"$lock" # from an earlier attempt
   [[ ! -e $base.h5.part ]] || resume=--resume
   while :; do
     "$program" "${arguments[@]}" $resume >"/dev/fd/$lock" 2>&1 </dev/null {events}>&- &
@@ -258,20 +261,21 @@ run_member() {
     [[ -z $stopping ]] || kill -TERM "$child" 2>/dev/null || true # the signal came before
     while :; do # `wait` also ends when a signal comes
       interrupted='' status=0
-      wait "$child" 2>/dev/null || status=$? # without bash's word on a kill
+      wait "$child" 2>/dev/null || status=$? # suppresses bash's message about a killed process
       [[ -n $interrupted && ($status == 143 || $status == 130) ]] || break
     done
     child=
     [[ -n $resume && $(last_words "${names[$1]}") == *": its run broke off "* ]] || break
-    resume= # it starts over
+    resume= # the member starts from the beginning
   done
-  # Stopped while it started, or while bash waited for it a second time (-1: it has lost the status).
+  # The member was stopped while it started, or while bash waited for it a second time (-1: bash has lost the exit status).
   if [[ -n $stopping ]] && ((status >= 127 || status < 0)); then status=75; fi
   ((status <= 128)) || tell_kill "$status" "$said" >&"$lock"
   printf '%s %s\n' "$1" "$status" >&"$events"
 }
 
-# STATUS and what was said before: a third kill asks for more memory or time, not for a fourth attempt.
+# Arguments: the exit status and the earlier messages. After three kills no further attempt is made, because the member needs more
+# memory or time.
 tell_kill() {
   local how='' given_up=''
   [[ $1 != 137 ]] || how=' (out of memory?)'
@@ -280,7 +284,8 @@ tell_kill() {
   printf '%skilled by signal %d%s, %(%FT%T%z)T on %s\n' "$given_up" "$(($1 - 128))" "$how" -1 "$host"
 }
 
-# Opens a member's log as `lock`: a file that is ordinary, has one name, and is what was opened.
+# Opens a member's log with the file descriptor `lock`. The file must be ordinary, have only one name, and be the same as the opened
+# one.
 open_log() {
   may_be_ours "$1" && { exec {lock}>>"$1"; } 2>/dev/null || return
   [[ ! -L $1 && $1 -ef /dev/fd/$lock && $(stat -L -c %h "/dev/fd/$lock") == 1 ]] && return
@@ -288,8 +293,8 @@ open_log() {
   return 1
 }
 
-# Walk along all members; take those that no other worker and no other copy has taken.
-# The lock is on the log; the program inherits it, so it holds as long as the program lives.
+# Runs all members that no other worker and no other copy of the script has taken. A member is taken by a lock on its log; the
+# program inherits the lock, which therefore exists as long as the program runs.
 work() {
   local k base lock child='' stopping='' interrupted=''
   trap 'stopping=1 interrupted=1; [[ -z $child ]] || kill -TERM "$child" 2>/dev/null || true' TERM INT
@@ -305,7 +310,7 @@ work() {
     elif [[ -e $base.h5 ]]; then
       printf '%s 0\n' "$k" >&"$events"
     elif [[ -n $share ]] && has_failed "${names[k]}"; then
-      printf '%s failed before\n' "$k" >&"$events" # as this task was requeued
+      printf '%s failed before\n' "$k" >&"$events" # because this task was requeued
     else
       tell "${names[k]}" "$([[ -e $base.h5.part ]] && echo continues || echo begins)"
       run_member "$k"
@@ -326,7 +331,7 @@ clock() {
   fi
 }
 
-# MEMBER TEXT: a line of a share, which must tell by itself who, when and where.
+# tell MEMBER TEXT: prints a line of a share. Because shares run elsewhere, the line contains the member, the time and the host.
 tell() {
   [[ -z $task ]] || printf '%(%FT%T%z)T %s %s %s: %s\n' -1 "$task" "$host" "$1" "$2" >&2
 }
@@ -356,7 +361,7 @@ run_all() {
   mkfifo "$claims/pipe"
   exec {events}<>"$claims/pipe"
   trap forward TERM INT HUP
-  set -m # own process groups: Ctrl-C reaches this script alone, which sends each member one TERM
+  set -m # separate process groups: Ctrl-C reaches this script only, which sends one TERM to each member
   for ((slot = 0; slot < jobs && slot < total; slot++)); do
     [[ -z $stopped ]] || break
     work &
@@ -370,9 +375,9 @@ run_all() {
       message=''
       count_reply "$k" "$status"
     elif kill -0 "${workers[@]}" 2>/dev/null; then
-      message+=$part # the second was over in the midst of a line
+      message+=$part # the second ended within a line
     else
-      break # all were killed
+      break # all workers were killed
     fi
     show_progress
   done
@@ -399,7 +404,8 @@ failure() {
   tell "$1" "failed$2: ${3:-no message in its log}"
 }
 
-# TEXT of what has come before; a share has told all.
+# Prints a summary, with TEXT for the members of earlier commands. A share prints no summary, because it has printed a line for each
+# member.
 announce() {
   [[ -z $share ]] || return 0
   printf '%s: %s%d of %d members finished' "$folder" "$1" "$finished" "$total" >&2
@@ -419,9 +425,10 @@ summarise() {
   exit 75
 }
 
-# --- engines: the same script, with one share of the members, started elsewhere ---
+# --- engines: they start this script elsewhere, each time with one share of the members ---
 
-# Fills `share_command`, which lacks only K/M, and `shares`, M: at most so many. A member that failed has no share.
+# Sets `share_command`, to which K/M must be appended, and `shares`, the number M of shares, which is at most the argument. Failed
+# members belong to no share.
 prepare_shares() {
   local most=$1 k here left=0
   here=$(cd -- "$folder" && pwd)
@@ -434,7 +441,7 @@ prepare_shares() {
     --manifest "$here/left.txt" -j 1 --share)
 }
 
-# The results of the members follow from their files.
+# The states of the members are determined from their files.
 judge_by_files() {
   local name said=''
   for name in "${names[@]}"; do
@@ -443,8 +450,8 @@ judge_by_files() {
   done
 }
 
-# TERM must meet the script itself: a shell above it would die at once, and GNU parallel would take
-# that for the end of the share, and go on with its sequence.
+# TERM must be delivered to the script itself: a shell that runs the script would terminate at once, and GNU parallel would regard
+# the share as finished and continue with its sequence.
 run_parallel() {
   local options=(--will-cite -j "$jobs" --termseq 'TERM,600000') child=''
   command -v parallel >/dev/null || die "--engine parallel needs GNU parallel (package parallel)"
@@ -462,8 +469,8 @@ run_parallel() {
   judge_by_files
 }
 
-# An input with which no member could begin fails before any member waits in the queue. Of members that differ only in their
-# seed one is tried.
+# Checks the input before jobs are submitted, so that an invalid input fails at once and not in the queue. Of members that differ
+# only in their seed, one is checked.
 check_inputs() {
   local k kind reason arguments
   local -A seen=()
@@ -475,10 +482,10 @@ check_inputs() {
     add_overrides "$k"
     reason=$("$program" "${arguments[@]}" 2>&1 </dev/null) || failure "${names[k]}" " (exit $?)" "${reason##*$'\n'}"
   done
-  ((failed == 0)) || summarise 'nothing is submitted: mend what failed, or leave it out: '
+  ((failed == 0)) || summarise 'nothing is submitted: correct the members that failed, or leave them out: '
 }
 
-# Members on other machines end a moment after the connection to them has.
+# Members on other machines end shortly after the connection to them has ended.
 wait_for_locks() {
   local name
   for name in "${names[@]}"; do
@@ -487,8 +494,7 @@ wait_for_locks() {
   done
 }
 
-# The array's tasks send TERM on to the members; a task whose time is over, and that nobody has
-# cancelled, goes back into the queue.
+# The tasks of the array pass TERM on to the members. A task that reaches its time limit and was not cancelled is requeued.
 submit_to_slurm() {
   local id='' here text site
   command -v sbatch >/dev/null || die "--engine slurm needs Slurm (no sbatch here)"
@@ -503,7 +509,7 @@ submit_to_slurm() {
   [[ -z $retry ]] || for name in "${names[@]}"; do forget_failure "$name"; done
   check_inputs
   judge_by_files
-  site=$(scontrol show config 2>/dev/null | awk '$1 == "MaxArraySize" { print $3 - 1 }' || true) # the highest number
+  site=$(scontrol show config 2>/dev/null | awk '$1 == "MaxArraySize" { print $3 - 1 }' || true) # the largest index of a task
   [[ $site =~ ^[1-9][0-9]*$ ]] || site=1000
   : "${tasks:=$((10*jobs))}"
   prepare_shares "$((tasks < site ? tasks : site))"
@@ -592,7 +598,7 @@ for k in "${!overrides[@]}"; do
   overrides[k]=${common:+$common${overrides[k]:+ }}${overrides[k]}
 done
 
-# Of M shares the K-th: members K, K + M, K + 2M, ...
+# The K-th of M shares consists of the members K, K + M, K + 2M, ...
 if [[ -n $share ]]; then
   task=${SLURM_ARRAY_JOB_ID:+${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID:-}}
   task=${task:-share $share}
@@ -605,7 +611,7 @@ fi
 
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 program=${here%/*}/build/ricochet
-[[ ! -x $here/ricochet ]] || program=$here/ricochet # both are installed
+[[ ! -x $here/ricochet ]] || program=$here/ricochet # program and script are installed in the same folder
 program=${RICOCHET:-$program}
 [[ -f $program && -x $program ]] || die "there is no program $program: run make, or set RICOCHET"
 if [[ -n $dry ]]; then
@@ -615,7 +621,7 @@ if [[ -n $dry ]]; then
   reason=$("$program" "${arguments[@]}" 2>&1 </dev/null) || status=$?
   ((status != 2)) || die "member ${names[0]} cannot run: ${reason##*$'\n'}"
   ((status == 0)) || printf '%s: note: member %s cannot run yet: %s\n' "$me" "${names[0]}" "${reason##*$'\n'}" >&2
-  exit 0 # a starting file may be a result that another ensemble will have
+  exit 0 # a starting file may be a result of another sweep that does not exist yet
 fi
 command -v flock >/dev/null || die "the program flock is missing (package util-linux)"
 reason=$(mkdir -p -- "$folder" 2>&1) || fail 3 "cannot make $folder: ${reason##*: }"

@@ -25,12 +25,12 @@ for system; do
   "runs/$system.sh" "${options[@]}" || status=$?
   case $status in
   0) ;;
-  75 | 130 | 143) exit 75 ;; # stopped on purpose: the same command goes on
+  75 | 130 | 143) exit 75 ;; # stopped on request: the same command continues
   *) failed+=("$system (exit $status)") ;;
   esac
 done
 
-# One section per figure that is there: name, title, the script that makes it.
+# Writes a section for each existing figure: name, title, and the script that produces it.
 section() {
   local name=$1 title=$2 script=$3 file
   for file in "$name".{png,mp4,gif}; do
@@ -43,7 +43,7 @@ section() {
     fi
     printf '<figcaption><b>%s</b> <code>runs/%s.sh</code>' "$title" "$script"
     [[ ! -e $figures/$name.csv ]] || printf ' <a href="%s.csv">numbers</a>' "$name"
-    [[ ! -e $figures/$name.html ]] || printf ' <a href="%s.html">to play with</a>' "$name"
+    [[ ! -e $figures/$name.html ]] || printf ' <a href="%s.html">interactive film</a>' "$name"
     printf '</figcaption>\n</figure>\n'
     return
   done
@@ -82,7 +82,7 @@ HTML
   section lab_masses_speeds 'The lab with different masses: speeds' lab
   section cost 'Cost of a collision' cost
   section billiards 'Billiards: Sinai, Lorentz' billiards
-  section lyapunov 'Sinai billiard: how fast neighbours part' billiards
+  section lyapunov 'Sinai billiard: divergence of neighbouring trajectories' billiards
   section container 'A round container' billiards
   section container_film 'A round container, film' billiards
   section brownian 'Brownian motion' billiards
@@ -95,28 +95,28 @@ HTML
   section gravity_frames 'Gravity: frames' gravity
   section gravity_film 'Gravity, film' gravity
   section equation_of_state 'Bulk: equation of state' state
-  section correlations 'Bulk: memory, diffusion, order' state
-  section rates 'Bulk: pressure in time, free paths' state
-  section haff 'Bulk: cooling by the law of Haff' state
+  section correlations 'Bulk: time correlations, diffusion, order' state
+  section rates 'Bulk: pressure against time, free paths' state
+  section haff 'Bulk: cooling and the law of Haff' state
   section stages 'Stages: compressed and relaxed' stages
   section stages_expanded 'Stages: cooled, heated, expanded' stages
-  section melting 'Melting: pressure against packing' melting
-  section melting_0.698 'Direction of the bonds at 0.698' melting
-  section melting_0.708 'Direction of the bonds at 0.708' melting
-  section melting_0.72 'Direction of the bonds at 0.720' melting
-  section fourier 'Heat between a hot and a cold wall' driven
+  section melting 'Melting: pressure against packing fraction' melting
+  section melting_0.698 'Bond orientation at packing fraction 0.698' melting
+  section melting_0.708 'Bond orientation at packing fraction 0.708' melting
+  section melting_0.72 'Bond orientation at packing fraction 0.720' melting
+  section fourier 'Heat conduction between a hot and a cold wall' driven
   section couette 'A gas between sliding walls' driven
-  section rough 'Rough disks: temperatures of translation and rotation' driven
-  section leidenfrost 'Leidenfrost: a dense layer floats on a hot one' driven
+  section rough 'Rough disks: translational and rotational temperature' driven
+  section leidenfrost 'Leidenfrost effect: a dense layer above a hot dilute layer' driven
   section leidenfrost_fields 'Leidenfrost: density and temperature above the floor' driven
   section demon "Maxwell's demon: grains gather in one of two chambers" driven
   section nut 'The Brazil nut: a large disk rises in a shaken bed' driven
   section compression 'Compression heats a gas along its adiabat' driven
-  section constant_pressure 'A piston that disks push: width at constant enthalpy' driven
-  section heated 'A granular gas held by random kicks' driven
-  section active 'Active disks gather in clusters' driven
+  section constant_pressure 'A free piston: width at constant enthalpy' driven
+  section heated 'A granular gas with white-noise driving' driven
+  section active 'Active disks form clusters' driven
   section transport 'Bulk: viscosity, conductivity, diffusion' driven
-  section coverage 'Bulk: how often an error bar holds the truth' coverage
+  section coverage 'Bulk: coverage of error bars' coverage
   printf '</main>\n</html>\n'
 } | replace "$figures/index.html"
 printf 'figures = %s/index.html\n' "$figures"

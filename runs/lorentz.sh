@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# The random Lorentz gas: one tracer among 100 000 scatterers that may overlap, at six densities, and
-# its diffusion coefficient against kinetic theory. Each run has scatterers of its own. N=1000000
-# takes more of them, EVENTS=10000000 longer runs.
+# The random Lorentz gas: one tracer among 100 000 scatterers that may overlap, at six densities. Its diffusion coefficient is
+# compared with kinetic theory. Each run has different scatterers. N=1000000 sets the number of scatterers, EVENTS=10000000 the
+# number of events of each run.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
-scatterers=${N:-100000} events=${EVENTS:-1000000} tracer=0.1 # radii: 0.1 and 0.9, so that R = 1
+scatterers=${N:-100000} events=${EVENTS:-1000000} tracer=0.1 # the radii are 0.1 (tracer) and 0.9 (scatterers), so that R = 1
 
 replace "$data/lorentz.nml" <<NML
 ! One tracer among random scatterers; each member sets the file, the size of the box and the frames.

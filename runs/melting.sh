@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Melting: pressure against packing fraction, and pictures of the order of the bonds.
+# Melting: pressure against packing fraction, and pictures of the bond-orientational order.
 #
-# A crystal takes very long to melt between 0.70 and 0.72, and a liquid to freeze. Therefore 64^2 disks
-# start from a crystal that has half melted at 0.66, once a little less and once a little more, so
-# that a memory of the start shows in their scatter. 128^2 disks start as four copies of these, with
-# other velocities. Some minutes; P* is then right to 0.1 near melting, and warnings say where the two
-# starts still differ. With FULL=1 long runs, and 256^2 disks: some eight hours of processor time.
+# A crystal takes very long to melt between 0.70 and 0.72, and a liquid to freeze. Therefore 64^2 disks start from a crystal that is
+# about half melted at 0.66. There are two such starts, one slightly less and one slightly more melted, so that an influence of the
+# start shows as a difference between the runs. 128^2 disks start from four copies of the result, with new velocities. The script
+# takes several minutes; P* is then correct to 0.1 near melting, and warnings state at which packing fractions the two starts still
+# differ. FULL=1 performs longer runs, and runs of 256^2 disks, in about eight hours of processor time.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 if [[ -n ${FULL:-} ]]; then
@@ -15,15 +15,15 @@ else
   sides=(64 128) length=([64]=4000 [128]=1500)
 fi
 
-disks() { # side of the square, folder, further options of ensemble.sh
+disks() { # arguments: number of disks along a side of the square, folder, further options of ensemble.sh
   local upper
   upper=$(awk -v n="$1" 'BEGIN { printf "%.17g,%.17g", n / 64, n / 64 * sqrt(3) / 2 }')
   runs/ensemble.sh input/bulk.nml -d "$data/$2" --set "species.disks.count=$(($1 ** 2))" \
     --set "box.upper=$upper" --set "output.observables_every_collisions=$((5 * $1 ** 2))" "${@:3}"
 }
 
-# Of runs in a folder: four copies of the last frame, side by side, as a starting file.
-copy_four_times() { # folder, names of the runs
+# copy_four_times FOLDER NAME...: writes, for each run, a starting file with four copies of its last frame in a square.
+copy_four_times() {
   "$python" - "$@" <<'PYTHON'
 import sys
 import numpy as np

@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
-# Memory per disk of each kind of run, beside the memory that the program assumes (src/start/memory.f90).
+# Memory per disk of each kind of run, compared with the estimate of the program (src/start/memory.f90).
 #
 #   runs/memory.sh             490 000 disks, on one core without domains, and 10^6 with domains
-#   runs/memory.sh 10000000    so many disks, of the kinds that have domains
-#   runs/memory.sh 490000 file only kinds whose name contains a word
+#   runs/memory.sh 10000000    this number of disks, only the kinds of run with domains
+#   runs/memory.sh 490000 file only the kinds whose name contains a word
 #
-# The measured number is the largest resident memory of the process, the assumed one that of --check. It needs about
-# 250 bytes per disk (700 with lists of neighbours) and no quiet machine. RICOCHET=build/ricochet is measured.
+# The measured number is the largest resident memory of the process, and the estimate is that printed by --check. The script needs
+# about 250 bytes of memory per disk (700 with neighbour lists). Other programs may run at the same time. The measured program is
+# RICOCHET=build/ricochet.
 set -euo pipefail
-export LC_ALL=C # so that awk reads and writes 0.5, whatever the language
+export LC_ALL=C # awk then reads and writes 0.5 with a point in every language
 case ${1:-} in -h | --help) sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 program=$(realpath "${RICOCHET:-build/ricochet}")
@@ -16,8 +17,8 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 verdict=0
 
-# kind DISKS NAME TEXT...: runs an input of these lines, %N being the number of disks, and prints a row. Where NAME begins
-# with `keep` the output is the starting file of others.
+# kind DISKS NAME TEXT...: runs an input that consists of the lines TEXT, in which %N stands for the number of disks, and prints a
+# row. If NAME begins with `keep`, the output is kept as the starting file of other kinds.
 kind() {
   local disks=$1 name=$2 out=$work/run.h5 assumed used
   shift 2
@@ -59,7 +60,7 @@ serial() {
   kind "$n" 'from a file, periodic, frames' "$periodic" "$(from periodic)" "$stop" "$frames"
   kind "$n" 'radii from 0.74 to 1.26' "$(disks 0.4 random "polydispersity = 0.15 radius_distribution = 'uniform'")" "$stop"
   kind "$n" 'lists of neighbours' "$(disks 0.45 random "$lognormal")" "$stop"
-  kind "$n" 'lists of neighbours, periodic, frames' "$periodic" "$(disks 0.45 random "$lognormal")" "$stop" "$frames"
+  kind "$n" 'neighbour lists, periodic, frames' "$periodic" "$(disks 0.45 random "$lognormal")" "$stop" "$frames"
   kind "$n" 'driving, periodic' "$periodic" "$(disks 0.5 lattice)" '&stop time = 1e-3 /' \
     "&drive kind = 'noise' strength = 1 interval = 1e-4 /"
   kind "$n" 'piston' "$(disks 0.5 lattice)" "$stop" "&side name = 'right' motion = 'piston' mass = 100 force = 1 /"
@@ -69,11 +70,11 @@ serial() {
 }
 
 divided() {
-  local n=$1 stop='&stop collisions_per_disk = 6 /' # shorter runs take no domains
+  local n=$1 stop='&stop collisions_per_disk = 6 /' # shorter runs do not use domains
   kind "$n" 'domains, random' "$(disks 0.5 random)" "$stop"
   kind "$n" 'domains, lattice' "$(disks 0.5 lattice)" "$stop"
   kind "$n" 'domains, periodic' "$periodic" "$(disks 0.5 lattice)" "$stop"
-  kind "$n" 'domains, lists of neighbours' "$(disks 0.45 random "$lognormal")" "$stop"
+  kind "$n" 'domains, neighbour lists' "$(disks 0.45 random "$lognormal")" "$stop"
 }
 
 only=${2:-}

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# How much faster a run is on the cores of this machine: about five minutes, in which nothing else should
-# run. Not part of `make figures`. Gases at packing fraction 0.5 in a box with walls, 6 million collisions
-# (15 million of a million disks), three runs alternately with 1, 2, 4, ... threads, up to the cores there are.
+# Speedup of a run on several cores of this machine. The script takes about five minutes, during which no other program should run.
+# It is not part of `make figures`. The runs are gases at a packing fraction of 0.5 in a box with walls, for 6 million collisions
+# (15 million for a million disks). Each is run three times, alternately with 1, 2, 4, ... threads up to the number of cores.
 #
 #   runs/scaling.sh
 #   SIZES="10000 100000" THREADS="1 2 3" RUNS=5 runs/scaling.sh
 #
-# post/scaling.py draws the figure; remove runs/scaling to measure anew.
+# post/scaling.py draws the figure; remove runs/scaling to repeat the measurement.
 set -euo pipefail
 if (($# > 0)); then
   sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"

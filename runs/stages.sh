@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# One system through several states, each run from the last frame of the one before: compressed in
-# two steps, relaxed, cooled, heated, expanded.
+# A sequence of runs of one system, each of which starts from the last frame of the previous run: compressed in two steps, relaxed,
+# cooled, heated, expanded.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-stage() { # name, the stage before it, further options of ensemble.sh
+stage() { # arguments: name, name of the previous run, further options of ensemble.sh
   local name=$1 before=$2
   shift 2
   runs/ensemble.sh input/bulk.nml -d "$data/$name" --seeds 1 --set species.disks.temperature= \
