@@ -348,7 +348,7 @@ def test_rates_of_a_gas_agree_with_each_other(bulk, tmp_path):
 def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp_path, capsys):
     """And no diffusion, no pressure, no equation of state."""
     rows = drawn(tmp_path, "correlations", bulk[2])
-    assert "no steady state without flow: no memory" in capsys.readouterr().err
+    assert "no steady state without flow: time correlations" in capsys.readouterr().err
     assert {row["what"] for row in rows} == {"psi6_local", "psi6_global", "a2", "g", "g6", "S"}
     run = read_run(bulk[2])
     assert run.collisions_per_disk_at(run.time[td.later(run).start]) > 14
@@ -681,7 +681,7 @@ def test_of_a_mixture_there_are_the_viscosities(gas, tmp_path, capsys):
     mixed = gas("mixed", packing=UNLIKE.format(0.1, 9))
     rows = drawn(tmp_path, "transport", mixed.path)
     assert {row["what"] for row in rows if not row["wt"]} == {"viscosity", "bulk_viscosity"}
-    assert "no conductivity and D of a mixture" in capsys.readouterr().err
+    assert "no conductivity and no D for a mixture" in capsys.readouterr().err
     nearly, plain = gas("nearly", packing=UNLIKE.format(3.01, 64)), gas(packing=0.2)
     whole, one = (tp.enskog_of(run, reduced=True) for run in (nearly, plain))
     for name in tp.MOMENTS[:2]:
@@ -744,11 +744,11 @@ SETTLED = ("equation_of_state", "melting", "coverage", "transport", "gravity", "
             {"correlations": "set output.frames_every_time"},
         ),
         (ROUND | MIXED, {"mixture": "keeps its angular momentum"}),
-        (APART, {"mixture": "have not met"}),
+        (APART, {"mixture": "have not collided"}),
         (MIXED | {"count": 1, "packing": MIXED["packing"].replace("9", "1")}, {"mixture": "three"}),
         (UNEVEN, dict.fromkeys(SETTLED, "at different temperatures")),
         (FALLING, dict.fromkeys(("correlations", "rates", *SETTLED[:4]), "falls")),
-        (MIXED, {"correlations": "not equal disks", "equation_of_state": "not of one radius"}),
+        (MIXED, {"correlations": "not equal disks", "equation_of_state": "the radii are not equal"}),
         (MIXED, {"melting": "disks of different mass or radius"}),
         ({}, {"equipartition": "needs ", "mixture": "needs "}),
     ],

@@ -466,7 +466,7 @@ def test_a_crowd_with_few_files_gets_answers(program, tmp_path):
     with laboratory(program, tmp_path, preexec_fn=few) as (process, address):
         asyncio.run(crowd(address))
         process.terminate()
-        assert process.communicate(timeout=PATIENCE) == ("stopped, with all runs\n", "")
+        assert process.communicate(timeout=PATIENCE) == ("stopped the server and all runs\n", "")
 
 
 # --- the command ---
@@ -531,7 +531,7 @@ def test_nothing_is_left_behind(program, tmp_path, at, signs):
             process.send_signal(getattr(signal, f"SIG{sign}"))
         out, err = process.communicate(timeout=PATIENCE)
         if signs != ["KILL"]:
-            assert (process.returncode, out, err) == (0, "stopped, with all runs\n", "")
+            assert (process.returncode, out, err) == (0, "stopped the server and all runs\n", "")
         assert at == "once" or len(pids) == 2
         wait_for(lambda: not alive(pids))
         assert list(tmp_path.iterdir()) == []
@@ -562,8 +562,8 @@ def test_wrong_words_are_refused_in_one_line(address, program, monkeypatch, caps
     port = address.split(":")[2][:-1]
     for words, reason in (
         (["--port", "99999"], "is not a port"),
-        ([tmp_path / "none.nml"], "is no input file"),
-        ([ROOT / "README.md"], "is no input file"),
+        ([tmp_path / "none.nml"], "is not an input file"),
+        ([ROOT / "README.md"], "is not an input file"),
         (["--port", port], f"lab.py: port {port}: Address already in use\n"),
     ):
         assert run_script("lab", *words) == 2
