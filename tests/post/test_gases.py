@@ -748,7 +748,7 @@ SETTLED = ("equation_of_state", "melting", "coverage", "transport", "gravity", "
         (MIXED | {"count": 1, "packing": MIXED["packing"].replace("9", "1")}, {"mixture": "three"}),
         (UNEVEN, dict.fromkeys(SETTLED, "at different temperatures")),
         (FALLING, dict.fromkeys(("correlations", "rates", *SETTLED[:4]), "falls")),
-        (MIXED, {"correlations": "not equal disks", "equation_of_state": "the radii are not equal"}),
+        (MIXED, {"correlations": "not equal disks", "equation_of_state": "not equal or"}),
         (MIXED, {"melting": "disks of different mass or radius"}),
         ({}, {"equipartition": "needs ", "mixture": "needs "}),
     ],

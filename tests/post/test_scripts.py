@@ -711,7 +711,7 @@ def test_lyapunov_finds_the_rate_of_divergence(tmp_path, rng, capsys):
     assert found.end == pytest.approx(10.8), "the last frame before the first pair is 0.01 apart"
     with pytest.raises(RunError, match="no fit is possible"):
         lyapunov.divergence(runs[0].time, 0 * apart, largest=0.01, begin=0.2)
-    assert "3 runs: not pairs" in refusal(capsys, "lyapunov", *paths[:3])
+    assert "3 runs: an even number" in refusal(capsys, "lyapunov", *paths[:3])
 
 
 # --- tracers among scatterers ---
@@ -786,7 +786,7 @@ def test_what_is_no_number_has_its_reason(tmp_path, rng, capsys):
     printed, said = capsys.readouterr()
     assert "nan" in printed and "no error of energy_left, temperature_ratio: it takes sev" in said
     drawn(tmp_path, "equipartition", falling(tmp_path / "f.h5", rng), "--within", 0)
-    assert "v0 = 0.5: no T_therm; the difference of the energies is not known to 0" in (
+    assert "v0 = 0.5: no T_therm; the error of the energy difference exceeds 0" in (
         capsys.readouterr().err
     )
 
