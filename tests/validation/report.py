@@ -152,7 +152,8 @@ BARS = """
 
 Written by `python tests/coverage_tables.py`, whose lists of systems and quantities were made before
 the first run. *Held* is how many of 100 error bars of single runs hold the true value, which is
-exact or the mean over all runs: 68 are expected, 61 to 75 allowed. *Error / scatter* is the mean
+exact or the mean over all runs: 68 are expected, 61 to 75 allowed (of n runs chance makes it
+scatter by 47 / √n). *Error / scatter* is the mean
 error over the standard deviation of the means; Student's t makes it larger than 1. *Three* is the
 same share for means over three runs with Student's t.
 
