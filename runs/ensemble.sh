@@ -237,13 +237,21 @@ remember() {
 
 # --- workers ---
 
-# Appends the overrides of member k to `arguments`.
+# Appends the overrides of member k to `arguments`. A value in quotes may contain ' --set '.
 add_overrides() {
-  local rest=${overrides[$1]}
+  local rest=${overrides[$1]} pair quotes more
   while [[ $rest == '--set '* ]]; do
     rest=${rest#--set }
-    arguments+=(--set "${rest%% --set *}")
-    if [[ $rest == *' --set '* ]]; then rest="--set ${rest#* --set }"; else rest=; fi
+    pair=${rest%% --set *}
+    while [[ $pair == *"='"* && $pair != "$rest" ]]; do
+      quotes=${pair//[!\']/}
+      ((${#quotes} % 2)) || break
+      more=${rest#"$pair --set "}
+      pair+=" --set ${more%% --set *}"
+    done
+    arguments+=(--set "$pair")
+    rest=${rest#"$pair"}
+    rest=${rest# }
   done
 }
 

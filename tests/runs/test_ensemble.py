@@ -305,7 +305,7 @@ fi' DEBUG
 fi
 """
 #: The commands behind `&`, and one just before it.
-NARROW_MOMENTS = ["child=$!", "workers+=($!)", 'arguments+=(--set "${rest%% --set *}")']
+NARROW_MOMENTS = ["child=$!", "workers+=($!)", 'arguments+=(--set "$pair")']
 RANDOM_MOMENTS = [str(random.Random(1).randrange(10, 500)) for _ in range(200)]
 
 

@@ -589,7 +589,7 @@ def test_a_damaged_input_in_a_file_is_called_damaged(tmp_path):
         {"output": {"frames_per_decade": 5, "decades_from": 1e-3, "observables_at": [0.1, 0.2]}},
         {"run": {"dynamics": "steps", "dt": 1e-4}},
         {"species": {"name": "a", "count": 1, "radius": 0.1, "speed": 1}}
-        | {"drive": {"kind": "noise", "interval": 0.01, "strength": 1}}
+        | {"drive": {"kind": "noise", "interval": 0.01, "strength": 1, "keep_momentum": False}}
         | {"box": {"boundary": ("periodic", "periodic")}},
     ],
 )

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from ricochet import ProgramError, RunError, ensemble, sweep
+from ricochet import ProgramError, RunError, ensemble, read_run, sweep
 from ricochet.running.ensembles import typed
 from whole_runs import executable, ran
 
@@ -103,7 +103,67 @@ def test_a_value_may_be_one_or_none(tmp_path):
     table = sweep(GAS, values, tmp_path)
     assert [*table.state] == 2 * ["finished"] and [*table.seed] == [3, 3]
     assert [*table["contact.restitution"].isna()] == [False, True]
-    assert set(table["run.title"]) == {"it's,or not"}
+    assert set(table["run.title"]) == {"it's, or not"}
+
+
+TEXTS = ["a b", "a_b", "a, b", "a,b", "x --set run.seed=7", "it's --set", "''", "a/b", "1,2"]
+
+
+@pytest.mark.usefixtures("_tools")
+def test_texts_reach_the_program_as_they_are(tmp_path):
+    """Each is a member of its own, whoever runs it, and keeps its name when more are added."""
+    first = sweep(GAS, {"run.title": TEXTS[1::2], "run.seed": 3}, tmp_path)
+    for path in tmp_path.glob("*.h5"):
+        path.unlink()  # the script is to run it
+    told = ran(ROOT / "runs/ensemble.sh", tmp_path / "input.nml", "-d", tmp_path,
+               "--manifest", tmp_path / "manifest.txt")  # fmt: skip
+    assert told.returncode == 0, told.stderr
+    table = sweep(GAS, {"run.title": TEXTS, "run.seed": 3}, tmp_path)
+    assert set(first.member) < set(table.member) and set(table.state) == {"finished"}
+    assert sorted(table["run.title"]) == sorted(TEXTS) and set(table.seed) == {3}
+    for name, title in zip(table.member, table["run.title"], strict=True):
+        assert read_run(tmp_path / f"{name}.h5").parameters["run"]["title"] == title
+
+
+@pytest.mark.usefixtures("_tools")
+def test_values_of_several_variables_may_belong_together(tmp_path):
+    """A list of dictionaries is a list of members, or of combinations; names may be nested."""
+    linked = [
+        {"contact": {"restitution": xi}, "stop.collisions": n} for xi, n in ((0.9, 5), (1, 9))
+    ]
+    table = sweep(GAS, [*linked, {"run.seed": [3, 4]}], tmp_path)
+    assert [*table["contact.restitution"]][:2] == [0.9, 1] and [*table.collisions][:2] == [5, 9]
+    assert [*table.seed][2:] == [3, 4] and len(table) == 4
+    with pytest.raises(ProgramError, match="from 0 to 1"):
+        sweep(GAS, [{"run.seed": 1}, {"contact.restitution": 2}], tmp_path / "no")
+    with pytest.raises(ValueError, match="no values"):
+        sweep(GAS, [], tmp_path / "no")
+
+
+@pytest.mark.usefixtures("_tools")
+def test_a_folder_that_cannot_be_used_is_named_in_one_line(tmp_path):
+    (tmp_path / "file").touch()
+    (tmp_path / "log").mkdir()
+    (tmp_path / "log/seed_1.log").symlink_to(tmp_path / "seed_1.log")
+    long = {"run.title": 30 * "very " + "long" + 30 * " text"}
+    for values, place, words in (
+        ({"run.seed": 1}, "file", "is no folder"),
+        ({"run.seed": 1}, "log", "is a link; remove it"),
+        (long, "long", "allowed: 200"),
+    ):
+        with pytest.raises(RunError, match=words) as caught:
+            sweep(GAS, values, tmp_path / place)
+        assert "\n" not in str(caught.value)
+    assert not (tmp_path / "long").exists() and not (tmp_path / "seed_1.log").exists()
+
+
+def test_a_missing_package_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match="pip install pandas"):
+        sweep(GAS, {"run.seed": 1}, tmp_path / "new")
+    with pytest.raises(ImportError, match="pip install pandas"):
+        ensemble(tmp_path)
+    assert not (tmp_path / "new").exists()
 
 
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGINT])

@@ -473,13 +473,21 @@ class Run:
         pandas.DataFrame
             (T', columns) of numbers
 
+        Raises
+        ------
+        ImportError
+            if pandas is not installed
+
         Examples
         --------
         >>> table = run.to_dataframe()
         >>> table.index.name, "all/kinetic_energy" in table.columns
         ('time', True)
         """
-        import pandas
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("to_dataframe needs a package: pip install pandas") from None
 
         columns: dict[str, np.ndarray] = {}
         with open_file(self.path) as file:
@@ -822,7 +830,7 @@ class Frame:
     Examples
     --------
     >>> frame = run[-1]
-    >>> frame.time == run.time[-1], frame.position.shape
+    >>> bool(frame.time == run.time[-1]), frame.position.shape
     (True, (64, 2))
     >>> len([frame for frame in run if frame.time < 0.1]) < len(run)
     True

@@ -20,6 +20,7 @@ import stat
 import subprocess
 import threading
 import time
+import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
@@ -30,7 +31,7 @@ import numpy as np
 from ..reading.files import RunError, open_file, plain
 from ..reading.reader import committed, series_in
 from .inputs import read_input
-from .program import STOPPED, ProgramError, find_program, settings_of, tied, value_text
+from .program import STOPPED, ProgramError, find_program, flat, tied, value_text
 from .simulation import Simulation
 
 if TYPE_CHECKING:
@@ -38,16 +39,17 @@ if TYPE_CHECKING:
 
 BROKE_OFF = ": its run broke off "
 LOOK = 0.2  # interval of checks whether members are still wanted [s]
+LONGEST_NAME = 200  # characters in the name of a member
 GOES_ON = re.compile(r"(stopped.*|killed by signal.*|.*--resume continues.*|)")
 
 
 def sweep(
     system: str | Path | Mapping[str, Any],
-    values: Mapping[str, Any],
+    values: Mapping[str, Any] | Iterable[Mapping[str, Any]],
     folder: str | Path,
     executor: Executor | None = None,
 ) -> "pandas.DataFrame":
-    """Run every combination of values of some variables.
+    """Run every combination of values of some variables, or a list of settings.
 
     Members that are finished are left out, others continue where they were stopped: repeat the call
     after an interrupt.
@@ -56,9 +58,10 @@ def sweep(
     ----------
     system : str, Path or mapping
         the input, as of `ricochet.run`
-    values : mapping of str to object
+    values : mapping of str to object, or list of them
         a list of values for each variable, or one value; None is the default; the first variable
-        varies slowest
+        varies slowest.  A list of such dictionaries is run one after the other, so that values of
+        several variables can belong together
     folder : str or Path
         folder for the files of the members
     executor : concurrent.futures.Executor, optional
@@ -73,6 +76,8 @@ def sweep(
     ------
     ProgramError
         if a member would refuse its input; no member has run then
+    RunError
+        if the folder or a member's log cannot be used, or if a member's name would be too long
     ValueError
         if there are no values
 
@@ -81,21 +86,25 @@ def sweep(
     >>> table = ricochet.sweep(small, {"contact.restitution": [1, 0.9]}, folder / "xi")
     >>> list(table["state"])
     ['finished', 'finished']
+    >>> linked = [{"species.speed": v, "stop.collisions": 10 * v} for v in (1, 2)]
+    >>> list(ricochet.sweep(small, linked, folder / "linked")["collisions"])
+    [10, 20]
     """
-    import pandas  # noqa: F401 (who has none hears of it before members run)
-
-    text = read_input(system)
-    choices = {
-        name: [own] if isinstance(own, str) or not isinstance(own, Iterable) else list(own)
-        for name, own in values.items()
-    }
-    if not choices:
+    pandas_module()  # who has none hears of it before members run
+    text, folder = read_input(system), Path(folder)
+    members = [
+        settings
+        for part in ([values] if isinstance(values, Mapping) else values)
+        for settings in combinations(choices_of(part))
+    ]
+    if not any(members):
         raise ValueError("sweep: there are no values; ricochet.run makes a single run")
-    members = combinations(choices)
-    check(text, choices)
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    overrides = {name: words_of(settings) for name, settings in members.items()}
+    check(text, members)
+    overrides = names_of(members, read_manifest(folder))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise RunError(f"{folder}: is no folder for members: {problem.strerror}") from None
     remember(folder, text, overrides)
     mark = folder / f".sweep {os.getpid()} {threading.get_ident()} {os.uname().nodename}"
     for left in folder.glob(".sweep * * *"):
@@ -116,36 +125,74 @@ def sweep(
     return ensemble(folder)
 
 
-def check(text: str, values: Mapping[str, list[Any]]) -> None:
-    """Refuse values that a member would refuse; each is checked with the first of all others."""
-    first = {name: own[0] for name, own in values.items() if own}
-    for name, own in values.items():
-        for value in own[: 1 if name == "run.seed" else None]:
-            with Simulation(text, first | {name: value}) as member:
-                if member._endless():
-                    raise ProgramError("stop: no rule ends a member", 2)
+def choices_of(values: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """Return the list of values of each variable."""
+    return {
+        name: [own] if isinstance(own, str) or not isinstance(own, Iterable) else list(own)
+        for name, own in flat(values).items()
+    }
 
 
-def combinations(values: Mapping[str, list[Any]]) -> dict[str, dict[str, object]]:
-    """Return the settings of each member by its name, as runs/ensemble.sh names it."""
-    choices = [[(name, value) for value in own] for name, own in values.items()]
-    members = {}
-    for settings in map(dict, itertools.product(*choices)):
-        parts = []
-        for variable, value in settings.items():
-            short = variable.removeprefix("species.")
-            if "." not in short.partition(".")[2] and not variable.startswith("species."):
-                short = short.partition(".")[2]
-            short = short.replace("(", "_").replace(")", "")  # box.gravity(2)
-            word = "default" if value is None else value_text(variable, value).replace(", ", ",")
-            parts.append(f"{short}_{re.sub('[^A-Za-z0-9.+-]', '_', word)}")
-        members["_".join(parts)] = settings
-    return members
+def combinations(choices: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
+    """Yield the settings of each combination of values; the first variable varies slowest."""
+    pairs = [[(name, value) for value in own] for name, own in choices.items()]
+    yield from map(dict, itertools.product(*pairs))
+
+
+def check(text: str, members: Iterable[Mapping[str, Any]]) -> None:
+    """Refuse values that a member would refuse.
+
+    Each value is checked once, in the first member that has it; seeds are not checked.
+    """
+    known: set[str] = set()
+    for settings in members:
+        pairs = {words_of({name: settings[name]}) for name in settings.keys() - {"run.seed"}}
+        if known and pairs <= known:
+            continue
+        known |= pairs or {""}
+        with Simulation(text, settings) as member:
+            if member._endless():
+                raise ProgramError("stop: no rule ends a member", 2)
+
+
+def names_of(members: Iterable[Mapping[str, Any]], taken: Mapping[str, str]) -> dict[str, str]:
+    """Return the overrides of each member, as a line of a manifest, by its name."""
+    found: dict[str, str] = {}
+    known = dict(taken)
+    for settings in members:
+        words, name = words_of(settings), name_of(settings)
+        altered = any(isinstance(value, str | Path) for value in settings.values())
+        if altered and words != known.get(name, words):
+            name += f"_{zlib.crc32(words.encode(errors='surrogateescape')):08x}"
+        if len(name) > LONGEST_NAME:
+            raise RunError(
+                f"sweep: the name {name[:40]}... of a member would have {len(name)} characters, "
+                f"allowed: {LONGEST_NAME}; vary fewer or shorter values"
+            )
+        found[name] = known[name] = words
+    return found
+
+
+def name_of(settings: Mapping[str, Any]) -> str:
+    """Return the name of the member with these settings, as runs/ensemble.sh names it."""
+    parts = []
+    for variable, value in settings.items():
+        short = variable.removeprefix("species.")
+        if "." not in short.partition(".")[2] and not variable.startswith("species."):
+            short = short.partition(".")[2]
+        short = short.replace("(", "_").replace(")", "")  # box.gravity(2)
+        word = "default" if value is None else value_text(variable, value, ",")
+        parts.append(f"{short}_{re.sub('[^A-Za-z0-9.+-]', '_', word)}")
+    return "_".join(parts)
 
 
 def words_of(settings: Mapping[str, object]) -> str:
     """Return overrides as a line of a manifest."""
-    return " ".join(f"--set {pair.replace(', ', ',')}" for pair in settings_of(settings))
+    words = {
+        name: "" if value is None else value_text(name, value, ",")
+        for name, value in settings.items()
+    }
+    return " ".join(f"--set {name}={word}" for name, word in words.items())
 
 
 def read_manifest(folder: Path) -> dict[str, str]:
@@ -202,9 +249,12 @@ def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
 
 def log_of(path: Path) -> TextIO:
     """Open a member's log to append; refuse a link, or a file with two names."""
-    log = os.fdopen(
-        os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW, 0o666), "a"
-    )
+    way = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
+    try:
+        log = os.fdopen(os.open(path, way, 0o666), "a")
+    except OSError as problem:
+        reason = "is a link" if path.is_symlink() else problem.strerror
+        raise RunError(f"{path}: {reason}; remove it, or choose another folder") from None
     status = os.fstat(log.fileno())
     if not stat.S_ISREG(status.st_mode) or status.st_nlink != 1:
         log.close()
@@ -278,8 +328,12 @@ def finished_with(command: list[Any], mark: Path, **pipes: Any) -> int:
 
 
 def pairs_of(overrides: str) -> Iterator[tuple[str, str]]:
-    """Yield variables and values of a line of a manifest."""
-    for part in overrides.split("--set ")[1:]:
+    """Yield variables and values of a line of a manifest; a value in quotes may contain `--set`."""
+    parts = overrides.removeprefix("--set ").split(" --set ") if overrides else []
+    while parts:
+        part = parts.pop(0)
+        while parts and "='" in part and part.count("'") % 2:
+            part += f" --set {parts.pop(0)}"
         name, _, value = part.strip().partition("=")
         yield name.strip(), value.strip()
 
@@ -326,9 +380,16 @@ def ensemble(folder: str | Path) -> "pandas.DataFrame":
     >>> ricochet.ensemble(folder / "sweep").equals(table)
     True
     """
-    import pandas
+    return pandas_module().DataFrame(gathered(Path(folder)))
 
-    return pandas.DataFrame(gathered(Path(folder)))
+
+def pandas_module() -> Any:
+    """Return pandas, or say how it is installed."""
+    try:
+        import pandas
+    except ImportError:
+        raise ImportError("tables of members need a package: pip install pandas") from None
+    return pandas
 
 
 def gathered(folder: Path) -> list[dict[str, Any]]:
@@ -385,7 +446,8 @@ def typed(value: str) -> object:
             except ValueError:
                 continue
         else:
-            return value.strip("'\"").replace("''", "'")
+            quoted = len(value) > 1 and value[0] == value[-1] and value[0] in "'\""
+            return value[1:-1].replace(2 * value[0], value[0]) if quoted else value
     return numbers[0] if len(numbers) == 1 else tuple(numbers)
 
 

@@ -315,7 +315,7 @@ def named(message: str, text: str | None) -> str:
     return re.sub(r"^input(?:\.nml)?(?::(\d+))?: &?(\w+)", place, message, flags=re.MULTILINE)
 
 
-def value_text(name: str, value: object) -> str:
+def value_text(name: str, value: object, separator: str = ", ") -> str:
     """Return a value as a namelist writes it; an array as the list of its numbers, row by row."""
     if isinstance(value, np.floating):
         value = float(value)
@@ -329,7 +329,7 @@ def value_text(name: str, value: object) -> str:
         case int() | float():
             return repr(value)
         case list() | tuple() if len(value) > 0:
-            return ", ".join(value_text(name, part) for part in value)
+            return separator.join(value_text(name, part, separator) for part in value)
         case list() | tuple():
             raise TypeError(f"{name}: the list is empty; leave the variable out for its default")
     kind = type(value).__name__
