@@ -1,5 +1,6 @@
-!> The disks in each cell: three slots and their count, 16 bytes that are copied as a unit. If a cell contains more disks, the
-!> others are in a linked list behind the last slot.
+!> Stores which disks are in each cell. A cell has three slots (elements of a small array, each for the index of one disk) and a
+!> count, together 16 bytes that are copied as a unit. A cell with more than three disks is called crowded: its further disks form a
+!> linked list that starts in the last slot.
 module cell_contents
   use kinds, only: int16, int32, int64
   use disks, only: disk_t, tag_t
@@ -13,10 +14,11 @@ module cell_contents
   integer(int32), parameter :: count_slot = cell_capacity + 1
   integer(int32), parameter :: counted = 65535               !! bit mask of the number of disks
   integer(int32), parameter :: crowd = counted + 1           !! increment of the number of crowded cells
-  integer(int32), parameter :: marked = shiftl(crowd, 8)     !! bit of the mark, above a count of nine crowded cells
+  integer(int32), parameter :: marked = shiftl(crowd, 8)     !! bit of the mark; the lower bits suffice to count nine crowded cells
 
-  !> The slots of a cell. Disks are counted from 0, as in the kernel. The last slot holds three values: in its lower half the
-  !> number of disks in the slots, in its upper half the number of crowded cells among the nine around this one, and a mark.
+  !> The slots of a cell. Indices of disks start at 0 here, as in the kernel. The last element contains three values: the lower half
+  !> is the number of disks in the slots, and the upper half is the number of crowded cells among the cell and its eight neighbours,
+  !> plus a mark.
   type :: cell_t
     integer(int32) :: slot(count_slot)
   contains
@@ -27,7 +29,7 @@ module cell_contents
   type :: cell_contents_t
     integer(int32) :: stride = 0                 !! difference between the numbers of cells in adjacent rows
     type(cell_t), allocatable :: cell(:)         !! (0:) cells, row by row
-    integer(int32), allocatable :: next(:)       !! (disks) next disk in the list of a crowded cell; 0: end
+    integer(int32), allocatable :: next(:)       !! (disks) next disk in the linked list of a crowded cell; 0 at the end of the list
   contains
     procedure :: number
     procedure :: empty
@@ -43,7 +45,7 @@ module cell_contents
 
 contains
 
-  !> Number of the cell in column cell(1) and row cell(2), which are counted from 1.
+  !> Number of the cell in column cell(1) and row cell(2). The first column and the first row have the number 1.
   pure function number(self, cell) result(c)
     class(cell_contents_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -68,7 +70,7 @@ contains
     end do
   end subroutine empty
 
-  !> Removes all disks from cell c and counts them.
+  !> Removes all disks from cell c and adds their number to n.
   pure subroutine clear(self, c, n)
     class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c
@@ -114,7 +116,7 @@ contains
         return
       end if
       head = slot(cell_capacity) + 1
-      self%next(i) = head                          ! becomes the head of the list
+      self%next(i) = head                          ! disk i becomes the head of the list
       slot(cell_capacity) = i - 1
     end associate
     if (self%next(head) == 0) call self%count_crowd(c, 1)
@@ -135,7 +137,7 @@ contains
         slot(count_slot) = slot(count_slot) - 1
         return
       end if
-      if (slot(k) == i - 1) then                   ! the head of the list takes the free slot
+      if (slot(k) == i - 1) then                   ! the head of the list is moved to the free slot
         slot(k) = link - 1
         slot(cell_capacity) = self%next(link) - 1
         self%next(link) = 0
@@ -199,7 +201,7 @@ contains
     if (self%next(i) == 0) i = 0
   end function chain
 
-  !> Number of slots before that of disk i, which is in this cell; 2 if the disk is in the list.
+  !> Number of slots that precede the slot of disk i, which is in this cell; 2 if the disk is in the linked list.
   elemental function slots_before(self, i) result(n)
     type(cell_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -209,14 +211,15 @@ contains
     n = first + iand(first, merge(0, 1, self%slot(2) == i - 1))
   end function slots_before
 
-  !> Lists the disks in the slots of the nine cells around c, which contains disk i, without i. Whole cells are copied, without
-  !> branches on the numbers of disks. If i is not in a slot of its crowded cell, the head of the list is left out instead.
+  !> Lists the disks in the slots of cell c and its eight neighbours, except disk i, which is in cell c. Whole cells are copied, so
+  !> that no branch depends on the numbers of disks. If disk i is in the linked list of a crowded cell and not in a slot, the head
+  !> of that list is omitted instead.
   subroutine gather(cell, c, stride, i, list, n)
     type(cell_t), intent(in) :: cell(0:*)
     integer(int32), intent(in) :: c, stride, i
     integer(int32), intent(out) :: list(list_capacity)
     integer(int32), intent(out) :: n               !! number of disks listed
-    integer(int64) :: below, here, above, m, own   ! 64 bits like an address, to avoid conversions
+    integer(int64) :: below, here, above, m, own   ! 64 bits, as an address, so that no conversion is needed
 
     here = c
     below = here - stride
@@ -247,8 +250,9 @@ contains
     n = n + cell%in_slots()
   end subroutine append
 
-  !> Prefetches data for predictions of some disks, in stages: their records, their cells, and the disks in
-  !> these cells. For their partners this happens one stage later.
+  !> Prefetches the data that are needed to predict the events of some disks. The first stage prefetches the records of the disks,
+  !> the second stage their cells, and the third stage the disks in these cells. The data of their collision partners are prefetched
+  !> one stage later.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(cell_contents_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -281,18 +285,18 @@ contains
       call prefetch(disk(i)%collision_counter)
     end subroutine fetch
 
-    !> Prefetches the nine cells around c.
+    !> Prefetches cell c and its eight neighbours.
     subroutine fetch_cells(c)
       integer(int32), intent(in) :: c
       integer(int32) :: m
 
       do m = c - self%stride, c + self%stride, self%stride
-        call prefetch(self%cell(m - 1)%slot(1))    ! three adjacent cells occupy one or two cache lines
+        call prefetch(self%cell(m - 1)%slot(1))    ! three adjacent cells lie in one or two cache lines
         call prefetch(self%cell(m + 1)%slot(count_slot))
       end do
     end subroutine fetch_cells
 
-    !> Prefetches the first disk in each of the nine cells around c.
+    !> Prefetches the first disk in cell c and in each of its eight neighbours.
     subroutine fetch_disks(c)
       integer(int32), intent(in) :: c
       integer(int32) :: m, l

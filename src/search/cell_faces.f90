@@ -1,7 +1,7 @@
 !> The faces of the cells of a grid, and the times when disks leave their cells. The sides of the box are faces as well.
-!>
-!> Neighbouring cells overlap as far as possible: disks that are two cells apart must not touch. In the overlap a disk may belong to
-!> either cell; the best one is that which it leaves last. With wide cells this halves the number of crossings.
+!>  Neighbouring cells overlap as far as possible. The overlap is limited by the condition that disks two cells apart cannot touch.
+!> A disk in the overlap may be assigned to either cell, and it is assigned to the cell that it leaves last. With wide cells this
+!> halves the number of crossings of faces.
 module cell_faces
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t
@@ -16,18 +16,19 @@ module cell_faces
   private
   public :: all_cells, cell_faces_t, line_t, patch_t
 
-  !> The cells of a grid, out of all cells into which the box is divided: usually all of them, or the patch of a domain, which may
-  !> extend across a periodic side. Outer faces of a patch that are not sides of the box are open: disks that pass them are
-  !> no longer in the grid.
+  !> A patch: the rectangular block of cells that a grid contains. It usually consists of all cells into which the box is divided.
+  !> In a parallel run the patch of a domain is a part of these cells, which may extend across a periodic side. Outer faces of a
+  !> patch that are not sides of the box are open: a disk that crosses an open face leaves the grid.
   type :: patch_t
     integer(int32) :: whole(2) = 0                 !! numbers of columns and rows in the box
     integer(int32) :: first(2) = 1                 !! first column and row of the patch; less than 1 beyond a periodic side
     integer(int32) :: n(2) = 0                     !! numbers of columns and rows in the patch
-    real(real64) :: small = 0.0_real64             !! largest radius for which the cells are wide enough [length]
-    real(real64) :: reach = 0.0_real64             !! largest distance at which such disks touch [length]
+    real(real64) :: small = 0.0_real64             !! radius of the largest disks for which the cells are wide enough [length]
+    real(real64) :: reach = 0.0_real64             !! largest distance between the centres of two such disks in contact [length]
     real(real64) :: lower(2) = 0.0_real64          !! lower left corner of the box [length]
     real(real64) :: width(2) = 0.0_real64          !! distance between the centres of adjacent cells [length]
-    ! Along each axis, if there is a periodic side in the patch: the last cells before it and the first behind it; otherwise 0.
+    ! Along each axis, if the patch extends across a periodic side: the last cell before that side and the first cell behind it;
+    ! otherwise 0.
     integer(int32) :: last(2) = 0
     integer(int32) :: next(2) = 0
   contains
@@ -41,10 +42,11 @@ module cell_faces
     procedure :: equals
   end type patch_t
 
-  !> A line that disks reach: a face of a column or row of cells, or a side of the box.
+  !> A line parallel to an axis that limits a cell: a face of a column or row of cells, or a side of the box.
   type :: line_t
     real(real64) :: place = 0.0_real64             !! position of the face or side [length]
-    real(real64) :: inset = 0.0_real64             !! distance to the line that the centre of a disk reaches, in radii
+    real(real64) :: inset = 0.0_real64             !! distance from the line at which the event of a disk occurs, in radii: 0 for a
+                                                   !! face, 1 for a side
     integer(int32) :: code = 0                     !! code of the event: a side, or a crossing
     logical :: struck = .false.                    !! a moving side may touch disks of this cell
   end type line_t
@@ -55,11 +57,12 @@ module cell_faces
     logical :: moving = .false.                    !! there are moving sides
     logical :: falling = .false.                   !! gravity or moving sides: more than one face has to be considered along an axis
     logical :: periodic(2) = .false.               !! periodic boundary along each axis
-    ! Pistons can touch disks anywhere, but for some time only in a strip of columns or rows.
+    ! A piston can reach any part of the box. Until it has moved by the width of a cell, however, it can touch only the disks in a
+    ! strip, which consists of adjacent columns or rows of cells.
     real(real64) :: due = never                    !! time when the first piston leaves its strip, since the epoch [time]
     real(real64) :: centre(n_sides) = 0.0_real64  !! centre of the strip of each piston, as displacement inwards from the side
                                                   !! [length]
-    real(real64) :: beyond(2, 2) = 0.0_real64      !! (axis, lower or upper) distance that disks can be beyond the sides [length]
+    real(real64) :: beyond(2, 2) = 0.0_real64      !! (axis, lower or upper) largest distance of disks beyond the sides [length]
     type(line_t), allocatable :: column(:, :)      !! (0:1,columns) left and right faces
     type(line_t), allocatable :: row(:, :)         !! (0:1,rows) lower and upper faces
   contains
@@ -86,7 +89,8 @@ contains
     patch%n = n
     patch%reach = reach
     patch%lower = box%lower
-    patch%width = box%edges()/n*(1 + 4*epsilon(reach))     ! rounding must not place the last face before the side
+    patch%width = box%edges()/n*(1 + 4*epsilon(reach))     ! the factor ensures that rounding does not place the last face inside
+                                                           ! the box
     call patch%find_sides(box%periodic)
   end function all_cells
 
@@ -103,7 +107,7 @@ contains
     end where
   end subroutine find_sides
 
-  !> The cell of the patch that contains a point of the box; beyond `n` if there is none.
+  !> The cell of the patch that contains a point of the box. If the point is outside the patch, the result exceeds `n`.
   pure function cell_at(self, x) result(cell)
     class(patch_t), intent(in) :: self
     real(real64), intent(in) :: x(2)               !! [length]
@@ -132,7 +136,7 @@ contains
     yes = all(cell >= 1 .and. cell <= self%n)
   end function holds
 
-  !> Selects those of the given cells of the whole grid that are in the patch.
+  !> Selects the cells that are in the patch from a list of cells of the whole grid.
   pure function covers(self, cell) result(yes)
     class(patch_t), intent(in) :: self
     integer(int16), intent(in) :: cell(:, :)       !! (2,n)
@@ -142,7 +146,7 @@ contains
       .and. modulo(cell(2, :) - self%first(2), self%whole(2)) < self%n(2)
   end function covers
 
-  !> Whether some of the nine cells around a cell are images beyond a periodic side.
+  !> Whether some of the eight neighbours of a cell are images beyond a periodic side.
   pure function at_seam(self, cell) result(yes)
     class(patch_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -151,7 +155,7 @@ contains
     yes = any(cell == self%last .or. cell == self%next)
   end function at_seam
 
-  !> The column or row that is `ahead` steps from another one, and the number of periods between them.
+  !> The column or row that is `ahead` steps from a given one, and the number of periods between the two.
   pure subroutine step(self, axis, cell, ahead, there, periods)
     class(patch_t), intent(in) :: self
     integer, intent(in) :: axis
@@ -242,8 +246,8 @@ contains
     end subroutine find_struck
   end subroutine set
 
-  !> Finds the columns and rows in which a piston may touch disks before it has moved by the width of a cell. A piston beyond all
-  !> cells touches disks of the outermost ones, which may follow it there.
+  !> Finds the columns and rows in which a piston may touch disks before it has moved by the width of a cell. If a piston is beyond
+  !> all cells, it can touch the disks in the outermost cells, because these disks may be beyond the cells as well.
   pure subroutine find_strips(self, box, small, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -260,7 +264,7 @@ contains
     call self%watch_pistons(box, now)
   contains
 
-    !> Marks the lines along one axis.
+    !> Marks the columns or rows along one axis that are in a strip.
     pure subroutine mark(line, axis)
       type(line_t), intent(inout) :: line(0:, :)
       integer, intent(in) :: axis
@@ -274,7 +278,7 @@ contains
     end subroutine mark
   end subroutine find_strips
 
-  !> Finds the time when the first piston leaves its strip, unless a disk collides with one before.
+  !> Finds the earliest time at which a piston leaves its strip. The time holds as long as no disk collides with a piston.
   pure subroutine watch_pistons(self, box, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -295,8 +299,8 @@ contains
     end do
   end subroutine watch_pistons
 
-  !> The rectangle that contains the centres of the disks in a cell. Outermost cells extend as far as sides move, in the case of a
-  !> piston without limit.
+  !> The rectangle that contains the centres of the disks in a cell. An outermost cell extends as far as its side moves, and without
+  !> limit if the side is a piston.
   pure subroutine rectangle(self, cell, n, low, high)
     class(cell_faces_t), intent(in) :: self
     integer(int32), intent(in) :: cell(2)          !! column and row in the box
@@ -307,7 +311,7 @@ contains
     high = self%width*cell + 0.5_real64*self%overlap + merge(self%beyond(:, 2), 0.0_real64, cell == n)
   end subroutine rectangle
 
-  !> Chooses, among the cells that contain the disk, the one that it leaves last.
+  !> Chooses the cell that the disk leaves last, among the overlapping cells that contain the disk.
   pure subroutine choose_cell(self, gravity, disk, now, cell)
     class(cell_faces_t), intent(in) :: self
     real(real64), intent(in) :: gravity(2)         !! [length/time**2]
@@ -344,7 +348,7 @@ contains
     n = ieor(first, iand(-merge(1, 0, condition), ieor(first, second)))
   end function chosen
 
-  !> Finds when and how the disk leaves its cell or touches a side within it.
+  !> Finds the earliest event at which the disk leaves its cell or touches a side that is within the cell.
   pure subroutine next(self, box, disk, cell, now, falling, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -352,7 +356,7 @@ contains
     integer(int16), intent(in) :: cell(2)
     real(real64), intent(in) :: now
     logical, intent(in) :: falling
-    type(prospect_t), intent(inout) :: near        !! its time and partner are set
+    type(prospect_t), intent(inout) :: near        !! the procedure sets its time and partner
 
     if (falling) then
       call self%next_falling(box, self%column(:, cell(1)), self%row(:, cell(2)), disk, now, near)
@@ -361,14 +365,15 @@ contains
     end if
   end subroutine next
 
-  !> Finds when and how the disk reaches one of four given lines around it, which may be closer than the faces of its cell.
+  !> Finds the earliest event at which the disk reaches one of four given lines around its position. These lines may be closer than
+  !> the faces of its cell.
   pure subroutine next_within(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: column(0:1), row(0:1)
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
-    type(prospect_t), intent(inout) :: near        !! its time and partner are set
+    type(prospect_t), intent(inout) :: near        !! the procedure sets its time and partner
 
     if (self%falling) then
       call self%next_falling(box, column, row, disk, now, near)
@@ -377,7 +382,8 @@ contains
     end if
   end subroutine next_within
 
-  !> The same for a straight path. Axis and direction are unpredictable and are selected without branches.
+  !> The same for a straight path. The axis and the direction are selected without branches, because a processor cannot predict
+  !> them.
   pure subroutine next_straight(column, row, disk, cell, t, code)
     type(line_t), intent(in) :: column(0:1, *), row(0:1, *)
     type(disk_t), intent(in) :: disk
@@ -410,14 +416,14 @@ contains
     t = merge(t, never, speed > slowest)
   end function line_time
 
-  !> The same for a parabolic path, or with moving sides.
+  !> The same for a parabolic path, or for a box with moving sides.
   pure subroutine next_falling(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: column(0:1), row(0:1)
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
-    type(prospect_t), intent(inout) :: near        !! its time and partner are set
+    type(prospect_t), intent(inout) :: near        !! the procedure sets its time and partner
     real(real64) :: t_x, t_y
     integer(int32) :: code_x, code_y
 
@@ -432,7 +438,7 @@ contains
     near%time = merge(t_y, t_x, t_y < t_x)
   end subroutine next_falling
 
-  !> The same along one axis, without moving sides.
+  !> The same as `time_to_leave`, along one axis and without moving sides.
   pure subroutine next_along(box, line, axis, disk, now, t, code)
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
@@ -453,13 +459,14 @@ contains
       t_other = falling_time(line(1 - up), axis, box, disk, now)
       up = chosen(up, 1 - up, t_other < t)
       t = min(t, t_other)
-    else                                           ! the forward face or, if gravity reverses the motion before, the one behind
+    else                                           ! the face ahead or, if gravity reverses the motion before the disk reaches that
+                                                   ! face, the face behind
       x = flight(disk%x(axis), disk%v(axis), g, now - disk%clock)
       v = flight_velocity(disk%v(axis), g, now - disk%clock)
       up = merge(1, 0, v > -g*resolution(now))
-      sense = 2*up - 1                             ! the roots of `time_to_line`, whose case is known here
+      sense = 2*up - 1                             ! the same roots as in `time_to_line`, simplified for this case
       gap = max(sense*(line(up)%place - x), 0.0_real64)
-      disc = (v*v + tiny(v)) + 2*sense*g*gap       ! positive also at rest on the face
+      disc = (v*v + tiny(v)) + 2*sense*g*gap       ! also positive if the disk is at rest on the face
       if (disc >= 0) then
         t = now + 2*gap/(abs(v) + sqrt(disc))
       else
@@ -471,7 +478,7 @@ contains
     code = line(up)%code
   end subroutine next_along
 
-  !> The same along one axis, with moving sides that may come into the cell.
+  !> The same along one axis, with moving sides that may enter the cell.
   pure subroutine next_beside(box, line, axis, disk, now, t, code)
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
@@ -488,7 +495,7 @@ contains
     end if
   end subroutine next_beside
 
-  !> The same for a cell that a moving side may reach, whether the side is a face of the cell or not.
+  !> The same for a cell that a moving side may enter, even if that side is not a face of the cell.
   pure subroutine next_moving(line, axis, box, disk, now, t, code)
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
     integer(int32), intent(in) :: axis
@@ -514,7 +521,7 @@ contains
     end do
   end subroutine next_moving
 
-  !> Time when a disk on a parabola reaches a face or side. The earlier root, at which it entered the cell, is excluded.
+  !> Time when a disk on a parabolic path reaches a face or side. The earlier root, at which the disk entered the cell, is excluded.
   pure function falling_time(line, axis, box, disk, now) result(t)
     type(line_t), intent(in) :: line
     integer(int32), intent(in) :: axis
@@ -531,12 +538,12 @@ contains
     sense = sense_of(side_crossed(line%code))
     g = box%gravity(axis)
     if (sense*flight_velocity(disk%v(axis), g, now - disk%clock + resolution(now)) <= 0 &
-      .and. sense*g < 0) return                    ! it moves away faster and faster
+      .and. sense*g < 0) return                    ! the disk accelerates away from the line
     t = max(now, disk%clock + time_to_line(sense*(line%place - disk%x(axis)), sense*disk%v(axis), sense*g))
   end function falling_time
 
-  !> Smallest resolvable time step at `now`. Without it a disk that reverses its motion at a face could cross it back and forth
-  !> for ever.
+  !> Smallest resolvable time step at `now`. Without this lower bound a disk that reverses its motion at a face could cross that
+  !> face back and forth without end.
   elemental function resolution(now)
     real(real64), intent(in) :: now
     real(real64) :: resolution

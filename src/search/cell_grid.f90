@@ -20,23 +20,22 @@ module cell_grid
   private
   public :: cell_grid_t
 
-  real(real64), parameter :: spacious = 1.2_real64  !! width of cells in diameters from which choosing between overlapping cells
-                                                    !! pays
+  real(real64), parameter :: spacious = 1.2_real64  !! smallest width of cells, in diameters, for which overlaps save time
 
   type :: cell_grid_t
     private
-    type(patch_t), public :: patch                 !! the cells; chosen here, except in a domain
+    type(patch_t), public :: patch                 !! the cells; `build` chooses them, except in a domain
     logical, public :: is_part = .false.
     logical, public :: undivided = .false.         !! a single cell: all disks are candidates
     logical, public :: everyone = .false.          !! predict all disks after each event, not only those involved
     type(cell_faces_t), public :: faces                    !! faces of the cells, and sides
-    logical, public :: roomy = .false.             !! cells overlap: a disk chooses its cell again after a collision
+    logical, public :: roomy = .false.             !! cells overlap: the cell of a disk is chosen again after a collision
     type(cell_contents_t), public :: cells                 !! numbered row by row, surrounded by a ring of empty cells
-    type(reach_lists_t), public :: reach           !! obstacles, and disks much larger than those for which the cells are made
+    type(reach_lists_t), public :: reach           !! obstacles, and disks that are too large for the width of the cells
     type(images_t) :: images                       !! images of the box in this epoch
     integer(int32) :: n_listed = 0                 !! number of disks inserted into cells
     type(neighbour_lists_t), public :: lists       !! neighbour lists of the small disks, where cells contain many of them
-    real(real64) :: plain_radius = 0.0_real64      !! largest radius of disks with simple crossings; negative with lists [length]
+    real(real64) :: plain_radius = 0.0_real64      !! radius up to which a crossing changes no list; negative with lists [length]
   contains
     procedure :: build
     procedure :: predict
@@ -55,12 +54,12 @@ module cell_grid
 contains
 
   !> Chooses the cells, inserts the disks, and finds the objects that reach into each cell. If there are obstacles and the cells
-  !> have not changed, only the disks are inserted again, because few disks among many obstacles often begin a new epoch.
+  !> have not changed, only the disks are inserted again, because epochs are short for few disks among many obstacles.
   subroutine build(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(place_t), allocatable :: rims(:)
-    logical :: kept                                ! lists of obstacles are kept
+    logical :: kept                                ! the lists of obstacles remain valid
     integer(int32) :: i
     integer(int16) :: ix, iy
 
@@ -125,7 +124,7 @@ contains
     associate (patch => self%patch)
       do i = 1, sim%n_disks()
         if (sim%disk(i)%radius > patch%small) then
-          sim%tag(i)%cell = 1                      ! a marked cell in any case
+          sim%tag(i)%cell = 1                      ! a cell that is always marked
         else if (sim%tag(i)%id > 0) then
           cell = int(patch%cell_at(sim%position(i)), int16)
           call put(self, sim%tag(i), i, cell)
@@ -135,7 +134,7 @@ contains
     end associate
   end subroutine fill_cells
 
-  !> Sets up the neighbour lists of all small disks, if they pay.
+  !> Sets up the neighbour lists of all small disks, if the search is expected to be faster with neighbour lists.
   subroutine list_all(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -171,7 +170,7 @@ contains
     call take(self, tag, i)
   end subroutine take_out
 
-  !> Inserts disk i into a cell, without the neighbour lists.
+  !> Inserts disk i into a cell and leaves the neighbour lists unchanged.
   subroutine put(self, tag, i, cell)
     class(cell_grid_t), intent(inout) :: self
     type(tag_t), intent(inout) :: tag
@@ -182,7 +181,7 @@ contains
     call self%cells%insert(self%cells%number(cell), i)
   end subroutine put
 
-  !> Removes disk i from its cell, without the neighbour lists.
+  !> Removes disk i from its cell and leaves the neighbour lists unchanged.
   subroutine take(self, tag, i)
     class(cell_grid_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag
@@ -230,7 +229,7 @@ contains
     end do
   end subroutine follow_big
 
-  !> Executes a crossing of disk i: moves it to the next cell, or renews its search region, and predicts its next event.
+  !> Executes a crossing of disk i: changes its cell, or renews its list or listed position, and predicts its next event.
   subroutine cross(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -274,7 +273,7 @@ contains
     cell = sim%tag(i)%cell
     cell(axis) = cell(axis) + int(sense_of(side), int16)
     if (is_wall(code) .and. self%patch%last(axis) > 0) then
-      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%patch%cell_at(sim%position(i)), int16)   ! displaced by the shear
+      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%patch%cell_at(sim%position(i)), int16)   ! cells shifted by shear
       cell(axis) = int(merge(self%patch%next(axis), self%patch%last(axis), sense_of(side) > 0), int16)
     end if
     inside = .true.
@@ -309,7 +308,8 @@ contains
     call put(self, tag, i, cell)
   end subroutine move
 
-  !> Predicts the earliest event of disk i: side or cell face, obstacle, or disk in the nine cells around it.
+  !> Predicts the earliest event of disk i: with a side or cell face, with an obstacle, or with a disk in the nine cells around disk
+  !> i.
   subroutine predict(self, sim, i)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -317,7 +317,7 @@ contains
 
     if (self%cells%cell(self%cells%number(sim%tag(i)%cell))%needs_care()) then
       call self%predict_with_care(sim, i, .false.)
-    else if (self%faces%falling) then              ! literals let the compiler specialise the kernel
+    else if (self%faces%falling) then              ! with literal arguments the compiler can specialise the kernel
       call predict_one(self, sim%box, sim%disk, sim%tag, sim%now, 0, i)
     else
       call predict_one(self, sim%box, sim%disk, sim%tag, sim%now, no_gravity, i)
@@ -344,7 +344,7 @@ contains
     end if
   end subroutine predict_both
 
-  !> Predicts two disks that have just collided and are not both in plain cells. Usually both have neighbour lists.
+  !> Predicts the next events of two disks that have collided, in the general case. Usually both have neighbour lists.
   subroutine predict_both_with_care(self, sim, i, j)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -363,7 +363,7 @@ contains
     call predict_collided(j)
   contains
 
-    !> Predicts one of them.
+    !> Predicts the next event of one of the two disks.
     subroutine predict_collided(k)
       integer(int32), intent(in) :: k
 
@@ -394,7 +394,7 @@ contains
 
     call survey_list(self, sim%box, sim%disk(i), sim%now, i, near_i)
     call survey_list(self, sim%box, sim%disk(j), sim%now, j, near_j)
-    if (self%faces%falling) then                   ! literals let the compiler specialise the kernel
+    if (self%faces%falling) then                   ! with literal arguments the compiler can specialise the kernel
       call take_earliest(sim%box%gravity, sim%disk, sim%tag, sim%now, latest_clock, near_i)
       call take_earliest(sim%box%gravity, sim%disk, sim%tag, sim%now, latest_clock, near_j)
     else
@@ -419,8 +419,8 @@ contains
     call self%lists%copy_list(near)
   end subroutine survey_list
 
-  !> Predicts the next events of two disks in unmarked cells. Cell faces and candidates of both are determined first, because this
-  !> does not depend on the tests of candidates.
+  !> Predicts the next events of two disks in unmarked cells. The cell faces and the candidates of both disks are determined first,
+  !> because they do not depend on the tests of candidates.
   subroutine predict_two(self, box, disk, tag, now, known, pair)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -454,7 +454,7 @@ contains
     call take_earliest(box%gravity, disk, tag, now, known, near)
   end subroutine predict_one
 
-  !> Finds when a disk leaves its cell, and lists the candidates that it can touch before.
+  !> Finds the time when a disk leaves its cell, and lists the candidates that the disk can touch before that time.
   subroutine survey(self, box, disk, tag, now, known, near)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -462,7 +462,7 @@ contains
     type(tag_t), intent(in) :: tag
     real(real64), intent(in) :: now
     integer(int32), value :: known
-    type(prospect_t), intent(inout) :: near        !! prospect of the disk that it names
+    type(prospect_t), intent(inout) :: near        !! prospect of the disk `near%disk`
 
     call self%faces%next(box, disk, tag%cell, now, iand(known, no_gravity) == 0, near)
     near%cell = self%cells%number(tag%cell)
@@ -481,7 +481,7 @@ contains
     call earliest_contact(disk, tag, near, now, gravity, known)
     disk(near%disk)%event_time = near%time
     disk(near%disk)%partner = near%partner
-    tag(near%disk)%partner_counter = disk(max(near%partner, 1))%collision_counter  ! without a branch; used only if partner > 0
+    tag(near%disk)%partner_counter = disk(max(near%partner, 1))%collision_counter  ! avoids a branch; used only if partner > 0
   end subroutine take_earliest
 
   !> Prefetches data for predictions of some disks, in stages.
@@ -504,7 +504,7 @@ contains
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    logical, intent(in) :: has_collided            !! at this moment, so that no clock is later than its own
+    logical, intent(in) :: has_collided            !! the disk has collided at this moment, so that no other disk has a later clock
     type(prospect_t) :: near
     integer(int32) :: known                        ! as in `earliest_contact`
 
@@ -525,8 +525,8 @@ contains
     sim%tag(i)%partner_counter = sim%disk(max(near%partner, 1))%collision_counter
   contains
 
-    !> Finds the earliest event of a big disk: a side, an obstacle, the end of its margin, another big disk, or a small disk in
-    !> the cells along its boundary.
+    !> Finds the earliest event of a big disk: with a side, an obstacle, another big disk, or a small disk in the cells along its
+    !> boundary, or the time when the disk leaves the margin around its listed position.
     subroutine find_event_of_big()
       real(real64) :: t_margin
       integer(int32) :: number, image
@@ -574,7 +574,7 @@ contains
     end associate
   end subroutine find_event_of_small
 
-  !> Finds contacts of a small disk with disks in the nine cells around it.
+  !> Finds contacts of a small disk with the disks in its own cell and the eight cells around its own.
   subroutine scan_cells_around(self, sim, known, near)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

@@ -10,12 +10,12 @@ module cell_layout
   public :: whole_box
 
   !> With fewer disks per cell there are fewer candidates, but more crossings of faces.
-  real(real64), parameter :: disks_per_cell = 0.6_real64    !! intended for a dilute system
+  real(real64), parameter :: disks_per_cell = 0.6_real64    !! intended mean number of disks per cell in a dilute system
 
 contains
 
-  !> The cells that are appropriate for all disks and obstacles of a simulation. An obstacle counts like a disk, because disks have
-  !> to be tested against obstacles that reach into their cells.
+  !> Chooses the cells for all disks and obstacles of a simulation. An obstacle counts like a disk, because disks have to be tested
+  !> against obstacles that reach into their cells.
   pure function whole_box(sim, undivided) result(patch)
     type(simulation_t), intent(in) :: sim
     logical, intent(in) :: undivided

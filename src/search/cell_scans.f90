@@ -1,5 +1,5 @@
-!> Contacts that the simple scan of nine cells does not include: with disks of crowded cells, across
-!> a periodic side, and with single disks.
+!> Finds contacts that the simple scan of nine cells does not include: contacts with disks of crowded cells, with disks across a
+!> periodic side, and with single disks.
 module cell_scans
   use kinds, only: int16, int32, int64, real64
   use box_geometry, only: find_image_contact
@@ -16,7 +16,8 @@ module cell_scans
 
 contains
 
-  !> Tests the listed candidates and empties the list. The literals let the compiler specialise the kernel.
+  !> Tests the listed candidates and empties the list. The calls have literal arguments, for which the compiler can specialise the
+  !> kernel.
   subroutine test_list(sim, known, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
@@ -54,11 +55,11 @@ contains
     near%n = 0
   end subroutine test_through_image
 
-  !> Finds contacts with given disks, seen through an image.
+  !> Finds contacts with given disks, which are seen through one periodic image.
   subroutine scan_disks(sim, disks, image, known, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: disks(:)
-    type(image_t), intent(in) :: image             !! image through which they are seen
+    type(image_t), intent(in) :: image             !! periodic image through which the disk sees the candidates
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prospect_t), intent(inout) :: near
     integer(int32) :: first
@@ -73,7 +74,7 @@ contains
   !> Finds contacts of a small disk with obstacles and big disks that reach into its cell.
   subroutine scan_reach(reach, cell, sim, images, known, near)
     type(reach_lists_t), intent(in) :: reach
-    integer(int16), intent(in) :: cell(2)          !! cell into which at least one of them reaches
+    integer(int16), intent(in) :: cell(2)          !! cell into which at least one such obstacle or big disk reaches
     type(simulation_t), intent(in) :: sim
     type(images_t), intent(in) :: images
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
@@ -158,7 +159,7 @@ contains
     near%n = int(n, int32)
     if (crowded > 0) then
       do k = 1, size(c, kind=int32)
-        j = cells%chain(c(k))                      ! it is in a slot as well
+        j = cells%chain(c(k))                      ! the first disk of the linked list is also in a slot
         if (j > 0) j = cells%next(j)
         do while (j > 0)
           if (near%n == list_capacity) call test_through_image(sim, known, images%image(number), near)
@@ -194,7 +195,8 @@ contains
     end do
   end subroutine scan_rim
 
-  !> Adds the disks in the lists of crowded cells among the nine around a disk to the candidates from `gather`.
+  !> Adds further candidates to those from `gather`: the disks in the linked lists of crowded cells, among the cell of a disk and
+  !> its eight neighbours.
   subroutine add_chains_around(cells, sim, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
@@ -204,7 +206,8 @@ contains
 
     do row = near%cell - cells%stride, near%cell + cells%stride, cells%stride
       do c = row - 1, row + 1
-        j = cells%chain(c)                         ! in a slot as well, unless `gather` omitted it
+        j = cells%chain(c)                         ! the first disk of the linked list is also in a slot, unless `gather` omitted
+                                                   ! this disk
         if (j > 0 .and. c /= near%cell) j = cells%next(j)
         do while (j > 0)
           if (near%n == list_capacity) call test_list(sim, known, near)
@@ -216,9 +219,9 @@ contains
     end do
   end subroutine add_chains_around
 
-  !> Finds contacts where some of the nine cells are images across a periodic side; cells of one image are treated together. If
-  !> the images above and below move along x, more columns are included: all that can be reached before the images have moved by one
-  !> column. Disks two columns apart cannot touch.
+  !> Finds contacts of a disk if some of the nine cells around the disk are images across a periodic side. Cells of one image are
+  !> treated together. If the images above and below move along x, the search includes more columns: all columns that the disk can
+  !> reach before the images have moved by one column. Disks two columns apart cannot touch.
   subroutine scan_around_seam(cells, patch, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch

@@ -21,22 +21,24 @@ module neighbour_lists
   public :: neighbour_lists_t
 
   integer(int32), parameter :: unlisted = -2, incomplete = -1    !! values in place of the number of entries
-  integer(int32), parameter :: always_copied = 15  !! number of entries that are always copied, without a branch on their actual
-                                                   !! number
-  integer(int32), parameter :: image_unit = 2**27                !! larger than the number of disks
-  integer(int32), parameter :: most_listed = image_unit/4  !! largest number of disks for which positions in all lists fit into 32
-                                                           !! bits
+  integer(int32), parameter :: always_copied = 15  !! number of entries that are copied from every list, so that no branch depends
+                                                   !! on the actual number
+  integer(int32), parameter :: image_unit = 2**27                !! factor of the image in an entry; it exceeds every number of
+                                                                 !! disks
+  integer(int32), parameter :: most_listed = image_unit/4  !! largest number of disks with neighbour lists: 32-bit integers can then
+                                                           !! number all entries
 
   !> The region in which the centre of a disk stays until it is listed again.
   type :: neighbourhood_t
-    type(line_t) :: column(0:1), row(0:1)          !! left and right, lower and upper line, with their events
+    type(line_t) :: column(0:1), row(0:1)          !! left and right line, lower and upper line, each with the code of its event
   end type neighbourhood_t
 
   real(real64), parameter, public :: candidates_that_pay = 30.0_real64
 
   type :: neighbour_lists_t
     logical :: used = .false.
-    real(real64) :: least_candidates = candidates_that_pay   !! number of dilute disks in nine cells from which lists pay
+    real(real64) :: least_candidates = candidates_that_pay   !! smallest mean number of disks in nine cells for which lists save
+                                                             !! time, in the dilute limit
     integer(int32) :: capacity = 16                !! capacity of the list of a small disk; larger disks have more neighbours
     real(real64) :: mean_radius = 0.0_real64       !! [length]
     real(real64) :: margin = 0.0_real64            !! half the width of the neighbourhood of a disk with the mean radius [length]
@@ -44,12 +46,15 @@ module neighbour_lists
     real(real64) :: period(2) = 0.0_real64         !! edges of the box [length]
     real(real32) :: rounding = 0.0_real32          !! bound on the errors in `extent` [length]
     type(neighbourhood_t), allocatable :: neighbourhood(:)   !! (disks)
-    !> (4,disks) x and y of the centre relative to `origin`, radius plus `rounding`, half the width of the unclipped square
+    !> (4,disks) x and y of the centre relative to `origin`, radius plus `rounding`, and half the width of the unclipped square
+    !> [length]
     real(real32), allocatable :: extent(:, :)
     integer(int32), allocatable :: first(:)  !! (disks+1) position of the list of each disk, which begins with the number of its
                                              !! entries
-    integer(int32), allocatable :: entry(:)        !! (0:) all lists: index of a disk, counted from 0, plus image_unit*image
-    integer(int32), allocatable :: back(:)         !! (0:) for each entry, the position of this disk in the list of the other one
+    integer(int32), allocatable :: entry(:)        !! (0:) all lists: each entry is the index of a disk, which starts at 0, plus
+                                                   !! image_unit times the index of the image
+    integer(int32), allocatable :: back(:)         !! (0:) for each entry, the position at which the list of the other disk contains
+                                                   !! the disk that owns this list
   contains
     procedure :: prepare
     procedure, private :: make_room
@@ -66,13 +71,14 @@ module neighbour_lists
 
 contains
 
-  !> Decides whether lists pay, and allocates them. With lists a collision tests fewer disks, but disks have to be listed again;
-  !> this happens more often the less dense they are. The limit and the margin were measured for polydisperse disks.
+  !> Determines whether neighbour lists save time, and allocates them in that case. With lists the prediction after a collision
+  !> tests fewer disks, but lists have to be renewed, and the renewals are more frequent at lower densities. The limit and the
+  !> margin were measured for polydisperse disks.
   subroutine prepare(self, disk, tag, lower, edges, patch)
     class(neighbour_lists_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
     type(tag_t), intent(in) :: tag(:)
-    real(real64), intent(in) :: lower(2), edges(2) !! of the box [length]
+    real(real64), intent(in) :: lower(2), edges(2) !! lower left corner and edges of the box [length]
     type(patch_t), intent(in) :: patch
     real(real64) :: area, packing, candidates, radii(2)
     integer(int32) :: i, n
@@ -99,12 +105,12 @@ contains
     call self%make_room(disk, lower, edges)
   end subroutine prepare
 
-  !> Allocates the lists of all disks, which are not listed yet. Larger disks get longer lists, because they have more neighbours.
+  !> Allocates the lists of all disks, which are still empty. Larger disks get longer lists, because they have more neighbours.
   subroutine make_room(self, disk, lower, edges)
     class(neighbour_lists_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
-    real(real64), intent(in) :: lower(2), edges(2) !! of the box [length]
-    real(real64) :: sizes                          ! radius relative to the mean one
+    real(real64), intent(in) :: lower(2), edges(2) !! lower left corner and edges of the box [length]
+    real(real64) :: sizes                          ! radius of the disk relative to the mean radius
     integer(int32) :: i, n
 
     n = size(disk, kind=int32)
@@ -116,7 +122,7 @@ contains
     end if
     if (.not. allocated(self%first)) then
       allocate (self%first(n + 1), self%neighbourhood(n))
-      allocate (self%extent(4, n), source=0.0_real32)           ! unlisted disks may be candidates
+      allocate (self%extent(4, n), source=0.0_real32)           ! initialised, because disks without a list may be candidates
     end if
     self%first(1) = 0
     do i = 1, n
@@ -131,7 +137,7 @@ contains
     self%entry(self%first(:n)) = unlisted
   end subroutine make_room
 
-  !> Sets up a new neighbourhood around disk i, which is at x.
+  !> Sets up a new neighbourhood around disk i, whose position is x.
   pure subroutine lay(self, i, radius, x, faces, cell)
     class(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -147,7 +153,8 @@ contains
     self%neighbourhood(i)%row = clipped(faces%row(:, cell(2)), 2)
   contains
 
-    !> The faces of a cell along an axis, replaced by the lines of the neighbourhood where these are closer.
+    !> The two lines that limit a neighbourhood along an axis: the faces of the cell, or the edges of the square where these are
+    !> closer.
     pure function clipped(line, axis) result(nearer)
       type(line_t), intent(in) :: line(0:1)
       integer(int32), intent(in) :: axis
@@ -167,8 +174,9 @@ contains
     end function clipped
   end subroutine lay
 
-  !> Adds disk i, which has a new neighbourhood, to the lists of the disks in the nine cells around it that it can touch, and these
-  !> to its list. A disk that is not listed yet will add the pair later.
+  !> Finds the disks that disk i can touch in its new neighbourhood, among the disks in the nine cells around disk i. Adds disk i to
+  !> the list of each disk found, and each disk found to the list of disk i. If the other disk has no list yet, the pair is added
+  !> when that list is made.
   subroutine enter(self, i, cells, patch, cell)
     class(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -203,7 +211,8 @@ contains
     end if
   contains
 
-    !> Adds the disks in the list of a crowded cell, except the first one, which was in the last slot.
+    !> Adds the disks in the linked list of a crowded cell to the neighbour list of disk i. The first disk of the linked list is
+    !> also in the last slot of the cell and has already been added.
     subroutine add_chain(c, image)
       integer(int32), intent(in) :: c, image
       integer(int32) :: j
@@ -218,7 +227,8 @@ contains
       end do
     end subroutine add_chain
 
-    !> Adds the candidates that are close enough. The condition is unpredictable and is evaluated without a branch.
+    !> Adds the candidates that are close enough. The condition is evaluated without a branch, because a processor cannot predict
+    !> it.
     subroutine test_candidates(image)
       integer(int32), intent(in) :: image          !! image through which they are seen
       integer(int32) :: j, k, found(list_capacity + 1), n_found
@@ -248,7 +258,8 @@ contains
     end subroutine test_candidates
   end subroutine enter
 
-  !> Adds disk j, seen through an image, to the list of disk i, and disk i to the list of disk j, unless j is not listed yet.
+  !> Adds disk j, which is seen through an image, to the list of disk i, and disk i to the list of disk j. If disk j has no list
+  !> yet, nothing is added.
   pure subroutine add_pair(self, i, j, image)
     type(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i, j, image
@@ -303,7 +314,7 @@ contains
     end do
   end subroutine leave
 
-  !> Removes an entry from the list of disk i; the last entry takes its position.
+  !> Removes an entry from the list of disk i. The last entry is moved to its position.
   pure subroutine remove(self, i, place)
     type(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i, place
@@ -314,11 +325,12 @@ contains
     last = self%entry(at + n)
     self%entry(at + place) = last
     self%back(at + place) = self%back(at + n)
-    self%back(self%first(iand(last, image_unit - 1) + 1) + self%back(at + n)) = place    ! not used if that list is incomplete
+    self%back(self%first(iand(last, image_unit - 1) + 1) + self%back(at + n)) = place    ! the value is not used if that list is
+                                                                                         ! incomplete
     self%entry(at) = n - 1
   end subroutine remove
 
-  !> Removes an entry from the list of disk i, if it is there.
+  !> Removes an entry from the list of disk i, if the list contains this entry.
   pure subroutine remove_disk(self, i, entry)
     type(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i, entry
@@ -331,7 +343,7 @@ contains
     end do
   end subroutine remove_disk
 
-  !> The nine cells around a cell, and the images through which they are seen.
+  !> A cell and its eight neighbours, and the images through which these cells are seen.
   pure subroutine find_cells(cells, patch, cell, around, image)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
@@ -347,7 +359,7 @@ contains
     end do
   end subroutine find_cells
 
-  !> The image through which disk i is seen from disk j, if `image` is the one through which j is seen from i.
+  !> The image through which disk i is seen from disk j, if disk j is seen from disk i through `image`.
   elemental function reverse(image)
     integer(int32), intent(in) :: image
     integer(int32) :: reverse
@@ -355,7 +367,7 @@ contains
     reverse = merge(9 - image, 0, image > 0)
   end function reverse
 
-  !> Index of an image along each axis, -1, 0 or 1. In an entry it is encoded as x + 3 y, modulo 9.
+  !> Index of an image along each axis: -1, 0 or 1. An entry encodes the two indices as x + 3 y, modulo 9.
   pure function periods(image) result(number)
     integer(int32), intent(in) :: image
     real(real64) :: number(2)
@@ -419,8 +431,9 @@ contains
     end associate
   end subroutine neighbour
 
-  !> Prefetches data for predictions of some disks, in stages: their records, their lists, and the disks in these lists. For
-  !> their partners this happens one stage later.
+  !> Prefetches the data that are needed to predict the events of some disks. The first stage prefetches the records of the disks,
+  !> the second stage their lists, and the third stage the disks in these lists. The data of their collision partners are prefetched
+  !> one stage later.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(neighbour_lists_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)

@@ -1,4 +1,4 @@
-!> Types for predicted events, and the kernel that predicts contacts of disks, which all search methods share.
+!> Defines types for predicted events, and the kernel that predicts contacts of disks. All search methods use this kernel.
 module neighbour_search
   use images, only: image_t
   use kinds, only: int32, never, real64
@@ -9,8 +9,9 @@ module neighbour_search
   public :: event_t, prospect_t, earliest_contact, event_of, list_capacity, latest_clock, no_gravity, wins
 
   integer(int32), parameter :: list_capacity = 64
-  !> Conditions that a caller guarantees, as a sum of flags. The compiler generates versions of the kernel that omit the
-  !> corresponding parts: no candidate has a later clock than the disk, whose clock is `now`; there is no gravity.
+  !> Flags for conditions that the caller of the kernel guarantees; a sum of flags states several conditions. `latest_clock`: the
+  !> clock of the disk is `now`, and no candidate has a later clock. `no_gravity`: there is no gravity. The compiler generates
+  !> versions of the kernel without the parts that are then not needed.
   integer(int32), parameter :: latest_clock = 1, no_gravity = 2
   real(real64), parameter :: margin_of_times = 32*epsilon(1.0_real64)    !! larger than all rounding errors in the kernel
 
@@ -18,16 +19,16 @@ module neighbour_search
   type :: event_t
     real(real64) :: time = 0.0_real64         !! since the epoch [time]
     integer(int32) :: disk = 0                !! disk that stores the event
-    integer(int32) :: partner = 0             !! its partner: a disk (> 0) or a code (<= 0)
+    integer(int32) :: partner = 0             !! partner in the event: a disk (> 0) or a code (<= 0)
   end type event_t
 
-  !> The prospect of a disk: its earliest known event, and candidates that it may touch before. Not initialised, because one is
-  !> created in each prediction.
+  !> The prospect of a disk: the earliest event that is known so far, and the candidates that the disk may touch before this event.
+  !> The components have no initial values, because a prospect is created in each prediction.
   type :: prospect_t
     real(real64) :: time                      !! time of the earliest event [time]
     integer(int32) :: partner                 !! partner in this event
     integer(int32) :: disk                    !! disk for which the prediction is made
-    integer(int32) :: cell                    !! number of its cell
+    integer(int32) :: cell                    !! number of the cell of the disk
     integer(int32) :: n                       !! number of candidates
     integer(int32) :: list(list_capacity)     !! (n) candidates, counted from 0
   end type prospect_t
@@ -35,23 +36,22 @@ module neighbour_search
 contains
 
   !> Finds the earliest contact of a disk with the candidates, if it precedes the earliest event known so far.
-  !>
-  !> The time is a pure function of the states of the two disks: both are advanced to the later of their clocks, and each term keeps
-  !> its value, or changes its sign, if the disks are exchanged. The result is therefore bit-identical, whenever and for whichever
-  !> of the two disks it is predicted. The order of simultaneous contacts is defined by `wins`. A contact time before `now` results
-  !> from rounding: after a perfectly inelastic collision two disks stay in contact to the last bits, and a shift of one disk by a
-  !> period can change these bits. The contact then occurs either now or never. As the shift is an event with a prediction, this is
-  !> decided at once, and later predictions do not change it.
+  !>  The time is a pure function of the states of the two disks: both are advanced to the later of their clocks, and each term
+  !> keeps its value, or changes its sign, if the disks are exchanged. The result is therefore bit-identical for both disks and for
+  !> any time of the prediction. The order of simultaneous contacts is defined by `wins`. A contact time before `now` results from
+  !> rounding: after a perfectly inelastic collision two disks stay in contact to the last bits, and a shift of one disk by a period
+  !> can change these bits. The contact then occurs either now or never. The contact is predicted again right after the shift,
+  !> because a shift is an event. Later predictions do not change the result.
   !>
   !> The root of |dx + dv s| = sigma is c/(sqrt(disc) - b), which is free of cancellation near contact. The discriminant sigma**2
   !> dv**2 - (dx x dv)**2 is free of cancellation for distant grazing pairs. Disks that touch, or overlap by rounding, and approach
   !> collide now.
-  !>
-  !> Most candidates fail one combined test: the root is not real, or not before the best one so far, or not before the event of the
-  !> candidate. (In the last case the candidate predicts again after its event, with the disk among its candidates.) A root before t
-  !> requires c < -2 b (t - late), which is tested with a margin above rounding errors.
+  !>  One combined test excludes most candidates. It fails if the root is not real, if the root is not earlier than the earliest
+  !> contact found so far, or if the root is not earlier than the event of the candidate. (In the last case the next event of the
+  !> candidate is predicted after its own event, and that prediction tests the disk.) A root before t requires c < -2 b (t - late),
+  !> which is tested with a margin above rounding errors.
   pure subroutine earliest_contact(disk, tag, near, now, gravity, known, image)
-    type(disk_t), intent(in) :: disk(0:*)     !! all disks, counted from 0
+    type(disk_t), intent(in) :: disk(0:*)     !! all disks, with indices that start at 0
     type(tag_t), intent(in) :: tag(*)
     type(prospect_t), intent(inout) :: near   !! the disk itself may be among the candidates
     real(real64), value :: now                !! [time]
@@ -98,7 +98,7 @@ contains
       in_time = merge(in_time, disc, in_time < disc)
       if (in_time > 0 .and. b < 0) then
         t_j = late + max(c, 0.0_real64)/(sqrt(min(disc, b*b)) - b)
-        if (t_j < now .and. .not. fresh) then ! by rounding: the contact is over, or occurs now
+        if (t_j < now .and. .not. fresh) then ! caused by rounding: the contact is over, or it occurs now
           t_j = merge(2*never, now, b + (du*du + dv*dv)*(now - late) >= 0)
         end if
         if (t_j < best) then
@@ -121,10 +121,10 @@ contains
     clock = d%clock; radius = d%radius
   end subroutine read_state
 
-  !> A coordinate after the time s. On a straight line fewer operations give the same result.
+  !> A coordinate after the time s. On a straight path the same result needs fewer operations.
   elemental function moved(x, v, g, s, falling) result(there)
     real(real64), intent(in) :: x, v, g, s
-    logical, intent(in) :: falling            !! .false.: g is zero
+    logical, intent(in) :: falling            !! .false. if g is zero
     real(real64) :: there
 
     if (falling) then
@@ -134,7 +134,7 @@ contains
     end if
   end function moved
 
-  !> A velocity component after the time s, likewise.
+  !> A velocity component after the time s, likewise with fewer operations on a straight path.
   elemental function sped_up(v, g, s, falling) result(after)
     real(real64), intent(in) :: v, g, s
     logical, intent(in) :: falling
@@ -153,8 +153,8 @@ contains
     event = event_t(disk(i)%event_time, i, disk(i)%partner)
   end function event_of
 
-  !> Whether event a precedes the simultaneous event b: the order is by the lower id of the disks involved,
-  !> then by the higher id, which is 0 for a single disk.
+  !> Whether event a precedes the simultaneous event b. Simultaneous events are ordered by the lower id of the disks involved, then
+  !> by the higher id, which is 0 if only one disk is involved.
   pure function wins(a, b, tag) result(yes)
     type(event_t), intent(in) :: a, b
     type(tag_t), intent(in) :: tag(*)
@@ -166,7 +166,7 @@ contains
     yes = ids_a(1) < ids_b(1) .or. (ids_a(1) == ids_b(1) .and. ids_a(2) < ids_b(2))
   contains
 
-    !> The lower and the higher id of the disks in an event.
+    !> The lower and the higher id of the two disks involved in an event.
     pure function ids_of(event) result(ids)
       type(event_t), intent(in) :: event
       integer(int32) :: ids(2)

@@ -1,5 +1,5 @@
-!> Lists of the obstacles that may exclude a disk from a point, for each cell of the box. The cost of a test of one point does not
-!> depend on the number of obstacles, and the cost of making the lists is proportional to it.
+!> Lists of the obstacles that may exclude a disk from a point, for each cell of the box. The cost of testing one point does not
+!> depend on the number of obstacles. The cost of making the lists is proportional to the number of obstacles.
 module obstacle_cells
   use box_geometry, only: box_t
   use kinds, only: int32, real64
@@ -11,11 +11,12 @@ module obstacle_cells
   !> An obstacle in the list of a cell.
   type :: entry_t
     integer(int32) :: obstacle = 0                  !! index in the box
-    integer(int32) :: next = 0                      !! next entry in the same list, with a larger index; 0: none
+    integer(int32) :: next = 0                      !! next entry in the same list, for an obstacle with a larger index; 0 at the
+                                                    !! end of the list
   end type entry_t
 
   type :: obstacle_cells_t
-    real(real64), private :: radius = -1.0_real64   !! largest radius for which the lists are made [length]
+    real(real64), private :: radius = -1.0_real64   !! largest radius of disks for which the lists are valid [length]
     real(real64), private :: lower(2) = 0.0_real64  !! lower left corner of the box [length]
     real(real64), private :: side(2) = 0.0_real64   !! edges of a cell [length]
     integer(int32), allocatable, private :: head(:, :)  !! (columns,rows) first entry of each cell; 0: none
@@ -28,7 +29,7 @@ module obstacle_cells
 
 contains
 
-  !> Makes the lists for disks up to some radius, unless they are already made for these.
+  !> Makes the lists for disks up to a given radius, unless the existing lists are already valid for these disks.
   subroutine serve(self, box, radius)
     class(obstacle_cells_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -53,7 +54,7 @@ contains
     allocate (self%head(n(1), n(2)), source=0_int32)
     if (.not. allocated(self%entry)) allocate (self%entry(2*box%n_obstacles()))
     self%n_entries = 0
-    do k = box%n_obstacles(), 1, -1                 ! lists then begin with the smallest index
+    do k = box%n_obstacles(), 1, -1                 ! in descending order, so that each list begins with the smallest index
       call enter(self, k, box%obstacle(k)%shape, box%periodic)
     end do
   end subroutine serve
@@ -94,10 +95,11 @@ contains
 
   contains
 
-    !> Adds the obstacle to the lists in a block of cells. The block is halved until it is a single cell, or until the outline
-    !> does not pass through it, so that all its points are equivalent.
+    !> Adds the obstacle to the lists in a block of cells. The block is halved recursively until it is a single cell, or until the
+    !> outline does not cross the block. In the latter case the disks are excluded from all points of the block or from none.
     recursive subroutine enter_block(low, high)
-      integer(int32), intent(in) :: low(2), high(2) !! first and last column and row, counted from 0; also beyond periodic sides
+      integer(int32), intent(in) :: low(2), high(2) !! first and last column and row, which start at 0 and may be beyond periodic
+                                                    !! sides
       real(real64) :: d(2), half(2)
       integer(int32) :: last(2), first(2), axis, i, j
 
@@ -122,7 +124,7 @@ contains
       end do
     end subroutine enter_block
 
-    !> Adds the obstacle to the list of one cell, unless another of its images has done so.
+    !> Adds the obstacle to the list of one cell, unless the list already contains it because of another periodic image.
     subroutine enter_cell(cell)
       integer(int32), intent(in) :: cell(2)         !! column and row, counted from 1
       type(entry_t), allocatable :: more(:)

@@ -1,5 +1,6 @@
-!> The disks that a piston may touch in the near future. In the long run it may touch any disk, but until it has moved by the width
-!> of a cell only those in a strip of columns or rows (`cell_faces: find_strips`). Only these are tested against it.
+!> Lists the disks that a piston may touch in the near future. A piston can reach every disk in the long run. Until it has moved by
+!> the width of a cell, however, it can touch only the disks in a strip of adjacent columns or rows (`cell_faces: find_strips`).
+!> Only the disks in the strip are tested against the piston.
 module piston_strips
   use kinds, only: int16, int32
   use cell_grid, only: cell_grid_t
@@ -35,7 +36,7 @@ contains
         do m = 1, self%cells%cell(c)%in_slots()
           call add(self%cells%cell(c)%slot(m) + 1)
         end do
-        i = self%cells%chain(c)                    ! the first one is also in a slot
+        i = self%cells%chain(c)                    ! the first disk of the linked list is also in a slot
         if (i > 0) i = self%cells%next(i)
         do while (i > 0)
           call add(i)
@@ -49,7 +50,7 @@ contains
     disks = disks(:n)
   contains
 
-    !> Adds disk i.
+    !> Adds disk i to the list.
     subroutine add(i)
       integer(int32), intent(in) :: i
 

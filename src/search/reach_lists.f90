@@ -1,8 +1,8 @@
-!> Objects that reach into cells besides the small disks: obstacles, and a few big disks among many small ones.
-!>
-!> The width of the cells is chosen for the small disks. A big disk is listed in each cell from which a small disk could touch it
-!> while it stays within a margin around its listed position. A small disk therefore finds big ones in its own cell, and a big disk
-!> searches the cells along its boundary. The cost for a disk depends only on the sizes of disks near it.
+!> Lists the objects other than small disks that reach into each cell: obstacles, and a few big disks among many small disks.
+!>  The width of the cells is chosen for the small disks. A big disk is listed in each cell from which a small disk could touch it
+!> while it stays within a margin around its listed position. The search for a small disk therefore finds big disks in the list of
+!> its own cell, and the search for a big disk tests the cells along its boundary. The cost for a disk depends only on the sizes of
+!> disks near it.
 module reach_lists
   use kinds, only: int16, int32, real64
   use cell_faces, only: cell_faces_t, patch_t
@@ -15,7 +15,7 @@ module reach_lists
   private
   public :: largest_small_radius, place_t, reach_lists_t
 
-  integer(int32), parameter :: most_big_disks = 256    !! each of them is tested against all others
+  integer(int32), parameter :: most_big_disks = 256    !! largest number of big disks; each is tested against all other big disks
 
   !> A cell into which an object reaches.
   type :: place_t
@@ -27,25 +27,26 @@ module reach_lists
   type :: entry_t
     integer(int32) :: code = 0                   !! index of a big disk (> 0), or code of an obstacle (<= 0)
     integer(int32) :: image(2) = 0
-    integer(int32) :: next = 0                   !! next entry in the same list; 0: none
+    integer(int32) :: next = 0                   !! next entry in the same list; 0 at the end of the list
   end type entry_t
 
   type :: big_disk_t
     integer(int32) :: disk = 0                   !! index of the disk
     real(real64) :: centre(2) = 0.0_real64       !! listed position [length]
-    type(place_t), allocatable :: rim(:)         !! cells in which small disks may touch it
-    integer(int32), allocatable :: obstacles(:)  !! codes of the obstacles that it may touch, in descending order
+    type(place_t), allocatable :: rim(:)         !! cells in which small disks may touch this disk
+    integer(int32), allocatable :: obstacles(:)  !! codes of the obstacles that the disk may touch, in descending order
   end type big_disk_t
 
   type :: reach_lists_t
     type(big_disk_t), allocatable :: big(:)
     real(real64) :: margin = 0.0_real64          !! margin around the listed positions of big disks [length]
-    integer(int32), allocatable :: first(:, :)  !! (columns,rows) first entry of each cell; 0: none. Not allocated if there are no
-                                                !! such objects
+    integer(int32), allocatable :: first(:, :)  !! (columns,rows) first entry of each cell; 0 if its list is empty. Not allocated if
+                                                !! there are neither obstacles nor big disks
     type(entry_t), allocatable :: entry(:)
     integer(int32), private :: vacant = 0        !! head of the list of free entries
     type(patch_t), private :: patch              !! cells for which obstacles are listed
-    real(real64), private :: span(2, 2) = 0.0_real64     !! corners of these cells together [length]
+    real(real64), private :: span(2, 2) = 0.0_real64     !! lower left and upper right corner of the rectangle of all these cells
+                                                         !! [length]
   contains
     procedure :: serves
     procedure :: renew
@@ -58,7 +59,7 @@ module reach_lists
 
 contains
 
-  !> The radius for which the cells are made: the largest one, unless a few disks are much bigger than the others.
+  !> The radius that determines the width of the cells: the largest radius, unless a few disks are much bigger than the others.
   pure function largest_small_radius(disk) result(radius)
     type(disk_t), intent(in) :: disk(:)
     real(real64) :: radius, next
@@ -84,7 +85,7 @@ contains
     if (yes) yes = self%patch%equals(patch) .and. all(abs(span_of(patch, faces) - self%span) <= 0)
   end function serves
 
-  !> The lower left and the upper right corner of all cells together.
+  !> The lower left and the upper right corner of the rectangle of all cells.
   pure function span_of(patch, faces) result(span)
     type(patch_t), intent(in) :: patch
     type(cell_faces_t), intent(in) :: faces
@@ -117,7 +118,7 @@ contains
     call self%renew_big(sim, patch, faces)
   end subroutine renew
 
-  !> Lists the big disks again. Their indices may have changed.
+  !> Lists the big disks again, because their indices may have changed.
   subroutine renew_big(self, sim, patch, faces)
     class(reach_lists_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -237,8 +238,8 @@ contains
 
   contains
 
-    !> Finds such cells in a block of cells, which is halved recursively until the outline does not cross it, or it is a single
-    !> cell.
+    !> Finds such cells in a block of cells. The block is halved recursively until it is a single cell, or until the outline does
+    !> not cross the block.
     recursive subroutine search_block(low, high)
       integer(int32), intent(in) :: low(2), high(2)  !! first and last column and row
       real(real64) :: lower(2), upper(2), beyond(2), half(2), d(2)
