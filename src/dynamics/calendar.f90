@@ -1,6 +1,8 @@
-!> The part of the event queue for later times. Each of the next time windows has a bucket of one cache line to which entries
-!> are only appended; longer spans beyond have unordered lists. Appending touches few cache lines, and single entries are never
-!> searched or removed. All lists share one array, in chunks that are reused when a span is done.
+!> The part of the event queue for later times. Time is divided into windows of equal length. Each of the next windows has a bucket:
+!> an array that occupies one cache line and to which entries are only appended. Later times are divided into spans of many windows,
+!> each of which has an unordered list. To append an entry accesses few cache lines, and single entries are never searched or
+!> removed. All lists share one array, which is divided into chunks. The chunks of a list are reused when its span has been
+!> processed.
 module calendar
   use kinds, only: int32, real64
   use disks, only: tag_t
@@ -9,11 +11,12 @@ module calendar
   public :: bucket_capacity, bucket_t, calendar_t, events_per_window, filed_t, most_coming, stages, window_none
 
   integer(int32), parameter :: bucket_capacity = 15
-  !> Intended mean number of events in a window. With fewer events more empty windows are opened; with more events buckets
-  !> overflow into the heap more often.
+  !> Intended mean number of events in a window. With fewer events per window, more of the windows that are processed contain no
+  !> event. With more events per window, buckets are full more often and further events are stored in the heap.
   real(real64), parameter :: events_per_window = 4.0_real64
-  integer(int32), parameter :: few_disks = 5000    !! up to this number of disks nearly all events get a bucket
-  integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]    !! number of windows ahead that each stage of prefetching covers
+  integer(int32), parameter :: few_disks = 5000    !! up to this number of disks nearly all events fit into buckets
+  integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]    !! number of windows after the current one in which each stage of
+                                                                  !! prefetching lists disks
   integer(int32), parameter :: stages = size(windows_ahead)
   integer(int32), parameter :: most_coming = windows_ahead(1)*bucket_capacity
     !! largest number of disks listed for prefetching at once
@@ -25,11 +28,11 @@ module calendar
   end type bucket_t
 
   integer(int32), parameter :: log_chunk = 7
-  integer(int32), parameter :: chunk = shiftl(1_int32, log_chunk)  !! length of a chunk of a list, of which one entry is a link: 1
-                                                                   !! KiB
+  integer(int32), parameter :: chunk = shiftl(1_int32, log_chunk)  !! number of entries in a chunk of a list, which occupies 1 KiB;
+                                                                   !! the first entry is a link
   integer(int32), parameter :: none = -1
 
-  !> A disk and the window of its event. In the first entry of a chunk `disk` is the number of the next chunk of the list.
+  !> A disk and the window of its event. In the first entry of a chunk, `disk` is the number of the next chunk of the list.
   type :: filed_t
     integer(int32) :: disk
     integer(int32) :: window
@@ -37,17 +40,19 @@ module calendar
 
   type :: calendar_t
     type(bucket_t), allocatable :: bucket(:)       !! (0:last_bucket) buckets of windows, a circular buffer
-    !> (0:last_span) position in `filed` behind the end of the list of each span, 0 if the list is empty; a circular buffer as
-    !> well. A span is half the length of the buffer of buckets. A list may also hold events of later turns of the circular buffer.
+    !> (0:last_span) position in `filed` after the last entry in the list of each span, 0 if the list is empty. This array is a
+    !> circular buffer as well. A span contains half as many windows as there are buckets. A list may also contain events of later
+    !> spans with the same index in the circular buffer.
     integer(int32), allocatable :: list_end(:)
-    type(filed_t), allocatable :: filed(:)         !! (0:) all lists, in chunks that are linked to the chunks filled before
+    type(filed_t), allocatable :: filed(:)         !! (0:) all lists, in chunks, each of which is linked to the chunk of its list
+                                                   !! that was filled before
     integer(int32) :: n_chunks = 0                 !! number of chunks that have been used
     integer(int32) :: vacant = none                !! head of the list of free chunks
     integer(int32) :: last_bucket = 0              !! a power of two minus 1, used as a bit mask for window numbers
-    integer(int32) :: last_span = 0                !! likewise for span numbers
-    integer(int32) :: log_span = 0                 !! binary logarithm of the windows in a span
+    integer(int32) :: last_span = 0                !! bit mask for span numbers, also a power of two minus 1
+    integer(int32) :: log_span = 0                 !! binary logarithm of the number of windows in a span
     integer(int32) :: ring_end = 0                 !! first window that has no bucket yet
-    integer(int32) :: announced(stages) = 0        !! last window covered by each stage
+    integer(int32) :: announced(stages) = 0        !! last window of which each stage has listed the disks
   contains
     procedure :: empty
     procedure :: begin
@@ -61,9 +66,10 @@ module calendar
 
 contains
 
-  !> Empties buckets and spans and chooses their numbers. At the mean number of events per window they cover 2n events, so that
-  !> most events of n disks fit. For many disks the buckets must leave space in the cache for the disks; equal numbers of buckets
-  !> and spans minimise the number of cache lines written.
+  !> Empties the buckets and the lists of spans, and chooses their numbers. With the intended mean number of events per window,
+  !> buckets and spans together cover 2n events, so that most events of n disks fit into them. For many disks the number of buckets
+  !> is limited, so that the cache can also contain the disks. Equal numbers of buckets and spans minimise the number of cache lines
+  !> that are written.
   subroutine empty(self, n)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: n                !! number of disks
@@ -85,7 +91,7 @@ contains
     end if
     if (.not. allocated(self%bucket)) then
       allocate (self%bucket(0:self%last_bucket), self%list_end(0:self%last_span))
-      ! The operating system provides memory only for the part that is used.
+      ! The operating system provides memory only for the part of the array that is used.
       allocate (self%filed(0:chunk*(self%last_span + 1 + 2*n/chunk) - 1))
     end if
     self%bucket%n = 0
@@ -94,7 +100,7 @@ contains
     self%vacant = none
   end subroutine empty
 
-  !> Starts the calendar at a window.
+  !> Starts the calendar at a given window.
   subroutine begin(self, window)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: window
@@ -136,7 +142,8 @@ contains
   !> Appends a chunk to the list that ends before `place`.
   subroutine add_chunk(self, place)
     class(calendar_t), intent(inout) :: self
-    integer(int32), intent(inout) :: place         !! in: end of the list; out: position of the first event in the new chunk
+    integer(int32), intent(inout) :: place         !! in: position after the last entry of the list; out: position of the first
+                                                   !! entry in the new chunk
     type(filed_t), allocatable :: more(:)
     integer(int32) :: c
 
@@ -165,8 +172,8 @@ contains
     yes = iand(window, shiftl(1_int32, self%log_span) - 1) == 0
   end function span_begins
 
-  !> Moves the events of the next span into their buckets. Events of a later turn stay in the list if they are still valid.
-  !> Events whose bucket is full are returned.
+  !> Moves the events of the next span into their buckets. Events of later spans with the same index stay in the list if they are
+  !> still valid. Events whose bucket is full are returned in `surplus`.
   subroutine open_span(self, tag, n_surplus, surplus)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
@@ -202,15 +209,16 @@ contains
     end do
   end subroutine open_span
 
-  !> Lists disks that probably have events in the next windows. Each stage lists each window once; later stages cover fewer
-  !> windows ahead. After the first stage only disks whose entry is still valid are listed.
+  !> Lists disks that probably have events in the next windows, separately for each stage of prefetching. Each stage lists the disks
+  !> of each window once. A later stage lists them at a later time, when fewer windows precede the window of their event. All stages
+  !> except the first list only disks whose entry is still valid.
   subroutine list_coming(self, tag, window, stage, n, disks)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(in) :: window           !! current window
     integer(int32), intent(in) :: stage
     integer(int32), intent(out) :: n
-    integer(int32), intent(out) :: disks(most_coming)    !! (n) the disks
+    integer(int32), intent(out) :: disks(most_coming)    !! (n) the listed disks
     integer(int32) :: w, last, k
     logical :: valid
 

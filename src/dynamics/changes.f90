@@ -1,5 +1,5 @@
-!> Changes to a running simulation: of forces, laws and motions of sides, of positions and velocities. They act at the present time
-!> on all disks at once. Their effect on the energy is counted as work.
+!> Changes a running simulation: forces, contact laws, motions of sides, positions and velocities. A change takes effect at the
+!> present time and for all disks at once. The energy change that it causes is counted as work.
 module changes
   use box_sides, only: bounds
   use disks, only: advance_disk
@@ -17,11 +17,12 @@ module changes
 
 contains
 
-  !> Replaces box, contact law and drive from now on by those of an input with the same disks. Moving sides must not jump.
+  !> Replaces the box, the contact law and the drive of a simulation by those of an input with the same disks. The new ones apply
+  !> from the present time on. The positions of moving sides must be continuous.
   subroutine change_system(sim, system, problem)
     type(simulation_t), intent(inout) :: sim
     type(system_t), intent(in) :: system
-    character(len=:), allocatable, intent(out) :: problem    !! reason why this is impossible; empty if it succeeded
+    character(len=:), allocatable, intent(out) :: problem    !! reason why the replacement is impossible; empty if it succeeded
     type(simulation_t) :: other
     real(real64) :: before, here(2, 2), there(2, 2), v  ! energy [energy], lower and upper sides [length], velocity of a side
                                                         ! [length/time]
@@ -57,8 +58,8 @@ contains
     call book(sim, before)
   contains
 
-    !> Sets the number of kicks to that of a run with the new driving from the start. It determines the time and the random
-    !> numbers of the next kick.
+    !> Sets the number of kicks to the number in a run that has had the new driving from its start. This number determines the time
+    !> and the random numbers of the next kick.
     subroutine count_kicks()
       if (.not. sim%drive%is_on()) return
       sim%kicks = int(min(sim%time()/sim%drive%interval, 2.0_real64**62), int64)
@@ -90,7 +91,8 @@ contains
     call book(sim, before)
   end subroutine change_velocities
 
-  !> Sets the positions of all disks, without a test for overlaps. A position outside a periodic side is that of an image.
+  !> Sets the positions of all disks, without a test for overlaps. A position beyond a periodic side is the position of a periodic
+  !> image of the disk.
   subroutine change_positions(sim, x)
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: x(:, :)                      !! (2,n) new positions in the order of ids [length]
@@ -104,7 +106,7 @@ contains
       if (any(sim%box%periodic)) image = sim%extra(i)%image
       old = sim%disk(i)%x
       v = sim%disk(i)%v
-      call wrap(sim, old, v, image)                          ! the image that a frame would show
+      call wrap(sim, old, v, image)                          ! position of the image that a frame would contain
       sim%disk(i)%x = x(:, sim%tag(i)%id)
       call wrap(sim, sim%disk(i)%x, v, image)
       if (any(sim%box%periodic)) sim%extra(i)%image = image
@@ -113,9 +115,9 @@ contains
     call book(sim, before)
   end subroutine change_positions
 
-  !> Advances all disks to the present time under the old law. Their clocks are equal afterwards. The last partners are erased,
-  !> because a disk may collide with its last partner again at once, as after a kick, and this must not be taken for a rounding
-  !> error of the previous collision.
+  !> Advances all disks to the present time with the previous forces. Their clocks are equal afterwards. The last partners are
+  !> erased: after a change, as after a kick, a disk may collide with its last partner again immediately, and this collision must
+  !> not be mistaken for a rounding error of the previous collision.
   subroutine advance_all(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i
@@ -127,7 +129,7 @@ contains
     end do
   end subroutine advance_all
 
-  !> Adds the energy change to the work, in sums whose units are those of a run with the new system.
+  !> Adds the energy change to the work. The exact sums use the same unit as a run that has had the new system from its start.
   subroutine book(sim, before)
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: before                       !! total energy before the change [energy]

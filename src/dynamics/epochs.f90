@@ -1,5 +1,5 @@
-!> Moves the origin of time and detects collapses. Both depend on the state alone, so that all searches, queues and numbers of
-!> threads agree.
+!> Divides the run into epochs. At the end of an epoch the origin of time is moved and the state is tested for a collapse. The end
+!> and the test depend on the state alone, so that they are the same for all searches, queues and numbers of threads.
 module epochs
   use box_sides, only: separate_from_sides
   use kinds, only: int32, int64, never, pi, real64
@@ -12,19 +12,22 @@ module epochs
   private
   public :: are_crushed, restart_epoch, begin_first_epoch, is_at_rest, last_time, most_events, move_epoch, stands_still
 
-  !> Collisions of disks, per disk, in an epoch. The origin of time then moves, so that times keep their precision.
+  !> Number of collisions per disk in an epoch. The origin of time moves at the end of the epoch, so that times keep their
+  !> precision.
   integer(int64), parameter :: epoch_length = 24
-  integer, parameter :: significant_bits = 20  !! significant bits of the length of an epoch, few enough for exact sums of lengths
-  !> Number of events without advance of time that is considered a collapse: at least this number, and this number per disk.
+  integer, parameter :: significant_bits = 20  !! significant bits of the length of an epoch; with so few bits, sums of lengths are
+                                               !! exact
+  !> A collapse is reported after this number of events, and at least this number per disk, that do not advance the time.
   integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
   real(real64), parameter :: shortest = 2.0_real64**(-20)  !! shortest epoch in units of `negligible_time`
   real(real64), parameter :: last_time = 0.5_real64*never
-  real(real64), parameter :: crushing = 1.0e6_real64 !! factor of energy growth by which crushed disks are recognised
-  real(real64), parameter :: densest = 0.9_real64  !! largest packing fraction used in the estimate
+  real(real64), parameter :: crushing = 1.0e6_real64 !! growth factor of the energy above which disks are considered crushed
+  real(real64), parameter :: densest = 0.9_real64  !! largest packing fraction used in the estimate of the event rate
 
 contains
 
-  !> Chooses the length of the first epoch from an estimate of the event rate, and the time within which no disk moves noticeably.
+  !> Chooses the length of the first epoch from an estimate of the event rate. Sets `negligible_time`, the time within which no disk
+  !> moves noticeably.
   pure subroutine begin_first_epoch(sim)
     type(simulation_t), intent(inout) :: sim
     real(real64) :: fastest, mean
@@ -94,9 +97,9 @@ contains
     call begin_epoch(sim, length)
   end subroutine move_epoch
 
-  !> Ends the epoch because the disks, or the forces and laws, have been changed. The following motion may be faster by any
+  !> Ends the epoch because the disks, the forces or the contact laws have been changed. The following motion may be faster by any
   !> factor. The origin of time therefore moves exactly to the present time, and the length of the epoch is determined again when
-  !> the evolution starts. Time-stepped dynamics counts from the start of the run and has no epochs.
+  !> the evolution starts. Time-stepped dynamics has no epochs; the origin of its times is the start of the run.
   subroutine restart_epoch(sim)
     type(simulation_t), intent(inout) :: sim
 
@@ -121,13 +124,14 @@ contains
     sim%last_advance = sim%last_advance - shift
     sim%box%epoch = sim%box%epoch + shift
     sim%box%side%clock = sim%box%side%clock - shift
-    if (.not. any(sim%box%surface(:n_sides)%motion%moves())) return      ! only moving sides need this
+    if (.not. any(sim%box%surface(:n_sides)%motion%moves())) return      ! only moving sides can compress the disks
     do i = 1, sim%n_disks()
       call separate_from_sides(sim%box, sim%disk(i), sim%now)
     end do
   end subroutine move_origin
 
-  !> Number of events at which an epoch ends early, because the event rate is far higher than expected, as before a collapse.
+  !> Number of events at which an epoch ends before its time. The epoch reaches this number only if the event rate is far higher
+  !> than expected, as before a collapse.
   pure function most_events(sim) result(n)
     type(simulation_t), intent(in) :: sim
     integer(int64) :: n
@@ -135,8 +139,9 @@ contains
     n = sim%epoch_events + 2*events_per_epoch(sim)
   end function most_events
 
-  !> Whether moving sides compress the disks beyond close packing, so that their energy grows without limit. Other energy sources,
-  !> such as driving, hot walls or gravity, are excluded. Tested at the end of an epoch.
+  !> Whether moving sides compress the disks beyond close packing, so that their energy grows without limit. The test does not apply
+  !> to simulations with another source of energy, such as driving, hot walls or gravity. The function is called at the end of an
+  !> epoch.
   pure function are_crushed(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -149,7 +154,7 @@ contains
     end associate
   end function are_crushed
 
-  !> Whether a long series of events has not advanced the time, as in a collapse. Tested at the end of an epoch.
+  !> Whether a long series of events has not advanced the time, as in a collapse. The function is called at the end of an epoch.
   pure function stands_still(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -158,9 +163,10 @@ contains
       .and. sim%tally%events - sim%events_then >= max(collapse_length, collapse_length_per_disk*sim%n_disks())
   end function stands_still
 
-  !> Whether all disks are at rest. The bounces of a disk that falls back on a surface at rest take ever shorter times with a
-  !> finite sum. A disk is considered at rest if its remaining bounces would end within `negligible_time`, and its last one
-  !> occurred within that time. Without gravity it is at rest if it does not move.
+  !> Whether all disks are at rest. A disk that bounces inelastically on a surface at rest makes infinitely many bounces in a finite
+  !> time, because the durations of the bounces form a convergent series. With gravity a disk is considered at rest if its remaining
+  !> bounces would end within `negligible_time` and its last bounce occurred within that time. Without gravity a disk is at rest if
+  !> it does not move.
   pure function is_at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes

@@ -1,8 +1,8 @@
-!> Event-driven dynamics: exact trajectories from event to event. Each disk stores one event, its earliest. When it is due, the
-!> disks involved collide, and their next events are predicted.
-!>
-!> An event becomes stale when its partner collides with another disk first. Stale events are not searched for. They are recognised
-!> by the collision counter of the partner when they are due; the disk then only predicts its next event.
+!> Event-driven dynamics: exact trajectories from event to event. Each disk stores one event, the earliest of its predicted events.
+!> When this event is due, the disks involved collide, and their next events are predicted.
+!>  An event becomes stale when its partner collides with another disk first. Stale events are not searched for. A stale event is
+!> recognised by the collision counter of the partner when the event is due. It is then not executed, and the next event of the disk
+!> is predicted.
 module event_driven
   use kinds, only: int32, int64, never, real64
   use box_sides, only: side_time
@@ -26,16 +26,19 @@ module event_driven
   private
   public :: event_driven_t
 
-  integer(int64), parameter :: events_to_look = 20000  !! number of events between two checks of the number of collisions
-  integer(int32), parameter :: disks_in_cache = 20000    !! more disks do not fit into a second-level cache, and prefetching pays
+  integer(int64), parameter :: events_to_look = 20000  !! number of events between two checks of the number of collisions against
+                                                       !! its limit
+  integer(int32), parameter :: disks_in_cache = 20000    !! largest number of disks that fit into a second-level cache; prefetching
+                                                         !! saves time for more disks
   integer(int64), parameter :: events_ahead = 8    !! number of events between two prefetches
 
   type, extends(evolution_t) :: event_driven_t
-    class(cell_grid_t), allocatable :: search      !! polymorphic, so that its rare procedures are not inlined into the hot path
+    class(cell_grid_t), allocatable :: search      !! polymorphic, so that its rarely used procedures are not inlined into the hot
+                                                   !! path
     type(event_queue_t) :: queue
     logical :: windowed = .true.                   !! the queue uses its calendar, not only the heap
     logical :: general = .false.                   !! collisions need the general procedure
-    logical :: is_part = .false.  !! this engine advances one domain, and only collisions that belong to it are counted
+    logical :: is_part = .false.  !! this engine advances one domain and counts only the collisions that belong to this domain
     class(histories_t), allocatable :: histories   !! histories of the disks of the domain
     integer(int64) :: last_count = 0               !! number of events at which `run_events` returns
   contains
@@ -48,7 +51,7 @@ module event_driven
 
 contains
 
-  !> Sets up search and queue from a state: a new one, a restored one, or at the start of an epoch.
+  !> Sets up search and queue from a state: a new state, a restored state, or the state at the start of an epoch.
   subroutine start(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -60,12 +63,12 @@ contains
     call self%search%build(sim)
     do i = 1, sim%n_disks()
       if (stop_requested()) return                 ! see `advance`
-      if (sim%tag(i)%id > 0) call self%search%predict(sim, i)    ! otherwise a vacant slot
+      if (sim%tag(i)%id > 0) call self%search%predict(sim, i)    ! an id of 0 marks an index without a disk
     end do
     call self%queue%fill(sim%disk, sim%tag, sim%now, self%windowed)
   end subroutine start
 
-  !> Predicts the events of disks that have been changed. Events of other disks with them are now stale.
+  !> Predicts the events of disks that have been changed. Events that other disks predicted with these disks are now stale.
   subroutine renew(self, sim, changed)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -83,8 +86,8 @@ contains
     end do
   end subroutine renew
 
-  !> Predicts the events of all disks, whose clocks are equal. If the next kick changes all velocities, later events will never
-  !> happen and are not filed. The earliest event is always filed, because the queue must not be empty.
+  !> Predicts the events of all disks, whose clocks are equal. If the next kick changes all velocities, events after that kick will
+  !> never occur and are not entered into the queue. The earliest event is always entered, because the queue must not be empty.
   subroutine renew_all(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -109,8 +112,8 @@ contains
     end do
   end subroutine renew_all
 
-  !> Executes events until a limit is reached. Returns early when a stop has been requested: long predictions are then
-  !> left incomplete, but the state itself is complete.
+  !> Executes events until a limit is reached. Returns early when a stop has been requested. Some predictions may then be missing,
+  !> but the state itself is complete.
   subroutine advance(self, sim, limits, error, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -135,17 +138,18 @@ contains
       call self%run_events(sim, t_limit, iterations, event, log)
       self%iterations_left = iterations
       self%last_event = [event%disk, event%partner]
-      ! A sample at this time requires that all events at this time have been executed.
+      ! A sample at this time is possible only after all events at this time have been executed.
       if (iterations == 0 .and. .not. sim%now < limits%time) iterations = 1
       if (self%search%everyone .and. sim%tally%events > events) call self%predict_all(sim)
       if (event%time <= t_limit) cycle
       if (t_limit < limits%time .and. event%time > t_limit) then
-        iterations = iterations + 1                ! no event has been executed
+        iterations = iterations + 1                ! the last iteration executed no event
         self%iterations_left = iterations
         call follow_piston(self, sim)
         cycle
       end if
-      if (is_stale()) then                         ! the returned event must not depend on the order of predictions
+      if (is_stale()) then                         ! a stale event depends on the order of predictions, and the returned event must
+                                                   ! not
         call predict(self, sim, event%disk)
         cycle
       end if
@@ -153,7 +157,7 @@ contains
         call fail(error, exit_broken, "a time became NaN: "//encounter_text(sim, event%disk, event%partner))
         return
       end if
-      self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! in a sheared box the images move for ever
+      self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! in a sheared box the images move without end
       if (limits%time < last_time) sim%now = max(sim%now, limits%time)
       self%arrived = .true.
       return
@@ -168,7 +172,7 @@ contains
       if (yes) yes = sim%disk(event%partner)%collision_counter /= sim%tag(event%disk)%partner_counter
     end function is_stale
 
-    !> The number of events up to which no check is due.
+    !> The number of events before which no check is due.
     pure function next_pause() result(events)
       integer(int64) :: events
 
@@ -189,8 +193,8 @@ contains
     end subroutine read_ahead
   end subroutine advance
 
-  !> Hot path: executes event after event, up to `last_count` events, a time limit, or a number of iterations. All
-  !> rare work is left to the caller.
+  !> Hot path: executes one event after another until the number of events is `last_count`, a time limit is reached, or a number of
+  !> iterations is used. The caller does all work that is rarely needed.
   subroutine run_events(self, sim, t_limit, iterations, event, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -228,7 +232,7 @@ contains
     if (self%is_part) counts = self%histories%counts(sim%tag, i, code)
     if (code > 0) then
       if (sim%disk(code)%collision_counter == sim%tag(i)%partner_counter) then
-        ! Equal clocks are rare: the disks are still in contact, or both have collided at exactly this time.
+        ! Equal clocks are rare. They occur if the disks are still in contact, or if both have collided at exactly this time.
         if (self%general .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0) then
           call collide(sim, i, code, t, counts, log)
         else
@@ -258,8 +262,9 @@ contains
     call predict(self, sim, i)
   end subroutine execute
 
-  !> Predicts again the events of disks that were to collide with a piston whose motion has changed, and of those that now
-  !> collide with it earlier. Makes the loop return, because the piston may leave its strip earlier.
+  !> Updates predictions after the motion of a piston has changed: predicts again the events of disks whose next event was with this
+  !> piston, and of disks that now collide with the piston before their next event. Makes the event loop return, because the piston
+  !> may now leave its strip earlier.
   subroutine follow_side(self, sim, side)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -277,7 +282,8 @@ contains
     end associate
   end subroutine follow_side
 
-  !> Predicts the events of disks that a piston may touch in the strip that it enters, and of those in the strip that it leaves.
+  !> Predicts the events of the disks in the strip (see `piston_strips`) that a piston enters, and of the disks in the strip that it
+  !> leaves.
   subroutine follow_piston(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -290,7 +296,7 @@ contains
     end do
   end subroutine follow_piston
 
-  !> Predicts the next event of disk i and files it.
+  !> Predicts the next event of disk i and enters this event into the queue.
   subroutine predict(self, sim, i)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -300,7 +306,7 @@ contains
     call self%queue%schedule(sim%disk, sim%tag, i)
   end subroutine predict
 
-  !> Predicts the events of all disks, not only of those involved: the simplest algorithm of textbooks.
+  !> Predicts the events of all disks, and not only of the disks involved in an event. This is the simplest algorithm of textbooks.
   subroutine predict_all(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -1,6 +1,6 @@
-!> A priority queue: a min-heap of events in an array, with four children per node and at most one event per
-!> disk, which can be accessed by disk. Simultaneous events have a fixed order that depends neither on which disk stores the
-!> event nor on the order of insertion.
+!> A priority queue of events: a min-heap in an array, with four children per node. It contains at most one event per disk, which
+!> can be found by the index of the disk. Simultaneous events have a fixed order that depends neither on which disk stores the event
+!> nor on the order of insertion.
 module event_heap
   use kinds, only: int32
   use disks, only: tag_t
@@ -9,12 +9,14 @@ module event_heap
   private
   public :: event_heap_t, need_order, precedes
 
-  integer(int32), parameter :: arity = 4  !! children per node: half the depth of a binary heap, with equally many cache lines
+  integer(int32), parameter :: arity = 4  !! children per node; compared with a binary heap, the depth is halved and no more cache
+                                          !! lines are accessed per level
 
   type :: event_heap_t
     integer(int32) :: n = 0                      !! number of events
     type(event_t), allocatable, private :: entry(:)        !! (n) events in heap order
-    integer(int32), allocatable, private :: slot(:)        !! (disks) position of the event of each disk; 0: none
+    integer(int32), allocatable, private :: slot(:)        !! (disks) position in `entry` of the event of each disk; 0 if it has no
+                                                           !! event in the heap
   contains
     procedure :: initialise
     procedure :: update
@@ -24,8 +26,8 @@ module event_heap
 
 contains
 
-  !> Order of events: by time, then by `wins`. Both disks of a pair may store the same collision; its position in the order
-  !> does not depend on which of them does.
+  !> Order of events: by time, then by `wins`. Both disks of a pair may store the same collision; the position of the collision in
+  !> the order is the same for both disks.
   pure function precedes(a, b, tag) result(yes)
     type(event_t), intent(in) :: a, b
     type(tag_t), intent(in) :: tag(*)
@@ -35,7 +37,8 @@ contains
     if (.not. (yes .or. a%time > b%time)) yes = wins(a, b, tag)
   end function precedes
 
-  !> Nonzero if two simultaneous events need an order. Most of them are the same collision, stored by both disks, and need none.
+  !> Nonzero if two simultaneous events need an order. Most pairs of simultaneous events are one collision that both disks store,
+  !> and need no order.
   elemental function need_order(a, b) result(bits)
     type(event_t), intent(in) :: a, b
     integer(int32) :: bits
@@ -56,7 +59,7 @@ contains
     self%n = 0
   end subroutine initialise
 
-  !> Inserts the event of a disk, or replaces the event that this disk had.
+  !> Inserts the event of a disk, or replaces the previous event of this disk.
   pure subroutine update(self, event, tag)
     class(event_heap_t), intent(inout) :: self
     type(event_t), intent(in) :: event

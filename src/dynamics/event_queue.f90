@@ -1,8 +1,8 @@
 !> The event queue: a calendar combined with a heap (G. Paul, J. Comput. Phys. 221, 615 (2007)).
-!>
-!> Events of the current time window are in a short sorted list; if it grows too long, the heap is used until the window is done.
-!> Later events are in the calendar, or in the heap if their bucket is full. Single entries are never searched or removed: an entry
-!> is valid only if it still equals the event that its disk stores. Without the calendar all events are in the heap.
+!>  Events of the current time window are in a short sorted list. If this list becomes full, its events are moved to the heap, and
+!> the heap is used until the end of the window. Events of later windows are in the calendar, or in the heap if their bucket is
+!> full. Single entries are never searched or removed. An entry is valid only if it still equals the event that its disk stores.
+!> Without the calendar all events are in the heap.
 module event_queue
   use kinds, only: int32, int64, never, real64
   use calendar, only: bucket_capacity, bucket_t, calendar_t, events_per_window, most_coming, window_none
@@ -21,17 +21,19 @@ module event_queue
     private
     type(calendar_t) :: calendar
     type(event_heap_t) :: heap
-    type(event_t) :: near(0:near_capacity)  !! (0:n_near) sorted list, latest first; element 0 is a sentinel that is never due
+    type(event_t) :: near(0:near_capacity)  !! (0:n_near) sorted list of events, the latest first; element 0 is a sentinel that is
+                                            !! never due
     integer(int32) :: n_near = 0
-    logical :: near_is_open = .false.              !! the list accepts events; otherwise the heap does
+    logical :: near_is_open = .false.              !! events of the current window are added to the sorted list; otherwise to the
+                                                   !! heap
     logical :: windowed = .true.                   !! the calendar is in use, not only the heap
     integer(int32) :: window = 0                   !! index of the current window since the epoch
     integer(int32) :: n_disks = 0
     real(real64) :: width = never                  !! width of a window [time]
     real(real64) :: per_time = 0.0_real64          !! number of windows per time, 1/width
     real(real64) :: next_window = 1.0_real64       !! window + 1
-    integer(int64) :: n_taken = 0                  !! number of events taken since the last filling
-    real(real64) :: filled_at = 0.0_real64         !! time of the last filling [time]
+    integer(int64) :: n_taken = 0                  !! number of events taken from the queue since all events were last entered
+    real(real64) :: filled_at = 0.0_real64         !! time when all events were last entered [time]
   contains
     procedure :: fill
     procedure :: schedule
@@ -40,7 +42,7 @@ module event_queue
     procedure :: drop_first
     procedure :: drop_if_next
     procedure :: list_coming
-    ! Rare procedures are bound to the type, so that they are not inlined into frequent ones.
+    ! Rarely called procedures are bound to the type, so that they are not inlined into frequently called procedures.
     procedure, private :: insert_near
     procedure, private :: insert_into_heap
     procedure, private :: first_in_heap
@@ -57,7 +59,7 @@ contains
     type(disk_t), intent(in) :: disk(:)
     type(tag_t), intent(inout) :: tag(:)
     real(real64), intent(in) :: now                !! since the epoch [time]
-    logical, intent(in) :: windowed                !! .false.: all events are filed in the heap
+    logical, intent(in) :: windowed                !! .false.: all events are entered into the heap
     integer(int32) :: i
 
     self%n_disks = size(disk, kind=int32)
@@ -65,7 +67,8 @@ contains
     self%near(0)%time = huge(now)
     call self%heap%initialise(self%n_disks)
     tag%window = window_none
-    self%width = max(window_width(), 1.0e-9_real64*now, 1/never)   ! window numbers fit into 32 bits
+    self%width = max(window_width(), 1.0e-9_real64*now, 1/never)   ! the lower bound ensures that window numbers fit into 32-bit
+                                                                   ! integers
     self%windowed = windowed .and. self%width < never
     self%near_is_open = self%windowed
     self%n_taken = 0
@@ -83,8 +86,8 @@ contains
     end do
   contains
 
-    !> Width of a window that contains a few events, from the event rate since the last filling or, at first, from the
-    !> median waiting time of a sample of disks. `never` if there are no events.
+    !> Width of a window that contains a few events, from the event rate since all events were last entered. The first estimate uses
+    !> the median waiting time of a sample of disks. The result is `never` if there are no events.
     pure function window_width() result(width)
       real(real64) :: width, waits(sample_size), swap
       integer :: i, k, n_waits
@@ -109,7 +112,8 @@ contains
     end function window_width
   end subroutine fill
 
-  !> Enters the event of disk i into the queue. A previous entry of the disk becomes invalid by itself.
+  !> Enters the event of disk i into the queue. A previous entry of the disk becomes invalid, because it no longer equals the event
+  !> of the disk.
   subroutine schedule(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -120,7 +124,7 @@ contains
     logical :: full
 
     number = disk(i)%event_time*self%per_time
-    if (.not. number >= self%next_window) then     ! also true for NaN, which is then found at once
+    if (.not. number >= self%next_window) then     ! also true if the time is NaN, so that this error is detected immediately
       tag(i)%window = window_none
       call self%insert_near(disk, tag, i)
       return
@@ -138,7 +142,8 @@ contains
     end if
   end subroutine schedule
 
-  !> Removes the entry of a disk from the queue; it becomes invalid by itself.
+  !> Removes the entry of a disk from the queue. Only the window of the disk is erased: the entry itself becomes invalid when the
+  !> event of the disk changes.
   pure subroutine remove_entry(self, tag)
     class(event_queue_t), intent(in) :: self
     type(tag_t), intent(inout) :: tag
@@ -186,8 +191,8 @@ contains
     call self%heap%update(event_of(disk, i), tag)
   end subroutine insert_into_heap
 
-  !> Inserts an event into a sorted list of n events. The time nearly always decides. Most simultaneous events are the same
-  !> collision, stored by both disks, and need no order.
+  !> Inserts an event into a sorted list of n events. The comparison of the times nearly always suffices to order two events. Most
+  !> pairs of simultaneous events are one collision that both disks store, and need no order.
   pure subroutine insert(list, n, event, tag)
     type(event_t), intent(inout) :: list(0:*)
     integer(int32), intent(in) :: n
@@ -230,7 +235,7 @@ contains
     end do
   end subroutine first
 
-  !> The disk with the earliest event in the heap; 0 if none is due in this window.
+  !> The disk with the earliest event in the heap; 0 if no event in the heap is due in this window.
   subroutine first_in_heap(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -263,8 +268,8 @@ contains
     self%n_taken = self%n_taken + 1
   end subroutine drop_first
 
-  !> Removes the entry of disk i if it is the next one. This only saves time: when both disks of a collision have stored it, the
-  !> second entry follows the first one.
+  !> Removes the entry of disk i if it is the next entry. This removal only saves time: if both disks of a collision have stored the
+  !> collision, the second entry directly follows the first entry.
   subroutine drop_if_next(self, i)
     class(event_queue_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -272,7 +277,7 @@ contains
     self%n_near = self%n_near - merge(1, 0, self%near(self%n_near)%disk == i)
   end subroutine drop_if_next
 
-  !> Lists disks that probably have events soon: see `calendar`.
+  !> Lists disks that probably have events in the next windows: see `calendar`.
   subroutine list_coming(self, tag, stage, n, disks)
     class(event_queue_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
@@ -295,7 +300,7 @@ contains
     end associate
   end function is_valid
 
-  !> Advances by one window and sorts its events into the list, which is empty before.
+  !> Advances by one window and sorts the events of the new window into the list, which is empty before.
   subroutine open_next_window(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -310,8 +315,8 @@ contains
     if (self%calendar%span_begins(self%window)) call self%open_next_span(disk, tag)
   end subroutine open_next_window
 
-  !> Empties a bucket into a sorted list. Only events before the next window are valid. Their number is so small that the position
-  !> of each is found by counting later events, without branches on times.
+  !> Empties a bucket into a sorted list. Only events before the next window are valid. Their number is small. The position of each
+  !> event is therefore found by counting the later events, without branches that depend on times.
   pure subroutine take_bucket(bucket, disk, tag, per_time, next_window, list, n)
     type(bucket_t), intent(inout) :: bucket
     type(disk_t), intent(in) :: disk(*)
@@ -367,8 +372,8 @@ contains
     call hand_over(self, disk, tag)
   end subroutine take_from_heap
 
-  !> Moves the events of the next span into their buckets. If windows have proved far too narrow or too wide, all events
-  !> are entered again.
+  !> Moves the events of the next span into their buckets. If the width of the windows has proved far too small or too large, all
+  !> events are entered again with a new width.
   subroutine open_next_span(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -388,8 +393,8 @@ contains
     end do
   contains
 
-    !> Whether windows have proved far too narrow or too wide since the last filling, and enough windows have passed to justify
-    !> filing all disks again.
+    !> Whether the width of the windows has proved far too small or too large since all events were last entered, and enough windows
+    !> have passed to justify entering all events again.
     pure function ill_fitting() result(yes)
       logical :: yes
       real(real64) :: per_window

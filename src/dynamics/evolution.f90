@@ -16,8 +16,9 @@ module evolution
     integer(int64) :: events = huge(0_int64)
     real(real64) :: dissipated = huge(0.0_real64)        !! dissipated energy [energy]
     logical :: at_rest = .false.                         !! all disks are at rest
-    integer(int64) :: iterations = huge(0_int64)         !! iterations of the loop, so that the caller can make other checks
-    real(real64) :: sampled = 0.0_real64                 !! time of the latest sample; the run does not end before it
+    integer(int64) :: iterations = huge(0_int64)         !! number of iterations of the event loop after which the caller can make
+                                                         !! other checks
+    real(real64) :: sampled = 0.0_real64                 !! time of the latest sample, before which the run does not end
   contains
     procedure :: reached
     procedure :: outgrown
@@ -27,7 +28,7 @@ module evolution
   type, abstract :: evolution_t
     logical :: idle = .false.     !! no event will ever occur again
     logical :: arrived = .false.  !! the last advance reached its time limit, and all events up to it have been executed
-    integer(int64) :: iterations_left = 0  !! number of iterations left of those that the last advance was allowed
+    integer(int64) :: iterations_left = 0  !! number of iterations that the last advance was allowed but did not use
     integer(int64) :: serial_events = 0    !! number of events executed by the serial engine of a parallel run
     integer(int32) :: last_event(2) = 0    !! disk and partner of the last event, or of the first one beyond the time limit
   contains
@@ -39,27 +40,29 @@ module evolution
   end type evolution_t
 
   abstract interface
-    !> Prepares to continue from `sim`, new or restored. All data that are not part of the state are derived from it here.
+    !> Prepares to continue from the state `sim`, which is new or restored. This procedure derives all data that are not part of the
+    !> state from the state.
     subroutine start_evolution(self, sim)
       import :: evolution_t, simulation_t
       class(evolution_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: sim
     end subroutine start_evolution
 
-    !> Advances until a limit is reached or the log is full. The trajectory does not depend on where it stops.
+    !> Advances until a limit is reached or the log is full. The trajectory does not depend on the times at which the procedure
+    !> returns.
     subroutine advance_evolution(self, sim, limits, error, log)
       import :: error_t, event_log_t, evolution_t, limits_t, simulation_t
       class(evolution_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: sim
       type(limits_t), intent(in) :: limits
       type(error_t), allocatable, intent(out) :: error
-      type(event_log_t), intent(inout), optional :: log    !! log of the collisions; if it is absent, they are not logged
+      type(event_log_t), intent(inout), optional :: log    !! log of the collisions; without this argument collisions are not logged
     end subroutine advance_evolution
   end interface
 
 contains
 
-  !> Whether a limit other than that of time is reached. (Events at exactly the time limit are still executed.)
+  !> Whether a limit other than the time limit is reached. (Events at exactly the time limit are still executed.)
   pure function reached(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally
@@ -68,8 +71,9 @@ contains
     yes = tally%events >= self%events .or. tally%collisions >= self%collisions .or. self%outgrown(tally)
   end function reached
 
-  !> Whether a limit on a quantity that any collision may change is reached. Such a quantity must never decrease: parallel runs
-  !> detect afterwards that the limit was exceeded, and go back to find the collision at which it was reached.
+  !> Whether a limit on a quantity that any collision may change is reached. Such a quantity must never decrease: a parallel run
+  !> detects afterwards that the limit was exceeded, and repeats the time window to find the collision at which the limit was
+  !> reached.
   pure function outgrown(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally
@@ -78,7 +82,7 @@ contains
     yes = tally%total(dissipated) >= self%dissipated
   end function outgrown
 
-  !> Whether there is a limit on such a quantity.
+  !> Whether there is a limit on a quantity that any collision may change.
   pure function watches(self) result(yes)
     class(limits_t), intent(in) :: self
     logical :: yes
@@ -86,7 +90,7 @@ contains
     yes = self%dissipated < huge(self%dissipated)
   end function watches
 
-  !> A warning about settings that are legal but rarely sensible with this dynamics; empty if there is none.
+  !> A warning about settings that are valid but rarely sensible with this dynamics; empty if there is nothing to report.
   pure function warning(self, sim) result(text)
     class(evolution_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

@@ -1,6 +1,7 @@
-!> Records of the motion of disks in one domain in the present time window: the cells that they were in and a digest of their
-!> collisions. They are used to test afterwards whether copies moved like the disks that they represent in other domains. Also
-!> decides which collisions a domain counts.
+!> Records the motion of disks in one domain during the present time window, in a parallel run. The record of a disk, called its
+!> history, consists of the range of cells in which the disk was and a digest (hash) of its collisions. After the window, the
+!> histories show whether each copy of a disk has moved as the disk itself in the domain that owns it. The module also determines
+!> which collisions a domain counts.
 module histories
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int16, int32, int64, real64
@@ -11,25 +12,28 @@ module histories
   private
   public :: history_t, histories_t
 
-  !> The motion of a disk in the present window. An own disk of which no other domain can have a copy has no history.
+  !> The history of a disk in the present window. A disk has no history if it is owned by the domain and no other domain can have a
+  !> copy of it.
   type :: history_t
-    integer(int64) :: digest = 0                   !! digest of the times of its collisions with disks
+    integer(int64) :: digest = 0                   !! digest of the times of the collisions of this disk with other disks
     integer(int32) :: slot = 0
-    logical :: own = .false.                       !! owned by this domain; otherwise a copy
-    integer(int16) :: low(2) = 0_int16             !! lowest column and row that it was in
-    integer(int16) :: high(2) = 0_int16            !! highest column and row
+    logical :: own = .false.                       !! .true.: the disk is owned by this domain; .false.: it is a copy
+    integer(int16) :: low(2) = 0_int16             !! lowest column and lowest row in which the disk was
+    integer(int16) :: high(2) = 0_int16            !! highest column and highest row in which the disk was
   end type history_t
 
   type :: histories_t
     type(patch_t) :: patch                         !! cells of the domain and its halo
     integer(int32) :: n_histories = 0
     type(history_t), allocatable :: history(:)     !! (at least n_histories) the histories
-    integer(int32), allocatable :: history_of(:)   !! (slots) index of the history; 0: none
-    integer(int32) :: own_low(2) = 0, own_high(2) = 0      !! columns and rows of the domain
-    integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! columns and rows that are in no patch of another domain
-    integer(int32) :: safe_low(2) = 0, safe_high(2) = 0    !! beyond these the patch ends and has no copies
-    integer(int8), allocatable :: reached(:, :)    !! (0:,0:) 1: an own disk that has left the domain came near this cell
-    logical :: left_patch = .false.                !! an own disk reached the edge of the patch
+    integer(int32), allocatable :: history_of(:)   !! (slots) index of the history of each disk; 0 if it has no history
+    integer(int32) :: own_low(2) = 0, own_high(2) = 0      !! first and last column and row of the domain
+    integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! range of columns and rows that are not in the patch of another domain
+    integer(int32) :: safe_low(2) = 0, safe_high(2) = 0    !! range of columns and rows in which all neighbouring cells are in the
+                                                           !! patch
+    integer(int8), allocatable :: reached(:, :)    !! (0:,0:) 1 if an own disk that has left the domain was in this cell or in one
+                                                   !! of the eight cells around it
+    logical :: left_patch = .false.                !! a disk that the domain owns has reached the edge of the patch
   contains
     procedure :: record_collision
     procedure :: record_cell
@@ -47,7 +51,7 @@ module histories
 
 contains
 
-  !> Begins a new window, in which no own disk has left the domain yet.
+  !> Starts a new window, in which no disk that the domain owns has left the domain yet.
   subroutine begin_window(self)
     class(histories_t), intent(inout) :: self
 
@@ -55,7 +59,8 @@ contains
     self%left_patch = .false.
   end subroutine begin_window
 
-  !> Begins a new history of disk i at its present cell, if it needs one there. The cell also determines whether the domain owns it.
+  !> Starts a new history of disk i, if a disk in its present cell needs a history. The cell also determines whether the domain owns
+  !> the disk.
   subroutine begin_history(self, cell, i)
     class(histories_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -69,7 +74,7 @@ contains
     end if
   end subroutine begin_history
 
-  !> Assigns a history to disk i, which has yet to be begun.
+  !> Assigns a history to disk i. The caller sets the content of the history.
   subroutine add_history(self, i)
     class(histories_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -79,7 +84,7 @@ contains
     self%history_of(i) = self%n_histories
   end subroutine add_history
 
-  !> Deletes the history of disk i, if it has one; the last history takes its index.
+  !> Deletes the history of disk i, if it exists. The last history is moved to the free index.
   subroutine drop_history(self, i)
     class(histories_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -95,7 +100,8 @@ contains
     self%n_histories = self%n_histories - 1
   end subroutine drop_history
 
-  !> Whether this domain counts a collision of disk i: the domain that owns the disk, or the disk with the lower id of a pair.
+  !> Whether this domain counts a collision of disk i. A collision of two disks is counted by the domain that owns the disk with the
+  !> lower id; any other collision is counted by the domain that owns disk i.
   pure function counts(self, tag, i, code) result(yes)
     class(histories_t), intent(in) :: self
     type(tag_t), intent(in) :: tag(:)
@@ -152,7 +158,7 @@ contains
 
     if (self%history_of(i) == 0) then
       if (within(cell, self%deep_low, self%deep_high)) return
-      call self%add_history(i)                     ! from here on it can be in other domains' patches
+      call self%add_history(i)                     ! from this cell on the disk can be in the patches of other domains
       self%history(self%history_of(i)) = history_t(0_int64, i, .true., cell, cell)
     end if
     associate (history => self%history(self%history_of(i)))
@@ -162,7 +168,7 @@ contains
     end associate
   end subroutine record_cell
 
-  !> Records that an own disk has left the domain: it may touch any disk in the nine cells around.
+  !> Records that an own disk in this cell has left the domain: the disk may touch any disk in the nine cells around its position.
   subroutine reach(self, cell)
     class(histories_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -209,7 +215,7 @@ contains
     if (.not. yes) yes = self%history(self%history_of(i))%own
   end function is_own
 
-  !> Number of copies.
+  !> Number of histories of copies.
   pure function n_copies(self) result(n)
     class(histories_t), intent(in) :: self
     integer(int32) :: n
@@ -217,7 +223,7 @@ contains
     n = count(.not. self%history(:self%n_histories)%own, kind=int32)
   end function n_copies
 
-  !> Whether a disk that was in these columns and rows during the window could have met an own disk.
+  !> Whether a disk that was in these columns and rows during the window could have touched a disk that the domain owns.
   pure function could_have_met(self, low, high) result(yes)
     class(histories_t), intent(in) :: self
     integer(int32), intent(in) :: low(2), high(2)

@@ -18,7 +18,7 @@ contains
   subroutine kick(sim, kicked)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable, intent(out) :: kicked(:)
-    real(real64), allocatable :: draws(:, :)     ! (2,n) random numbers of the affected disks, kept where they are needed again
+    real(real64), allocatable :: draws(:, :)     ! (2,n) random numbers of the affected disks, stored if they are needed again
     real(real64) :: z(2)
     integer(int32) :: i, n
     logical :: is_hit
@@ -62,12 +62,12 @@ contains
     end subroutine restore_momentum
   end subroutine kick
 
-  !> Sets a new velocity of disk i, in a sheared box relative to the profile. Erases its last partner, with which it may now
-  !> collide again at once. A kick is not a contact.
+  !> Sets a new velocity of disk i; in a sheared box the velocity is relative to the velocity profile. Erases the last partner of
+  !> the disk, because the two disks may now collide again immediately. A kick does not count as a collision.
   subroutine kick_disk(sim, i, is_hit, z)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    logical, intent(out) :: is_hit               !! .false. if 'andersen' does not select the disk
+    logical, intent(out) :: is_hit               !! .false. if the driving is 'andersen' and the disk is not selected
     real(real64), intent(out) :: z(2)            !! Gaussian random numbers of variance 1 drawn for the velocity
     type(random_stream_t) :: stream
     real(real64) :: u, spin(2), v(2)

@@ -12,9 +12,9 @@ module renumbering
 
 contains
 
-  !> Sorts the disks by the cells of a grid with about one disk per cell, and the cells by square tiles, so that
-  !> a neighbourhood extends over few memory pages. Disks of one cell keep their order. The order depends on the state alone, not on
-  !> the search or the queue; `tag%id` keeps the order of the input.
+  !> Sorts the disks by the cells of a grid with about one disk per cell, and the cells by square tiles, so that the disks of a
+  !> region of space occupy few memory pages. Disks of one cell keep their order. The order depends on the state alone, and not on
+  !> the search or the queue. `tag%id` is the position of a disk in the input.
   subroutine renumber(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable :: first(:), place(:), cell(:), order(:)
@@ -37,7 +37,8 @@ contains
   !> Permutes the disks in place, without a second copy of them. Most of them are already near their new position.
   subroutine move_in_order(sim, order)
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(inout) :: order(:)     !! in: disk for each position; out: the identity permutation
+    integer(int32), intent(inout) :: order(:)     !! in: index of the disk that belongs at each position; out: the identity
+                                                  !! permutation
     type(whole_disk_t) :: held
     integer(int32) :: start, to, from
 

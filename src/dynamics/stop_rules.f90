@@ -1,9 +1,8 @@
-!> Decides when a run ends: when the first rule in the input is met, or when rounding errors dominate.
-!>
-!> In a periodic box inelastic disks cool until they all move with the common velocity that rounding has left. The temperature loses
-!> its precision long before that; the run then ends. This is tested when the epoch has moved, so that the end depends on the
-!> trajectory alone. The energy is compared with that of the velocities that were set last, because precision is lost only from then
-!> on.
+!> Determines when a run ends: when one of the stop rules in the input is met, or when rounding errors dominate.
+!>  In a periodic box inelastic disks cool until all of them move with the common velocity that results from rounding errors. The
+!> temperature loses its precision long before this state, and the run ends when it does. The test is made at the start of each
+!> epoch, so that the end of the run depends on the trajectory alone. The energy is compared with the energy at the time when
+!> velocities were last set, because this sets the scale of the rounding errors.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use epochs, only: is_at_rest, stands_still
@@ -15,7 +14,7 @@ module stop_rules
   private
   public :: coldness, stop_rule_t, stop_settings_t, whole_collisions
 
-  real(real64), parameter :: coldest = 1.0e-25_real64        !! smallest temperature relative to the first one
+  real(real64), parameter :: coldest = 1.0e-25_real64        !! smallest temperature, relative to the initial temperature
   character(len=*), parameter :: coldness = "cooled to 1e-25 of the initial temperature"
 
   !> Stop rules. The default values are never reached.
@@ -32,7 +31,7 @@ module stop_rules
   type :: stop_rule_t
     type(limits_t) :: limits
     real(real64) :: wall_clock = never       !! [s]
-    logical :: cools = .false.               !! inelastic disks in a periodic box, which cool for ever
+    logical :: cools = .false.               !! the disks are inelastic and the box is periodic, so that they cool without end
   contains
     procedure :: is_met
     procedure :: rests
@@ -47,7 +46,7 @@ module stop_rules
 
 contains
 
-  !> The stop rules of the input, converted to the quantities with which they are compared.
+  !> The stop rules of the input, converted to limits on quantities of the simulation.
   pure function new_stop_rule(settings, sim) result(rule)
     type(stop_settings_t), intent(in) :: settings
     type(simulation_t), intent(in) :: sim
@@ -73,7 +72,7 @@ contains
     if (number < 9.0e18_real64) n = ceiling(number - 4*spacing(number), int64)
   end function whole_collisions
 
-  !> Whether a rule other than that of wall-clock time is met.
+  !> Whether a stop rule other than the limit of wall-clock time is met.
   pure function is_met(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -83,8 +82,8 @@ contains
     if (.not. yes .and. self%limits%at_rest) yes = stands_still(sim) .and. is_at_rest(sim)
   end function is_met
 
-  !> Whether all disks are at rest and the run is to end then. This applies where no force causes bounces, so that no events occur
-  !> and the test at the end of an epoch is never made.
+  !> Whether all disks are at rest and the input contains the rule that ends the run in this case. This test is for simulations
+  !> without gravity: disks at rest then have no events, and the test at the end of an epoch is never made.
   pure function rests(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -105,8 +104,8 @@ contains
       yes = relative_energy(sim) < coldest*sim%reference_energy
   end function too_cold
 
-  !> Whether a run is finished: a rule is met, rounding errors dominate, or no event will occur any more and no time is given
-  !> to wait for. Failures are errors of `timeline` or of the evolution.
+  !> Whether a run is finished: a rule is met, rounding errors dominate, or no event will occur any more and the run has no time
+  !> limit. Failures are errors of `timeline` or of the evolution.
   pure function is_over(self, sim, evolution) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -118,7 +117,7 @@ contains
       yes = self%rests(sim) .or. .not. min(self%limits%time, next_kick(evolution, sim)) < never
   end function is_over
 
-  !> Kinetic energy relative to the mean velocity. Computed in two passes, because a difference of two large sums would lose
+  !> Kinetic energy relative to the mean velocity. The computation has two passes, because a difference of two large sums would lose
   !> precision.
   pure function relative_energy(sim) result(energy)
     type(simulation_t), intent(in) :: sim
@@ -138,7 +137,7 @@ contains
     end do
   end function relative_energy
 
-  !> Completed fraction of the run, from 0 to 1, by the rule that is closest to being met.
+  !> Completed fraction of the run, from 0 to 1. It is the largest of the fractions that the stop rules define.
   pure function share(self, sim, elapsed) result(done)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

@@ -1,8 +1,8 @@
-!> Time-stepped dynamics: exact free flight over a fixed step; then each disk beyond a wall is reflected, and each pair that
-!> overlaps and approaches collides once. A contact is detected up to one step late, and a short one not at all. The method serves
-!> for comparisons with event-driven dynamics.
-!>
-!> As in event-driven dynamics the state of a disk changes only in its own collisions, so that errors of steps do not accumulate.
+!> Time-stepped dynamics: exact free flight over a fixed step; then each disk beyond a wall is reflected, and each pair of disks
+!> that overlap and approach each other collides once. A contact is detected up to one step late, and a contact that begins and ends
+!> within a step is not detected. The method serves for comparisons with event-driven dynamics.
+!>  As in event-driven dynamics, the stored state of a disk changes only when this disk collides, so that rounding errors do not
+!> accumulate from step to step.
 module time_stepped
   use images, only: images_t
   use kinds, only: int32, int64, largest_exact, never, real64
@@ -24,16 +24,17 @@ module time_stepped
 
   !> Largest recommended displacement in a step, relative to the smallest radius.
   real(real64), parameter :: longest_way = 0.5_real64
-  integer(int64), parameter :: steps_per_look = 1024  !! number of steps between two tests whether anything moves
+  integer(int64), parameter :: steps_per_look = 1024  !! number of steps between two tests whether any disk moves
 
   type, extends(evolution_t) :: time_stepped_t
     real(real64) :: dt = 0.0_real64                 !! [time]
-    logical :: every_pair = .false.                 !! test all pairs in every step, instead of near ones
+    logical :: every_pair = .false.                 !! all pairs are tested in every step, and not only the pairs in the Verlet
+                                                    !! lists
     type(verlet_list_t), private :: near
-    ! Coordinates are stored separately, for vectorisation.
+    ! The coordinates are stored separately from the disks, so that loops can be vectorised.
     real(real64), allocatable, private :: x(:, :)    !! (disks,2) positions in this step [length]
     real(real64), allocatable, private :: radius(:)  !! (disks) [length]
-    integer(int32), allocatable, private :: outside(:)   !! (disks) 1: beyond a side
+    integer(int32), allocatable, private :: outside(:)   !! (disks) 1 if the disk is beyond a side
   contains
     procedure :: warning
     procedure :: pause_at
@@ -58,7 +59,7 @@ contains
     self%idle = .false.
   end subroutine start
 
-  !> The end of the step that contains a time.
+  !> The time at which the step that contains a given time ends.
   pure function pause_at(self, time) result(t)
     class(time_stepped_t), intent(in) :: self
     real(real64), intent(in) :: time               !! since the start of the run
@@ -70,7 +71,7 @@ contains
     if (t < time) t = (steps_taken(time, self%dt) + 1)*self%dt
   end function pause_at
 
-  !> Continues after disks were changed. Verlet lists remain valid for any velocities; only the test for rest is reset.
+  !> Continues after disks have been changed. Only the test for rest is reset, because Verlet lists do not depend on velocities.
   subroutine renew(self, sim, changed)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -79,7 +80,7 @@ contains
     self%idle = .false.
   end subroutine renew
 
-  !> Executes steps. The k-th step ends at the time k*dt, wherever earlier calls stopped.
+  !> Executes steps. The k-th step ends at the time k*dt. This does not depend on the times at which earlier calls returned.
   subroutine advance(self, sim, limits, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -88,7 +89,7 @@ contains
     type(event_log_t), intent(inout), optional :: log
     integer(int64) :: k
 
-    self%arrived = .not. sim%now < limits%time      ! the end of a step is a single moment, at which all limits are tested
+    self%arrived = .not. sim%now < limits%time      ! all limits are tested at the end of a step
     self%iterations_left = limits%iterations
     k = steps_taken(sim%now, self%dt)
     do while (self%iterations_left > 0)
@@ -107,7 +108,7 @@ contains
     end do
   end subroutine advance
 
-  !> The largest k with k*dt <= now. It depends on the state alone.
+  !> The largest integer k with k*dt <= now. This number depends on the state alone.
   pure function steps_taken(now, dt) result(k)
     real(real64), intent(in) :: now, dt             !! [time]
     integer(int64) :: k
@@ -214,7 +215,7 @@ contains
         call collide(sim, i, code, sim%now, .true., log)
     end subroutine meet_wall
 
-    !> Executes the collision of disks i < j, which overlap, if they approach.
+    !> Executes the collision of disks i < j, which overlap, if they approach each other.
     subroutine meet_disk(i, j)
       integer(int32), intent(in) :: i, j
       type(images_t) :: images
@@ -227,7 +228,7 @@ contains
     end subroutine meet_disk
   end subroutine take_step
 
-  !> The next marked position; 0 if there is none.
+  !> The next position at which the array contains 1; 0 if there is none.
   pure function next_marked(mark, after) result(k)
     integer(int32), contiguous, intent(in) :: mark(:)
     integer(int32), intent(in) :: after
@@ -239,7 +240,7 @@ contains
     k = 0
   end function next_marked
 
-  !> Marks disks that are not between the sides, or whose position is NaN, with 1, the others with 0.
+  !> Sets `outside` to 1 for disks that are not between the sides or whose position is NaN, and to 0 for all other disks.
   pure subroutine mark_outside(self, sim)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -265,9 +266,9 @@ contains
     inside = iand(merge(1, 0, x >= low), merge(1, 0, x <= high))
   end function between
 
-  !> Reports problems of the step; empty if there are none. The fastest disk may fall through the whole box and then has the
-  !> speed v0 + sqrt(2 g L). A disk that dissipates energy in every step of a lasting contact sinks by up to g dt**2/2 per
-  !> step under gravity; the TC model prevents this.
+  !> Reports problems of the length of the step; the text is empty if there are none. The fastest disk may fall through the whole
+  !> box; its speed is then estimated as v0 + sqrt(2 g L). A disk that dissipates energy in every step of a lasting contact sinks by
+  !> up to g dt**2/2 per step under gravity; the TC model prevents this.
   pure function warning(self, sim) result(text)
     class(time_stepped_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

@@ -1,5 +1,5 @@
-!> Executes everything that affects all disks at once, in its order. At each moment collisions come first, then kicks, then the
-!> actions of the caller (samples, end of the run). The origin of time moves in between.
+!> Executes the actions that affect all disks at once, in a fixed order. At equal times collisions are executed first, then kicks,
+!> then the actions of the caller (samples, end of the run). The origin of time is moved between these actions.
 module timeline
   use encounters, only: encounter_text
   use box_geometry, only: wall_normal
@@ -18,7 +18,7 @@ module timeline
   private
   public :: adapted_iterations, advance, advance_once, next_kick, collapse_note
 
-  real(real64), parameter :: pause_interval = 0.05_real64  !! time between two checks of signals and clocks [s]
+  real(real64), parameter :: pause_interval = 0.05_real64  !! intended time between two checks of signals and of the wall clock [s]
 
 contains
 
@@ -38,7 +38,7 @@ contains
   end subroutine advance
 
   !> Advances until a limit is reached, a kick is due, or the epoch ends, and executes the kick or the change of epoch. The
-  !> trajectory does not depend on where this stops.
+  !> trajectory does not depend on the times at which the procedure returns.
   subroutine advance_once(evolution, sim, limits, error, log)
     class(evolution_t), intent(inout) :: evolution
     type(simulation_t), intent(inout) :: sim
@@ -69,7 +69,7 @@ contains
         call wait()
       else if (arrived .and. due - sim%box%epoch > sim%epoch_end) then
         epoch_is_over = .true.
-        arrived = .false.                          ! stopped at the end of the epoch, before the intended time
+        arrived = .false.                          ! the evolution stopped at the end of the epoch, before the intended time
       end if
       if (epoch_is_over) call end_epoch()
     end if
@@ -80,16 +80,17 @@ contains
     sim%events_done = arrived .or. (sim%events_done .and. sim%tally%events == events .and. .not. sim%time() > before)
   contains
 
-    !> Advances the time to what is due next, if no event occurs any more. Without an end the time is that of the last collision.
+    !> Advances the time to the next action that is due, if no event occurs any more. If no action is due, the time becomes the time
+    !> of the last collision.
     subroutine wait()
       if (due < last_time) then
         sim%now = max(sim%now, due - sim%box%epoch)
-      else                                           ! a stale event, or the end of the epoch, may have advanced it
+      else                                           ! a stale event, or the end of the epoch, may have advanced the time
         sim%now = max(maxval(sim%disk%clock), limits%sampled - sim%box%epoch)
       end if
     end subroutine wait
 
-    !> Begins the next epoch, or reports that the disks are crushed or that time stands still.
+    !> Starts the next epoch, or reports that the disks are crushed or that events no longer advance the time.
     subroutine end_epoch()
       if (are_crushed(sim)) then
         call fail(error, exit_broken, "side.end_time: the side crushes the disks, whose energy has grown a million times; " &
@@ -106,11 +107,11 @@ contains
     end subroutine end_epoch
   end subroutine advance_once
 
-  !> Number of iterations that take about `pause_interval`. It grows only if all iterations were used. Otherwise it would grow
-  !> without limit in a run with many samples, and after the last sample signals would not be checked for hours.
+  !> Number of iterations that take about `pause_interval`. The number grows only if all iterations were used. Otherwise it would
+  !> grow without limit in a run with many samples, and signals would not be checked for hours after the last sample.
   pure function adapted_iterations(iterations, elapsed, cut_short) result(n)
     integer(int64), intent(in) :: iterations
-    real(real64), intent(in) :: elapsed               !! time for these iterations, or for some of them [s]
+    real(real64), intent(in) :: elapsed               !! wall-clock time of the iterations that were used [s]
     logical, intent(in) :: cut_short                  !! a limit was reached before all iterations were used
     integer(int64) :: n
 
@@ -119,7 +120,7 @@ contains
     if (elapsed > 2*pause_interval) n = max(iterations/2, 1_int64)
   end function adapted_iterations
 
-  !> Time of the next kick, which follows all collisions at that time and precedes everything else.
+  !> Time of the next kick. A kick is executed after all collisions and before all other actions at the same time.
   pure function next_kick(evolution, sim) result(t)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
@@ -154,7 +155,7 @@ contains
     if (is_at_rest(sim)) text = text//"; stop.at_rest = .true. ends a run where all disks have come to rest"
   end function standstill
 
-  !> Whether an event of disk i with this partner can dissipate energy.
+  !> Whether an event of disk i with the given partner can dissipate energy.
   pure function may_lose(sim, i, code) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code
@@ -184,7 +185,7 @@ contains
       .and. dot_product(sim%box%obstacle(obstacle_number(code))%shape%middle - x, normal) > 0
   end function slides
 
-  !> The report of collapses that occurred in a run; empty if there were none.
+  !> The report of the collapses in a run; empty if no collapse occurred.
   pure function collapse_note(sim) result(text)
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text
@@ -195,8 +196,8 @@ contains
       //"; the motion after it depends on rounding errors; "//longer_contacts(sim)
   end function collapse_note
 
-  !> The advice to set a contact duration: much longer than a collapse, and much shorter than the mean time between collisions, as
-  !> far as it is known.
+  !> Advice to set a contact duration that is much longer than the times in a collapse and much shorter than the mean time between
+  !> collisions. The advice contains numbers if these times are known.
   pure function longer_contacts(sim) result(text)
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text

@@ -1,6 +1,7 @@
-!> Lists of pairs that are close to each other at the positions of a time step: two disks, or a disk and an obstacle. Other pairs
-!> cannot touch before a disk has moved by half the `skin`, so that a list is valid for many steps (Verlet, Phys. Rev. 159, 98
-!> (1967)). Loops that run in every step have no branches and are vectorised, as requested by directives.
+!> Lists of pairs that are close to each other at the positions of a time step. A pair consists of two disks, or of a disk and an
+!> obstacle. The members of other pairs cannot touch before a disk has moved by half the `skin`, so that a list is valid for many
+!> steps (Verlet, Phys. Rev. 159, 98 (1967)). Loops that run in every step have no branches and are vectorised, as requested by
+!> directives.
 module verlet_list
   use kinds, only: int32, pi, real64
   use box_geometry, only: box_t, obstacle_gap
@@ -13,8 +14,9 @@ module verlet_list
   private
   public :: verlet_list_t
 
-  integer, parameter :: steps_per_list = 16                !! number of steps for which a list should be valid
-  real(real64), parameter :: pairs_per_disk = 4.0_real64   !! largest number of pairs per disk in a list, at the mean density
+  integer, parameter :: steps_per_list = 16                !! intended number of steps for which a list is valid
+  real(real64), parameter :: pairs_per_disk = 4.0_real64   !! intended largest number of pairs per disk in a list, at the mean
+                                                           !! density
   real(real64), parameter :: least_skin = 0.2_real64       !! smallest skin [mean diameter]
   real(real64), parameter :: cells_per_disk = 4.0_real64   !! largest number of bins per disk
 
@@ -22,9 +24,9 @@ module verlet_list
   !> order of i and then of the partner.
   type :: verlet_list_t
     integer(int32) :: n = 0
-    integer(int32), allocatable :: i(:)        !! (at least n) a disk
-    integer(int32), allocatable :: partner(:)  !! (at least n) a disk > i, or the code of an obstacle
-    integer(int32), allocatable :: hit(:)      !! (at least n) 1: the pair overlaps
+    integer(int32), allocatable :: i(:)        !! (at least n) index of the first disk of the pair
+    integer(int32), allocatable :: partner(:)  !! (at least n) index of the second disk, larger than i, or code of an obstacle
+    integer(int32), allocatable :: hit(:)      !! (at least n) 1 if the members of the pair overlap
     integer(int32), private :: n_obstacles = 0 !! number of pairs with obstacles
     logical, private :: known = .false.
     real(real64), private :: skin = 0.0_real64 !! largest gap between the members of a pair [length]
@@ -37,7 +39,7 @@ module verlet_list
 
 contains
 
-  !> Registers that disk i has been moved by a period.
+  !> Updates the reference position of disk i after the disk has been moved by a period.
   subroutine shift(self, i, dx)
     class(verlet_list_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -46,8 +48,8 @@ contains
     if (self%known) self%from(i, :) = self%from(i, :) + dx
   end subroutine shift
 
-  !> Makes a new list, unless all disks have moved by less than half the skin since the last one. With `all_pairs` a list is made
-  !> every time and without bins; a stop request ends this early, and the list is then incomplete.
+  !> Makes a new list, unless all disks have moved by less than half the skin since the last one. With `all_pairs` a list is made in
+  !> every step and without bins. A stop request ends this procedure early, and the list is then incomplete.
   subroutine update(self, sim, x, step, all_pairs)
     class(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -55,7 +57,7 @@ contains
     real(real64), intent(in) :: step           !! [time]
     logical, intent(in) :: all_pairs
     real(real64) :: width                      ! width of a bin: a mean diameter and the skin, or more in a very large box [length]
-    integer(int32) :: bins(2), i, k, still     ! number of disks that have moved less
+    integer(int32) :: bins(2), i, k, still     ! number of disks that have moved by less than half the skin
 
     if (self%known) then
       still = 0
@@ -88,7 +90,8 @@ contains
     call list_disks(self, sim, x, bins)
   contains
 
-    !> Skin that is wide enough for many steps but does not include too many distant pairs. It affects only the speed.
+    !> A skin that is wide enough for many steps but does not include too many distant pairs. The choice affects only the speed of
+    !> the program.
     pure function wanted_skin() result(skin)
       real(real64) :: skin, diameter, reach, fastest
       integer(int32) :: i
@@ -103,7 +106,7 @@ contains
     end function wanted_skin
   end subroutine update
 
-  !> Marks pairs that overlap with 1, the others with 0.
+  !> Sets `hit` to 1 for pairs that overlap, and to 0 for all other pairs.
   pure subroutine mark_overlaps(self, box, x, radius)
     class(verlet_list_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -124,8 +127,9 @@ contains
     end associate
   end subroutine mark_overlaps
 
-  !> Adds pairs of disks. Each disk searches for smaller disks, or equal ones with higher indices. A small disk therefore searches
-  !> only few bins, however large the largest disk is. Bins are treated as periodic, which has no effect at walls.
+  !> Adds pairs of disks. The search for each disk finds smaller disks, and disks of equal size with higher indices. The search for
+  !> a small disk therefore covers only few bins, however large the largest disk is. All axes of the grid of bins are treated as
+  !> periodic. At walls this has no effect, because disks near opposite walls are too far apart to form a pair.
   subroutine list_disks(self, sim, x, bins)
     type(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -147,20 +151,21 @@ contains
       centre = [x(i, 1), x(i, 2)]
       reach = (2*sim%disk(i)%radius + self%skin)*(1 + spare)
       low = bin_at(in_box(centre) - reach)
-      high = min(bin_at(in_box(centre) + reach), low + bins - 1)    ! each bin once
+      high = min(bin_at(in_box(centre) + reach), low + bins - 1)    ! no bin is searched twice
       from = 1 + modulo(low(1), bins(1))
       to = from + high(1) - low(1)
       do iy = low(2), high(2)
         row = bins(1)*modulo(iy, bins(2))
         call add_run(row + from, row + min(to, bins(1)))
-        call add_run(row + 1, row + to - bins(1))           ! part of the range beyond the last column
+        call add_run(row + 1, row + to - bins(1))           ! the part of the range that continues beyond the last column
       end do
     end do
     call sort_pairs(self%i(first_pair:self%n), self%partner(first_pair:self%n), size(x, 1, kind=int32))
 
   contains
 
-    !> The image of a point inside the box. A disk may have travelled more periods than an integer can hold.
+    !> The periodic image of a point that lies inside the box. It is computed with reals, because a disk may have moved by more
+    !> periods than an integer can represent.
     pure function in_box(point) result(image)
       real(real64), intent(in) :: point(2)
       real(real64) :: image(2)
