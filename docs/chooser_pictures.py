@@ -22,7 +22,7 @@ from PIL import Image, PngImagePlugin
 INPUTS = Path(__file__).resolve().parents[1] / "input"
 PIXELS, FEW = 144, 20
 SPECIES = ("#0072b2", "#d55e00", "#009e73")
-# : The palette of a picture: greys, and mixtures of the colours of disks with white.
+#: The palette of a picture: greys, and mixtures of the colours of disks with white.
 PALETTE = [g for grey in (77, 130, 204, 255) for g in (grey,) * 3] + [
     round(255 + share * (int(colour[k : k + 2], 16) - 255))
     for colour in SPECIES

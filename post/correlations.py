@@ -72,7 +72,7 @@ from ricochet.script import by_packing, command_line, launch, measured, over_run
 import numpy as np
 
 PLAIN = {"walls"}  # the only special property allowed for Enskog's D
-# : Properties of runs that have no equilibrium but whose structure can be computed.
+#: Properties of runs that have no equilibrium but whose structure can be computed.
 RESTLESS = (
     "inelastic",
     "soft_contacts",

@@ -42,7 +42,7 @@ from ricochet.script import command_line, grouped, launch, measured, report
 
 import numpy as np
 
-# : Text and dimension of the label of each parameter.
+#: Text and dimension of the label of each parameter.
 AXES = {
     "mass": ("mass of the projectile / mass of a bed disk, $M$", "number"),
     "speed": ("speed of the projectile $v$", "speed"),

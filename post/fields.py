@@ -48,7 +48,7 @@ from matplotlib.patches import Circle
 MOST_CELLS = 100_000
 LEAST_FLOW = 0.2  # smallest range of the axis of a flow velocity [thermal speeds]
 SIGNIFICANT = 5.99  # 95 % quantile of chi^2 with two degrees of freedom
-# : Text and dimension of the label of each field.
+#: Text and dimension of the label of each field.
 LABELS = {
     "density": ("number density n", "number density"),
     "flow_x": ("flow $u_x$", "speed"),

@@ -24,7 +24,7 @@ from ricochet.script import Parser, launch
 
 from aiohttp import web
 
-# : Program of a worker process; the module `player` is in the folder of this file.
+#: Program of a worker process; the module `player` is in the folder of this file.
 WORKER = """import sys; sys.path[:0] = [{!r}]
 from player import scene
 from ricochet.pages.worker import work

@@ -36,7 +36,7 @@ import numpy as np
 
 BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
 BLOCKS = 8  # number of blocks of frames of a single run
-# : Properties that leave free flights straight, of constant speed, and equal everywhere in the box.
+#: Properties that leave free flights straight, of constant speed, and equal everywhere in the box.
 STRAIGHT = {
     "walls",
     "mixture",

@@ -53,7 +53,7 @@ from ricochet.script import command_line, grouped, late_frames, launch, measured
 import numpy as np
 
 BINS = np.linspace(0, 3, 51)  # u = 1 is the centre of a bin
-# : Titles for the possible states of the late frames of all runs; the first two have one kT.
+#: Titles for the possible states of the late frames of all runs; the first two have one kT.
 EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
 COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each frame at its own kT"
 UNSTEADY = "No steady kT yet: each frame at its own"

@@ -5,17 +5,17 @@
     run = ricochet.read_run("runs/gas.h5")
     curve = ricochet.structure.pair_correlation(run)
 
-The modules are sorted into sub-packages; `README.md` beside this file has the picture.  A module is
-an attribute of the package, whatever its sub-package is: `from ricochet import structure` imports
-`ricochet.analysis.structure`.  It is loaded when it is first used, because `import ricochet` should
-load neither Matplotlib nor a web server.
+The modules are sorted into sub-packages, which `README.md` in this folder describes.  Every module
+is also an attribute of the package: `from ricochet import structure` imports
+`ricochet.analysis.structure`.  Modules are loaded at their first use, so that `import ricochet`
+loads neither Matplotlib nor a web server.
 """
 
 import sys
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from . import packages as packages  # first: it reports packages that are missing
+from . import packages as packages  # the first import, because it reports missing packages
 from .aliases import Aliases
 from .reading.bridges import mdanalysis_universe
 from .reading.files import RunError
@@ -48,7 +48,7 @@ __all__ = [
     "write_start",
 ]
 
-if TYPE_CHECKING:  # the modules that `__getattr__` loads, for type checkers
+if TYPE_CHECKING:  # imports for type checkers of the modules that `__getattr__` loads
     from .analysis import cooling as cooling
     from .analysis import correlations as correlations
     from .analysis import crater as crater
@@ -86,7 +86,7 @@ else:
     sys.meta_path.append(ALIASES)
 
     def __getattr__(name: str) -> object:
-        """The module of this short name."""
+        """Return the module with this short name."""
         if name in ALIASES.modules:
             return import_module(f"{__name__}.{name}")
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""The commands ricochet-player, ricochet-lab, ...: one for each script of post/.
+"""The commands ricochet-player, ricochet-lab, ..., one for each script of post/.
 
-`make install` gives this file their names, pip makes them of `main`.  A script runs the program
-beside its command, if there is one and RICOCHET names no other.
+`make install` installs this file under the names of the commands; pip generates commands that call
+`main`.  A script uses the simulation program in the folder of the command, if that folder contains
+one and RICOCHET names no other program.
 """
 
 import os
@@ -11,12 +12,12 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-#: pip puts the scripts into the package; elsewhere it is beside them.
+#: pip installs the scripts inside the package; in a source tree they are in the folder above.
 SCRIPTS = HERE / "post" if (HERE / "post").is_dir() else HERE.parent
 
 
 def main() -> None:
-    """Run the script that the command is called after."""
+    """Run the script that has the name of the command."""
     command = Path(sys.argv[0]).absolute()
     if command.stem == "ricochet":  # of pip
         os.execv(HERE / "bin/ricochet", [sys.argv[0], *sys.argv[1:]])
@@ -24,7 +25,7 @@ def main() -> None:
     if program.is_file() and not (HERE / "bin").is_dir():
         os.environ.setdefault("RICOCHET", str(program))
     name = command.name.removeprefix("ricochet-").replace("-", "_")
-    sys.path[0] = str(SCRIPTS)  # as python post/NAME.py has it
+    sys.path[0] = str(SCRIPTS)  # as for python post/NAME.py
     runpy.run_path(str(SCRIPTS / f"{name}.py"), run_name="__main__")
 
 

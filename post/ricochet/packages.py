@@ -1,6 +1,6 @@
-"""Reports which required packages are missing, and how to install them.
+"""Report missing packages, and how to install them.
 
-The scripts import `ricochet` before other packages, so that no script has to check for itself.
+The scripts import `ricochet` before other packages, so that no script needs its own check.
 """
 
 import sys

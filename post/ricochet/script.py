@@ -1,6 +1,6 @@
-"""Options, report and exit codes that the scripts in post/ share.
+"""Command-line options, reports and exit codes that the scripts in post/ share.
 
-Figures are drawn without a display, in the style of `style.mplstyle`.
+Figures are drawn without a display and in the style of `style.mplstyle`.
 """
 
 import argparse
@@ -30,7 +30,7 @@ from .running.ensembles import in_order, read_manifest
 matplotlib.use("Agg")
 plt.style.use(STYLE)
 
-Table = dict[str, Iterable] | list[dict]  # columns by name, or rows
+Table = dict[str, Iterable] | list[dict]  # columns by name, or a list of rows
 
 
 # --- options ---
@@ -43,7 +43,7 @@ def frame_list(text: str) -> tuple[int | slice, ...]:
         if ":" not in part:
             return int(part)
         frames = slice(*(int(number) if number else None for number in part.split(":")))
-        frames.indices(1)  # refuses a step of 0
+        frames.indices(1)  # raises an error for a step of 0
         return frames
 
     try:
@@ -54,7 +54,7 @@ def frame_list(text: str) -> tuple[int | slice, ...]:
 
 
 def disk_list(text: str) -> list[int]:
-    """Parse ids of disks such as '1,5,9'."""
+    """Parse numbers of disks such as '1,5,9'."""
     try:
         return [int(part) for part in text.split(",")]
     except ValueError:
@@ -63,17 +63,17 @@ def disk_list(text: str) -> list[int]:
 
 
 def positive(text: str) -> int:
-    """Parse a whole number above 0."""
+    """Parse a positive integer."""
     if not text.isdecimal() or int(text) == 0:
         raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
     return int(text)
 
 
 def not_negative(text: str) -> float:
-    """Parse a number from 0 on."""
+    """Parse a number that is not negative."""
     value = float(text)
     if not 0 <= value < float("inf"):
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number from 0 on")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of at least 0")
     return value
 
 
@@ -85,30 +85,30 @@ def unit_names(text: str) -> Units:
         raise argparse.ArgumentTypeError(str(problem)) from None
 
 
-#: Options that several scripts have (type, value, meaning): a name means the same everywhere.
+#: Options that several scripts share: name, type, symbol of the value, help text.
 OPTIONS = {
-    "frames": (frame_list, "LIST", "which frames: numbers, ranges, as 0,10,-1 or 100:200 or ::5"),
-    "count": (positive, "N", "at most this many of the frames, evenly spread"),
+    "frames": (frame_list, "LIST", "frames to use, such as 0,10,-1 or 100:200 or ::5"),
+    "count": (positive, "N", "largest number of frames, which are evenly spread"),
     "equilibration": (
         not_negative,
         "X",
-        "leave out the first X collisions per disk [until nothing drifts]",
+        "equilibration: the first X collisions per disk are left out [until no observable drifts]",
     ),
-    "min_separation": (float, "X", "take frames at least X collisions per disk apart"),
-    "wavenumber": (not_negative, "K", "wave number of F_s(k, t), times the mean diameter"),
-    "disks": (disk_list, "IDS", "which disks: ids such as 1,5,9"),
+    "min_separation": (float, "X", "smallest distance of two frames, in collisions per disk"),
+    "wavenumber": (not_negative, "K", "wave number of F_s(k, t) times the mean diameter"),
+    "disks": (disk_list, "IDS", "disks to show: numbers such as 1,5,9"),
     "colour": (str, "WHAT", f"species, {', '.join(COLOURINGS)} [species; speed if there is one]"),
 }
 
 
-#: Options that have another name now.
+#: Former names of options, with their present names.
 RENAMED = {"--skip": "--equilibration", "--apart": "--min-separation", "--wave": "--wavenumber"}
-#: Other spellings of an option.
+#: Alternative spellings of options.
 SPELLINGS = {"colour": ["--color"]}
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that accepts no abbreviations and suggests the right word for a wrong one."""
+    """Parser that accepts no abbreviations and suggests similar options for unknown ones."""
 
     def parse_args(self, args: Sequence[str] | None = None, namespace=None) -> argparse.Namespace:
         words = joined(sys.argv[1:] if args is None else args)
@@ -130,9 +130,10 @@ class Parser(argparse.ArgumentParser):
 
 
 def finished(paths: list[Path]) -> list[Path]:
-    """Return the finished runs, if there are any, and warn of the others.
+    """Return the finished runs and warn about unfinished ones; without finished runs, return all.
 
-    Members of an ensemble without a file are counted too, if all its files are given.
+    Member runs of a sweep that have no file yet are counted, too, if all files of the sweep are
+    given.
     """
     whole = [path for path in paths if path.suffix != ".part"]
     if not whole:
@@ -150,7 +151,7 @@ def finished(paths: list[Path]) -> list[Path]:
 
 
 def distinct(runs: list[Run]) -> list[Run]:
-    """Return each run once: runs with identical last states carry the same information."""
+    """Return the runs without duplicates, which are runs with identical final states."""
     found: dict[bytes, list[Run]] = {}
     for run in runs:
         parts = run.time[-1:], run.position[-1], run.velocity[-1], run.mass, run.radius
@@ -162,7 +163,7 @@ def distinct(runs: list[Run]) -> list[Run]:
 
 
 def joined(words: Iterable[str]) -> list[str]:
-    """Join a list such as '-10:' to its option, because it looks like an option itself."""
+    """Join a list such as '-10:' to its option, because argparse would read it as an option."""
     result: list[str] = []
     for word in words:
         if re.fullmatch(r"-\d+[,:][-\d,:]*", word) and result and result[-1].startswith("--"):
@@ -175,12 +176,12 @@ def joined(words: Iterable[str]) -> list[str]:
 def command_line(
     doc: str, output: str, one: bool = False, csv: bool = True, repeated: bool = False, **defaults
 ) -> Parser:
-    """Return a parser whose help is the script's docstring, with this default output.
+    """Return a parser with this default output, whose help is the docstring of the script.
 
-    It opens `one` run or any number of them as `runs`.  Equal runs count once unless they may be
-    `repeated`, and unfinished ones are left out unless runs belong together (`paired`).  There is a
-    --csv if there are numbers to write, and those of the shared `OPTIONS` that are named, with
-    their defaults (None: no default).
+    The parser opens a single run (`one`) or any number of runs as `runs`.  Duplicates of a run are
+    left out unless they are allowed (`repeated`), and unfinished runs are left out unless the runs
+    form pairs (`paired`).  There is an option --csv if the script writes numbers.  The keyword
+    arguments name the shared `OPTIONS` of the script and their defaults (None: no default).
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
@@ -188,10 +189,11 @@ def command_line(
     some = {"nargs": 1 if one else "+", "help": f"file{'s' * (not one)} written by ricochet"}
     parser.add_argument("runs", type=Path, metavar="RUN.h5", **some)
     place = {"default": None if output.startswith("RUN") else Path(output), "metavar": "FILE"}
-    parser.add_argument("-o", "--output", type=Path, help=f"where to write [{output}]", **place)
+    parser.add_argument("-o", "--output", type=Path, help=f"output file [{output}]", **place)
     if csv:
-        parser.add_argument("--csv", type=Path, metavar="FILE", help="write the numbers to a table")
-    names = "names of units, such as length=cm,time=s,mass=g, for axes [reduced units]"
+        parser.add_argument("--csv", type=Path, metavar="FILE", help="file to which the numbers "
+            "are written as a table")
+    names = "names of units for the axes, such as length=cm,time=s,mass=g [reduced units]"
     parser.add_argument("--units", type=unit_names, default=UNNAMED, metavar="NAMES", help=names)
     for name, default in defaults.items():
         convert, value, meaning = OPTIONS[name]
@@ -216,10 +218,10 @@ def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | No
 
 
 def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
-    """Return frames of the steady state among --frames, --min-separation apart.
+    """Return the frames of --frames that are in the steady state and --min-separation apart.
 
-    If there is none, it is the last one.  The notes of `args` say if these are fewer than
-    requested, or too early.
+    Without such a frame, the last frame is returned.  A warning is added to the notes of `args` if
+    the frames are fewer than requested or too early.
     """
     frames, start = (
         chosen_frames(run, args.frames, None),
@@ -230,7 +232,7 @@ def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
     if not used:
         used = [max(frames)]
         args.notes.append(
-            f"{says}none of the frames is from t = {start:.4g} on; takes the last one"
+            f"{says}none of the frames is from t = {start:.4g} on; the last one is used"
         )
     elif args.frames is not None and len(used) < len(frames):
         some = f"takes {len(used)} of {len(frames)} frames, from t = {start:.4g} on and "
@@ -243,7 +245,7 @@ def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
 
 
 def chosen_disks(run: Run, ids: list[int]) -> list[int]:
-    """Return the indices of the disks of --disks, whose ids count from 1."""
+    """Return the indices (from 0) of the disks of --disks, which are numbered from 1."""
     for number in ids:
         if not 1 <= number <= run.n_disks:
             raise RunError(f"{run.path}: no disk {number}, there are {run.n_disks}")
@@ -251,27 +253,28 @@ def chosen_disks(run: Run, ids: list[int]) -> list[int]:
 
 
 def recorded(run: Run, name: str) -> float:
-    """Return a positive number that finished runs record in their provenance."""
+    """Return a positive number that finished runs store in their provenance."""
     value = float(run.provenance.get(name, 0))
     if value <= 0:
         what = name.replace("_", " ")
-        raise RunError(f"{run.path}: records no {what}: not finished, or had none")
+        raise RunError(f"{run.path}: contains no {what}: the run is not finished, or this number "
+            "was 0")
     return value
 
 
 def grouped(runs: Iterable[Run], key: Callable[[Run], float]) -> list[tuple[float, list[Run]]]:
-    """Group runs by the value of `key`, in ascending order."""
+    """Return the runs in groups of equal value of `key`, in ascending order."""
     ordered = sorted(runs, key=key)
     return [(value, list(group)) for value, group in groupby(ordered, key=key)]
 
 
 def by_restitution(runs: Iterable[Run]) -> list[tuple[Restitution, list[Run]]]:
-    """Group runs by restitution and its law."""
+    """Return the runs in groups of equal restitution and restitution law."""
     return grouped(runs, lambda run: run.contact_law)
 
 
 def by_packing(runs: Iterable[Run]) -> list[tuple[float, list[Run]]]:
-    """Group runs by packing fraction."""
+    """Return the runs in groups of equal packing fraction."""
     return grouped(runs, lambda run: round(packing(run), 6))
 
 
@@ -285,10 +288,10 @@ def report(
     data: Table | None = None,
     notes: Sequence[str] = (),
 ) -> None:
-    """Print the tables, save the figure, write `data` (else the first table) to --csv.
+    """Print the tables, save the figure, and write `data` (default: first table) to --csv.
 
-    `notes` are reasons to doubt the numbers.  They appear on stderr and on the figure,
-    together with those of runs that ended early.
+    `notes` are warnings about the numbers.  They are printed to stderr and on the figure, together
+    with warnings about runs that ended early.
     """
     if any(tables):
         print("\n\n".join(text_of(table) for table in tables if table), flush=True)
@@ -309,7 +312,10 @@ def report(
 
 
 def once(notes: Iterable[str], names: set[str]) -> list[str]:
-    """Merge notes about several runs that differ only in names and numbers; add their count."""
+    """Return the notes without repetitions.
+
+    Notes that differ only in names and numbers are merged into one note with their count.
+    """
     kinds: dict[str, list[str]] = {}
     for note in notes:
         name = re.match(r".*?\.h5(\.part)?(?=[: ])", note)
@@ -322,9 +328,9 @@ def once(notes: Iterable[str], names: set[str]) -> list[str]:
 def measured(
     name: str, estimate: Estimate | SeriesMean | None, at: int | tuple = ()
 ) -> dict[str, float | None]:
-    """Return two cells of a row: a mean and its error, of one point of a curve or of a number.
+    """Return two cells of a row: a mean and its error, from a point of a curve or a number.
 
-    They are None if there is no estimate.
+    Both are None without an estimate.
     """
     parts = (None, None) if estimate is None else (estimate.mean, estimate.error)
     values = [part if part is None else float(np.asarray(part)[at]) for part in parts]
@@ -334,13 +340,13 @@ def measured(
 def over_runs(
     name: str, members: Sequence[SeriesMean], notes: list[str], about: str
 ) -> dict[str, float | None]:
-    """Return the cells of a mean over runs; its diagnostics are added to the notes."""
+    """Return the cells of a mean over runs, and add its diagnostics to the notes."""
     notes += diagnostics(about, members)
     return measured(name, combine_runs(members))
 
 
 def spread(results: dict[str, dict]) -> dict[str, np.ndarray]:
-    """Return columns of arrays and of estimates with errors; names get the given endings."""
+    """Return the columns of arrays and estimates with errors, with the endings added to names."""
     columns = {}
     for end, found in results.items():
         for name, values in found.items():
@@ -352,7 +358,7 @@ def spread(results: dict[str, dict]) -> dict[str, np.ndarray]:
 
 
 def points(names: Sequence[str], curves: dict[tuple, Curve]) -> list[dict]:
-    """Return a row for each point of the curves: the key of the curve, x, y, error."""
+    """Return a row for each point of the curves: key of the curve, x, y and error."""
     return [
         dict(zip(names, (*key, *map(float, point)), strict=True))
         for key, curve in curves.items()
@@ -361,7 +367,7 @@ def points(names: Sequence[str], curves: dict[tuple, Curve]) -> list[dict]:
 
 
 def without_error(tables: Sequence[Table]) -> list[str]:
-    """Return why some numbers have no error, in at most one sentence."""
+    """Return the reason why numbers have no error, as a list of at most one sentence."""
     names = [
         name.removesuffix("_error")
         for table in map(columns, tables)
@@ -375,19 +381,19 @@ def without_error(tables: Sequence[Table]) -> list[str]:
 
 
 def is_nan(value: object) -> bool:
-    """Whether a value is the float NaN."""
+    """Return whether a value is the float NaN."""
     return isinstance(value, float) and bool(np.isnan(value))
 
 
 def columns(table: Table) -> dict[str, Iterable]:
-    """Return a table by columns; its rows must have the same keys."""
+    """Return a table as a dictionary of columns; its rows must have the same keys."""
     if isinstance(table, dict):
         return table
     return {name: [row[name] for row in table] for name in (table[0] if table else ())}
 
 
 def write_csv(path: Path, table: Table) -> None:
-    """Write a table with one header line; numbers keep all their digits."""
+    """Write a table with one header line and with all digits of the numbers."""
     table = columns(table)
     with destination(path).open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -414,7 +420,7 @@ def text_of(table: Table) -> str:
 
 
 def launch(main: Callable[[], None]) -> None:
-    """Run a script; a failure is one line on stderr and exit code 2, or 1 (`Refused`).
+    """Run a script and turn exceptions into a line on stderr and exit code 2, or 1 for `Refused`.
 
     Unexpected errors are reported in the same way; `python -X dev` shows their traceback.
     """
@@ -425,7 +431,7 @@ def launch(main: Callable[[], None]) -> None:
         main()
     except RunError as problem:
         give_up(name, str(problem), code=1 if isinstance(problem, Refused) else 2)
-    except OSError as problem:  # without a name: while writing, on a full disk
+    except OSError as problem:  # errors while writing, as on a full disk, have no file name
         give_up(name, f"{problem.filename or 'cannot write the output'}: {problem.strerror}")
     except Exception as problem:
         if sys.flags.dev_mode:
@@ -437,6 +443,6 @@ def launch(main: Callable[[], None]) -> None:
 
 
 def give_up(name: str, reason: str, code: int = 2) -> NoReturn:
-    """Print one line and exit: with 1 where a theory does not apply to a run, else with 2."""
+    """Print one line and exit with 1 if a theory does not apply to a run, otherwise with 2."""
     print(f"{name}: {' '.join(reason.split())}", file=sys.stderr)
     sys.exit(code)

@@ -472,7 +472,7 @@ def test_results_are_written_into_files_of_ones_own(
         ("trajectory run.h5 --disks 0", "no disk 0"),
         ("fields run.h5 --cells 1", "there are 2 to 100000 cells"),
         ("fields run.h5 --cells 4 --grid 3,3", "not allowed with"),
-        ("fields run.h5 --equilibration nan", "is not a number from 0 on"),
+        ("fields run.h5 --equilibration nan", "is not a number of at least 0"),
         ("export run.h5 --count 0.5", "'0.5' is not a whole number above 0"),
     ],
 )

@@ -288,7 +288,7 @@ def kept(system) -> Simulation:
 @pytest.mark.parametrize(
     ("act", "error", "words"),
     [
-        (lambda gas: gas.advance(time=-1), ValueError, "is past"),
+        (lambda gas: gas.advance(time=-1), ValueError, "has passed"),
         (lambda gas: gas.advance(time=np.nan), ValueError, "nan"),
         (lambda gas: gas.advance(time="soon"), ValueError, "soon"),
         (lambda gas: gas.advance(events=None, collisions=[1]), TypeError, "int"),
@@ -311,9 +311,9 @@ def kept(system) -> Simulation:
         (lambda _: Simulation(None), TypeError, "its text"),
         (lambda _: Simulation("&species count = -1 radius = 1 /"), ProgramError, "from 1 to"),
         (lambda gas: gas.save("/proc/none/x.h5"), ProgramError, "/proc/none"),
-        (lambda gas: gas.advance(events=9).advance(events=8), ValueError, "8 is past"),
-        (lambda gas: gas.advance(collisions=-1), ValueError, "-1 is past"),
-        (lambda gas: gas.advance_by(), ValueError, "how far?"),
+        (lambda gas: gas.advance(events=9).advance(events=8), ValueError, "8 has passed"),
+        (lambda gas: gas.advance(collisions=-1), ValueError, "-1 has passed"),
+        (lambda gas: gas.advance_by(), ValueError, "give time, collisions"),
         (lambda gas: gas.advance_by(time=-1), ValueError, "-1 is not a number from 0"),
         (lambda _: kept(RESTING).advance(events=1), RunError, "ever collide again"),
         (lambda _: kept(RESTING).event_log(3), RunError, "output.event_log"),

@@ -1,1 +1,1 @@
-"""Output files: their layout, what kind of run one is, and runs for other programs."""
+"""Output files: reading runs, their physical properties, and conversion for other programs."""

@@ -5,14 +5,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-#: Chooses frames: a number, which counts from the end if it is negative, a slice, or a list.
+#: Index that selects frames: a number (from the end if it is negative), a slice, or a list.
 Index = int | slice | Sequence[int] | np.ndarray
-#: A number, or an array of numbers at which a formula is evaluated.
+#: Argument of a formula: a number or an array of numbers.
 Number = TypeVar("Number", float, np.ndarray)
 
 
 def as_index(index: Index) -> int | slice | np.ndarray:
-    """Return an index as NumPy understands it along one axis, also of a tuple or a range."""
+    """Return an index in a form that NumPy accepts for one axis, also from a tuple or range."""
     if isinstance(index, int | np.integer | slice):
         return index if isinstance(index, slice) else int(index)
     array = np.asarray(index)
@@ -20,13 +20,13 @@ def as_index(index: Index) -> int | slice | np.ndarray:
 
 
 def chosen(count: int, index: Index) -> list[int]:
-    """Return the numbers, from 0, that an index chooses among `count` things."""
+    """Return the numbers (from 0) that an index selects among `count` items."""
     found: list[int] = np.atleast_1d(np.arange(count)[as_index(index)]).tolist()
     return found
 
 
 def in_place(function: np.ufunc, name: str) -> Any:
-    """Return an in-place operator that leaves a read-only array as it is."""
+    """Return an in-place operator that does not modify a read-only array."""
 
     def operator(self: "Snapshot", other: Any) -> np.ndarray:
         if self.flags.writeable:
@@ -58,7 +58,7 @@ class Snapshot(np.ndarray):
         return array[()] if return_scalar else np.asarray(array)
 
     def __setitem__(self, index: Any, value: Any) -> None:
-        """Refuse what would change a copy only."""
+        """Raise an error, because an assignment would change only a copy."""
         if not self.flags.writeable:
             raise ValueError(
                 "read-only: this array is a copy of the simulation's; change a copy of it, and "

@@ -1,4 +1,4 @@
-"""Runs for other programs, in their own types; for pandas see `Run.to_dataframe`."""
+"""Conversion of runs to types of other packages; for pandas see `Run.to_dataframe`."""
 
 from typing import TYPE_CHECKING
 
@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 
 def mdanalysis_universe(run: Run) -> "MDAnalysis.Universe":
-    """Return the run as a Universe of the package MDAnalysis, which must be installed.
+    """Return the run as a Universe of MDAnalysis, a package that must be installed.
 
-    MDAnalysis has three dimensions only: z = 0 is added.  Lengths and times keep their numbers; the
-    time between frames is their mean.  Selections go by species, such as
+    MDAnalysis supports three dimensions only: z = 0 is added.  Lengths and times are not converted;
+    the time between frames is the mean interval.  Selections use the names of species, such as
     `u.select_atoms("type projectile")`; the analysis classes work on `u.trajectory`.
 
     Parameters

@@ -1,4 +1,4 @@
-"""HDF5 files of runs, and places for results."""
+"""Open HDF5 files of runs, and prepare paths of results."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -11,16 +11,16 @@ import numpy as np
 
 
 class RunError(Exception):
-    """Error for a file that cannot be used; the message names the file and the reason."""
+    """Error for a file that cannot be used; the message contains the file and the reason."""
 
 
 class Unsound(Exception):
-    """Error for a fault inside a file; `open_file` adds the path."""
+    """Error for invalid content of a file; `open_file` adds the path."""
 
 
 @contextmanager
 def open_file(path: Path) -> Iterator[h5py.File]:
-    """Open an HDF5 file for reading; any fault that is found in it becomes a RunError."""
+    """Open an HDF5 file for reading; errors caused by its content become a RunError."""
     with hdf5_file(path) as file:
         try:
             yield file
@@ -33,13 +33,13 @@ def open_file(path: Path) -> Iterator[h5py.File]:
 
 
 def hdf5_file(path: Path) -> h5py.File:
-    """Open an HDF5 file, also while a simulation writes it."""
+    """Open an HDF5 file, which a simulation may still be writing."""
     if not path.exists():
         part = Path(f"{path}.part")
         hint = f", but there is {part} of an unfinished run" if part.exists() else None
         hint = hint or did_you_mean(str(path), map(str, path.parent.glob("*.h5*")))
         raise RunError(f"{path}: no such file{hint}")
-    if not path.is_file():  # a FIFO would be waited for
+    if not path.is_file():  # opening a FIFO would block
         raise RunError(f"{path}: is a {'folder' if path.is_dir() else 'device'}, not a run")
     try:
         return h5py.File(path, "r", locking=False)
@@ -49,19 +49,19 @@ def hdf5_file(path: Path) -> h5py.File:
         if "locking flag" in str(problem) or "already open" in str(problem):
             why = "this process has opened it with another mode or lock; close it there first"
             raise RunError(f"{path}: {why}") from None
-        if not path.exists():  # it has just been removed, or renamed by the program
+        if not path.exists():  # the file has just been removed, or renamed by the program
             raise RunError(f"{path}: no such file") from None
         state = "is empty" if path.stat().st_size == 0 else "is not an HDF5 file, or is cut short"
         raise RunError(f"{path}: {state}") from None
 
 
 def did_you_mean(word: str, others: Iterable[str]) -> str:
-    """Return a suggestion if one of the other words is similar, else an empty text."""
+    """Return a suggestion if one of the other words is similar, otherwise an empty text."""
     return "".join(f"; did you mean {near}?" for near in get_close_matches(word, others, 1))
 
 
 def tree(group: h5py.Group) -> dict[str, Any]:
-    """Return an HDF5 group as a dictionary of plain values, from attributes and datasets alike."""
+    """Return the attributes and datasets of an HDF5 group as a dictionary of plain values."""
     values = {name: plain(value) for name, value in group.attrs.items()}
     for name, item in group.items():
         values[name] = tree(item) if isinstance(item, h5py.Group) else plain(item[()])
@@ -69,7 +69,7 @@ def tree(group: h5py.Group) -> dict[str, Any]:
 
 
 def plain(value: object) -> object:
-    """Convert bytes to text and numbers of NumPy to numbers of Python."""
+    """Return bytes as text and numbers of NumPy as numbers of Python."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace").rstrip()
     if isinstance(value, np.ndarray) and value.dtype.kind == "S":
@@ -78,9 +78,9 @@ def plain(value: object) -> object:
 
 
 def destination(path: Path) -> Path:
-    """Prepare the path of a result: make its folder, and return the path.
+    """Make the folder of a result and return the path of the result.
 
-    Only an ordinary file that holds no HDF5 data may be replaced.
+    An existing file may be replaced only if it is an ordinary file without HDF5 data.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.is_symlink() or (path.exists() and not path.is_file()):
@@ -88,5 +88,5 @@ def destination(path: Path) -> Path:
     if path.exists() and h5py.is_hdf5(path):
         raise RunError(f"{path}: holds HDF5 data, which a result does not replace")
     if path.exists() and path.stat().st_nlink > 1:
-        path.unlink()  # its other names keep what they have
+        path.unlink()  # other hard links keep the old content
     return path

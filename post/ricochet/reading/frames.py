@@ -1,6 +1,6 @@
-"""Values that a run contains: quantities of each disk in the frames, and observables in time.
+"""Values of a run: quantities of each disk in the frames, and time series of observables.
 
-Both behave as arrays in expressions and in functions of NumPy: `run.velocity * 2`,
+Objects of both kinds behave as arrays in expressions and in functions of NumPy: `run.velocity * 2`,
 `run.observable("all/temperature").mean()`.
 """
 
@@ -15,7 +15,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from .files import RunError, Unsound, open_file
 
 DISKS = "particles/disks"
-WHOLE = (type(None), type(...), bool, np.bool_)  # as first index they do not choose frames
+WHOLE = (type(None), type(...), bool, np.bool_)  # a first index of these does not select frames
 
 
 class NoSuchFrame(RunError, IndexError):
@@ -23,14 +23,14 @@ class NoSuchFrame(RunError, IndexError):
 
 
 class Values(NDArrayOperatorsMixin):
-    """Arithmetic of objects that NumPy can convert to an array; results are arrays."""
+    """Arithmetic for objects that NumPy can convert to an array; the results are arrays."""
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         """Return the values as an array."""
         raise NotImplementedError
 
     def __array_ufunc__(self, function: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
-        """Evaluate a function of NumPy for the arrays in place of these objects."""
+        """Evaluate a function of NumPy with the arrays instead of these objects."""
         if any(isinstance(item, Values) for item in options.get("out", ())):
             return NotImplemented
         arrays = [np.asarray(item) if isinstance(item, Values) else item for item in inputs]
@@ -58,10 +58,10 @@ class Values(NDArrayOperatorsMixin):
 
 
 class Series(Values):
-    """An observable: values (T, ...) at times (T,), which are not those of the frames.
+    """Time series of an observable: values (T, ...) at times (T,) that differ from those of frames.
 
-    An index, a function of NumPy and an expression concern the values: `series[-1]` is the last
-    value.  `time, value = series` assigns both arrays.
+    Indices, functions of NumPy and expressions apply to the values: `series[-1]` is the last value.
+    `time, value = series` assigns both arrays.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class Series(Values):
     """
 
     def __init__(self, time: np.ndarray, value: np.ndarray):
-        """Combine times and values; the class describes the arguments."""
+        """Combine times and values; the arguments are described in the class docstring."""
         self.time, self.value = time, value
 
     def __len__(self) -> int:
@@ -119,9 +119,9 @@ class Series(Values):
 
 @dataclass(frozen=True, eq=False)
 class Frames(Values):
-    """A quantity of each disk in time, read from the file when it is indexed; [:] reads all.
+    """A quantity of each disk in all frames, read from the file on indexing; [:] reads all frames.
 
-    In an expression or a function of NumPy all frames are read.
+    An expression or a function of NumPy reads all frames.
     """
 
     path: Path
@@ -138,7 +138,8 @@ class Frames(Values):
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         """Return all frames, for functions of NumPy."""
         if copy is False:
-            raise ValueError(f"{self.path}: {self.name} is read from the file, that is copied")
+            raise ValueError(f"{self.path}: {self.name} is read from the file, which requires a "
+                "copy")
         return self[:] if dtype is None else self[:].astype(dtype)
 
     @property
@@ -152,7 +153,7 @@ class Frames(Values):
         return self.read(np.arange(0)).dtype
 
     def __getitem__(self, index: Any) -> np.ndarray:
-        """Index as in NumPy; only the chosen frames are read from the file."""
+        """Return the values of an index as in NumPy; only the selected frames are read."""
         first, *rest = index if isinstance(index, tuple) and index else (index,)
         try:
             if type(first) in WHOLE or np.ndim(first) > 1:
@@ -167,7 +168,7 @@ class Frames(Values):
             raise NoSuchFrame(f"{self.path}: {self.name} ({shape}): {problem}") from None
 
     def read(self, chosen: np.ndarray) -> np.ndarray:
-        """Read these frames, in this order."""
+        """Read the given frames in the given order."""
         steps = np.unique(np.diff(chosen))
         with open_file(self.path) as file:
             if self.name not in file[DISKS]:
@@ -177,6 +178,6 @@ class Frames(Values):
                 values = data[:0]
             elif len(steps) == 1 and steps[0] > 0:
                 values = data[chosen[0] : chosen[-1] + 1 : steps[0]]
-            else:  # far faster than a list as index in h5py
+            else:  # much faster than indexing with a list in h5py
                 values = np.stack([data[k] for k in chosen])
         return values.astype(float if values.dtype.kind == "f" else np.int64)

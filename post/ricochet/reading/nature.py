@@ -1,12 +1,12 @@
-"""The traits of a run, and which theories apply to it.
+"""The physical properties of a run, called traits, and the theories that apply to a run.
 
     run.nature                      # Nature({'inelastic', 'walls', ...}), the differences from
                                     # equal smooth elastic disks in an empty periodic box
     run.nature.closed               # whether only collisions change the energy
-    allow(run, "Haff's law", "inelastic", "mixture")   # refuses a run with any other trait
+    allow(run, "Haff's law", "inelastic", "mixture")   # an error for any other trait
 
-The traits follow from the parameters of a run and from its balance of energy, by a pure function:
-a file, a file that is still being written and a simulation in memory are treated alike.
+A pure function determines the traits from the parameters and the energy balance of a run.  The same
+function is used for finished and unfinished output files and for simulations in memory.
 """
 
 from collections.abc import Mapping
@@ -16,34 +16,34 @@ import numpy as np
 
 from .files import RunError
 
-ROUNDING = 1e-6  # share of the energy: smaller losses are rounding
-#: Traits of a run, and the words in which each is given as a reason.
+ROUNDING = 1e-6  # fraction of the energy below which losses are rounding errors
+#: The traits of a run, and for each trait the words of a message.
 TRAITS = {
-    "changed": "was changed while it ran",
-    "collapsed": "passed a collapse, and is decided by rounding from then on",
-    "time_stepped": "is made by time steps",
+    "changed": "was changed during the run",
+    "collapsed": "passed an inelastic collapse, after which rounding errors determine its state",
+    "time_stepped": "is time-stepped",
     "sheared": "is sheared (box.shear_rate)",
     "noise_driven": "is heated by noise (&drive)",
     "random_walk": "has a centre of mass that noise moves (drive.keep_momentum)",
-    "active": "has disks that drive themselves (&drive)",
-    "moving_sides": "has sides that move",
-    "piston": "has sides that disks push",
-    "sliding_surfaces": "has surfaces that slide",
+    "active": "has active disks (&drive)",
+    "moving_sides": "has moving sides",
+    "piston": "has a piston",
+    "sliding_surfaces": "has sliding surfaces",
     "unequal_temperatures": "is heated and cooled at different temperatures",
-    "thermostatted": "is kicked by a heat bath (&drive)",
-    "thermal_walls": "has walls that heat and cool (temperature)",
+    "thermostatted": "is coupled to a heat bath (&drive)",
+    "thermal_walls": "has thermal walls (temperature)",
     "gravity": "falls (box.gravity)",
     "inelastic": "is not elastic: it loses energy in collisions",
-    "soft_contacts": "has a restitution that depends on the speed (contact.restitution_law)",
-    "rough": "has rough disks, whose collisions turn them",
-    "rotating": "has disks that turn",
-    "round_container": "keeps its angular momentum in a round container",
+    "soft_contacts": "has a velocity-dependent restitution (contact.restitution_law)",
+    "rough": "has rough disks, which rotate after collisions",
+    "rotating": "has rotating disks",
+    "round_container": "conserves angular momentum in a round container",
     "obstacles": "has obstacles or walls in the box",
     "pair_restitution": "has a restitution for each pair of species",
     "walls": "has walls",
     "mixture": "has disks of different mass or radius",
 }
-#: Traits that change the energy in other ways than by dissipation in collisions.
+#: Traits that change the energy by other processes than dissipation in collisions.
 SOURCES = {
     "changed",
     "sheared",
@@ -67,11 +67,11 @@ SETTLED = TRAITS.keys() - UNSETTLED
 
 
 class Refused(RunError):
-    """Error for a run to which a theory does not apply; the message names the reason."""
+    """Error for a run to which a theory does not apply; the message contains the reason."""
 
 
 class Nature(frozenset[str]):
-    """The traits of a run: a set of the words in `TRAITS`."""
+    """The traits of a run: a set of keys of `TRAITS`."""
 
     @property
     def closed(self) -> bool:
@@ -131,7 +131,8 @@ def nature_of(
         baths.add(float(drive["temperature"]))
     beta = float(contact.get("tangential_restitution", -1.0))
     pairs = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
-    # A dissipative law of disks is a trait from the start; one of walls only after it has acted.
+    # A dissipative collision rule of disks is a trait from the start, that of a wall only after a
+    # loss.
     slips = beta > -1 and (beta < 1 or contact.get("friction") is not None)
     inelastic = len(mass) > 1 and (pairs.min() < 1 or slips)
     found = {
@@ -175,7 +176,7 @@ def nature_of(
 
 
 def drifts(parameters: Mapping[str, Any]) -> bool:
-    """Whether along some axis nothing in the box acts on the centre of mass."""
+    """Return whether no force acts on the centre of mass along at least one axis."""
     if "obstacle" in parameters or "wall" in parameters:
         return False
     box = parameters.get("box", {})
@@ -184,7 +185,7 @@ def drifts(parameters: Mapping[str, Any]) -> bool:
 
 
 def held_round(parameters: Mapping[str, Any]) -> bool:
-    """Whether a single round container, which does not reach the sides, encloses the disks."""
+    """Return whether a round container that does not touch the sides encloses all disks."""
     box, rows = parameters.get("box", {}), rows_of(parameters.get("obstacle", {}))
     if len(rows) != 1 or not rows[0].get("inside") or "wall" in parameters:
         return False
@@ -194,18 +195,18 @@ def held_round(parameters: Mapping[str, Any]) -> bool:
 
 
 def rows_of(group: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return one dictionary for each obstacle or wall; the file has a column for each variable."""
+    """Return a dictionary for each obstacle or wall from the columns of variables in the file."""
     columns = {name: column for name, column in group.items() if np.ndim(column) > 0}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def known(value: Any) -> bool:
-    """Whether a variable of an obstacle or wall was given; otherwise it is NaN or 0 in the file."""
+    """Return whether a variable of an obstacle or wall was given; if not, the file has NaN or 0."""
     return value is not None and bool(np.isfinite(value)) and float(value) > 0
 
 
 def allow(run: Any, law: str, *traits: str) -> None:
-    """Refuse a run that has any trait but these; `law` completes the message."""
+    """Raise an error for a run with any trait except these; `law` completes the message."""
     for trait, reason in TRAITS.items():
         if trait in run.nature and trait not in traits:
             raise Refused(f"{getattr(run, 'path', 'the simulation')}: {reason}; {law}")

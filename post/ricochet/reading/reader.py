@@ -1,4 +1,4 @@
-"""Read a Ricochet run: the only module that knows the layout of the HDF5 file.
+"""Read output files of Ricochet; only this module depends on the layout of the HDF5 file.
 
     from ricochet import read_run
     run = read_run("runs/gas.h5")
@@ -36,11 +36,11 @@ TENSORS = ("virial_tensor", "kinetic_tensor", "helfand_stress")
 DRIFTING = (
     "constant_velocity",
     "piston",
-)  # motions of a side that change the area of the box for good
+)  # motions of a side that change the area of the box permanently
 
 
 class EventLog(NamedTuple):
-    """The event log: collisions of any kind in chronological order, (E,) each.
+    """The event log: events (collisions of any kind) in chronological order, as arrays (E,).
 
     `j` is the id of the other disk; or 0, -1, -2, -3 for the left, right, bottom and top side; or
     -4, -5, ... for the obstacles followed by the straight walls.  `momentum_change` is that of disk
@@ -51,11 +51,11 @@ class EventLog(NamedTuple):
     i: np.ndarray  # id of a disk
     j: np.ndarray
     impulse: np.ndarray  # magnitude of the change of momentum
-    momentum_change: np.ndarray | None = None  # (E, 2) of disk i; None in files of before
+    momentum_change: np.ndarray | None = None  # (E, 2) of disk i; None in files of older versions
 
 
 class Event(NamedTuple):
-    """One collision of any kind, with `j` as in `EventLog`."""
+    """One event (collision of any kind), with `j` as in `EventLog`."""
 
     time: float
     i: int  # id of a disk
@@ -73,7 +73,7 @@ class Obstacle(NamedTuple):
 
 
 class Species(NamedTuple):
-    """The disks of one species; those of a starting file may differ in mass and radius."""
+    """The disks of one species; mass and radius may differ if they are from a starting file."""
 
     name: str
     masses: np.ndarray  # (n,)
@@ -82,17 +82,17 @@ class Species(NamedTuple):
 
     @property
     def alike(self) -> bool:
-        """Whether all disks have the same mass and the same radius."""
+        """Whether all disks of the species have the same mass and the same radius."""
         return bool(np.ptp(self.masses) == 0 and np.ptp(self.radii) == 0)
 
     @property
     def mass(self) -> float:
-        """Mass of a disk, or the mean mass."""
+        """Mass of the disks, or the mean mass if masses differ."""
         return float(self.masses[0] if self.alike else self.masses.mean())
 
     @property
     def radius(self) -> float:
-        """Radius of a disk, or the mean radius."""
+        """Radius of the disks, or the mean radius if radii differ."""
         return float(self.radii[0] if self.alike else self.radii.mean())
 
     @property
@@ -104,7 +104,8 @@ class Species(NamedTuple):
 class Restitution(NamedTuple):
     """Normal restitution of a contact.
 
-    It is `xi` for impact velocities above `speed`; below, it follows the law of soft bodies.
+    The restitution is `xi` for impact velocities above `speed`; for smaller velocities it follows
+    the law of viscoelastic disks.
     """
 
     xi: float
@@ -117,7 +118,7 @@ class Restitution(NamedTuple):
 
     @property
     def name(self) -> float | str:
-        """The number, or a text with the law: it distinguishes contacts in a table."""
+        """The value, or a text with the law, which identifies the contact in a table."""
         return self.xi if self.law == "constant" else f"{self:g}"
 
     def at(self, g: np.ndarray) -> np.ndarray:
@@ -135,16 +136,17 @@ class Restitution(NamedTuple):
 class Run:
     """One run: constants as arrays, frames on demand, observables by name.
 
-    `read_run` opens it.  T frames, N disks; units are those of the input.
+    `read_run` returns such an object.  T is the number of frames, N the number of disks; units are
+    those of the input.
     """
 
     path: Path
     time: np.ndarray  # (T,)
     position: Frames  # (T, N, 2), wrapped into the box along a periodic axis
-    velocity: Frames  # (T, N, 2); to read it fails where `output.frame_columns` has left it out
-    image: Frames | None  # (T, N, 2) periods a disk has travelled; None: no side is periodic
-    event_count: Frames | None  # (T, N) of each disk since the start; None: not in the frames
-    disk_data: dict[str, Frames]  # (T, N) what else the disks of this run have, by name
+    velocity: Frames  # (T, N, 2); not available if `output.frame_columns` omits it
+    image: Frames | None  # (T, N, 2) periods crossed; None without periodic sides
+    event_count: Frames | None  # (T, N) numbers per disk; None if not in the frames
+    disk_data: dict[str, Frames]  # (T, N) further quantities of the disks, by name
     mass: np.ndarray  # (N,)
     radius: np.ndarray  # (N,)
     species: np.ndarray  # (N,) 1-based
@@ -154,12 +156,12 @@ class Run:
     periodic: np.ndarray  # (2,) bool
     obstacles: tuple[Obstacle, ...]
     walls: np.ndarray  # (W, 2, 2) straight walls, from one point to another
-    parameters: dict[str, Any]  # group -> variable -> value, as used
+    parameters: dict[str, Any]  # group -> variable -> value used in the run
     provenance: dict[str, Any]
-    units: Units = field(default=UNNAMED, kw_only=True)  # their names, for labels of axes
+    units: Units = field(default=UNNAMED, kw_only=True)  # names of the units for labels of axes
 
     def __repr__(self) -> str:
-        """Return one line, however many disks there are."""
+        """Return one line for any number of disks."""
         kinds = ", ".join(f"{np.sum(kind.disks)} {kind.name}" for kind in self.by_species)
         frames = f"{self.n_frames} frame{'s' * (self.n_frames > 1)}, t = {span(self.time)}"
         return f"<Run {self.path}: {kinds}; {frames}>"
@@ -169,7 +171,7 @@ class Run:
         return len(self.time)
 
     def __getitem__(self, frame: int) -> "Frame":
-        """Return a frame; a negative number counts from the end."""
+        """Return a frame; negative numbers count from the end."""
         if not -len(self) <= frame < len(self):
             raise NoSuchFrame(f"{self.path}: there is no frame {frame} of {len(self)}")
         return Frame(self, frame % len(self))
@@ -199,9 +201,10 @@ class Run:
         return [self.parameters.get("side", {}).get(name, {}) for name in SIDES]
 
     def corners_at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the corners of the box at some times.
+        """Return the corners of the box at given times.
 
-        Sides may move.  The position of a piston is interpolated between the observables.
+        The corners change if sides move.  The position of a piston is interpolated between samples
+        of the observables.
 
         Parameters
         ----------
@@ -229,14 +232,14 @@ class Run:
 
     @property
     def _offsets(self) -> np.ndarray:
-        """(4,) how far inwards of the box's sides the sides are at the start of their motion."""
+        """(4,) inward displacements of the sides from those of the box at the start of motion."""
         ends = [end[axis] for axis in (0, 1) for end in (self.lower, self.upper)]
         starts = [side.get("position", end) for side, end in zip(self.sides, ends, strict=True)]
         return (np.array(starts, dtype=float) - ends) * [1, -1, 1, -1]
 
     @cached_property
     def piston_positions(self) -> dict[int, Series]:
-        """Positions of the pistons in time, by their numbers in `sides`."""
+        """Time series of the positions of the pistons, by their numbers in `sides`."""
         free = [k for k, side in enumerate(self.sides) if side.get("motion") == "piston"]
         return {k: self.observable(f"sides/{SIDES[k]}/position") for k in free}
 
@@ -287,7 +290,7 @@ class Run:
         return self.species == self.names.index(name) + 1
 
     def speed(self, frame: Index) -> np.ndarray:
-        """Return the speeds of all disks in some frames.
+        """Return the speeds of all disks in the given frames.
 
         Parameters
         ----------
@@ -307,7 +310,7 @@ class Run:
         return np.linalg.norm(self.velocity[as_index(frame)], axis=-1)
 
     def kinetic_energy(self, frame: Index) -> np.ndarray:
-        """Return the translational kinetic energy of each disk in some frames.
+        """Return the translational kinetic energy of each disk in the given frames.
 
         Parameters
         ----------
@@ -328,9 +331,10 @@ class Run:
         return 0.5 * self.mass * np.sum(self.velocity[as_index(frame)] ** 2, axis=-1)
 
     def unwrapped(self, frame: Index) -> np.ndarray:
-        """Return positions that are continuous in time: whole periods are added.
+        """Return positions that are continuous in time, including the periods crossed.
 
-        In a sheared box (Lees and Edwards) the image above is displaced by gamma L_y t along x.
+        In a sheared box (Lees-Edwards boundary conditions) the upper periodic image is displaced by
+        gamma L_y t along x.
 
         Parameters
         ----------
@@ -340,7 +344,7 @@ class Run:
         Returns
         -------
         numpy.ndarray
-            (..., N, 2) positions [length]; along an axis that is not periodic those of `position`
+            (..., N, 2) positions [length]; equal to `position` along axes that are not periodic
 
         Examples
         --------
@@ -359,14 +363,16 @@ class Run:
         return place
 
     def displacement(self, frame: Index, origin: int = 0) -> np.ndarray:
-        """Return how far disks are from their positions in another frame, through periodic sides.
+        """Return the distances of disks from their positions in another frame.
+
+        Displacements across periodic sides are included.
 
         Parameters
         ----------
         frame : int, slice, list of int or numpy.ndarray
             which frames
         origin : int
-            frame from which distances count
+            frame of the reference positions
 
         Returns
         -------
@@ -381,7 +387,7 @@ class Run:
         return np.linalg.norm(self.unwrapped(frame) - self.unwrapped(origin), axis=-1)
 
     def per_disk(self, name: str) -> Frames:
-        """Return a quantity of each disk that only some runs have.
+        """Return a quantity of each disk that only some runs contain.
 
         Parameters
         ----------
@@ -396,7 +402,7 @@ class Run:
         Raises
         ------
         RunError
-            if the frames do not have the quantity
+            if the frames do not contain the quantity
 
         Examples
         --------
@@ -451,7 +457,7 @@ class Run:
 
     @cached_property
     def _samples(self) -> int:
-        """Number of samples of each observable; it stays the same while a run goes on."""
+        """Number of samples of each observable when the file was opened."""
         with open_file(self.path) as file:
             return committed(file, "observables")
 
@@ -464,9 +470,9 @@ class Run:
     def to_dataframe(self) -> "pandas.DataFrame":
         """Return the observables as a DataFrame of pandas, with a row for each sample.
 
-        The index is the time.  Columns are named as the observables, such as `all/kinetic_energy`;
-        vectors and tensors have a column for each component, such as `momentum_x` or
-        `virial_tensor_xy`.
+        The index is the time.  Columns have the names of the observables, such as
+        `all/kinetic_energy`; vectors and tensors have a column for each component, such as
+        `momentum_x` or `virial_tensor_xy`.
 
         Returns
         -------
@@ -503,8 +509,8 @@ class Run:
     def to_xarray(self) -> "xarray.Dataset":
         """Return the frames as a Dataset of xarray, which must be installed.
 
-        Its dimensions are time, disk and component ("x", "y").  It contains all quantities of the
-        frames, mass, radius and species; path and seed are in its `attrs`.
+        The dimensions are time, disk and component ("x", "y").  The Dataset contains all quantities
+        of the frames, mass, radius and species; its `attrs` contain path and seed.
 
         Returns
         -------
@@ -540,7 +546,7 @@ class Run:
         return xarray.Dataset(data, axes, {"path": str(self.path), "seed": self.seed})
 
     def event_log(self) -> EventLog:
-        """Return the event log, collisions of any kind in chronological order.
+        """Return the event log: events (collisions of any kind) in chronological order.
 
         Returns
         -------
@@ -577,14 +583,15 @@ class Run:
 
     @cached_property
     def collisions_per_disk(self) -> Series:
-        """2 C / N at the observables, C the number of pair collisions since the start."""
+        """2 C / N at the times of observables, where C is the number of pair collisions so far."""
         time, collisions = self.observable("collisions")
         return Series(time, 2 * collisions / self.n_disks)
 
     def collisions_per_disk_at(self, time: np.ndarray) -> np.ndarray:
-        """Return the number of pair collisions per disk at other times, by interpolation.
+        """Return the number of pair collisions per disk at given times, by interpolation.
 
-        Where frames are more frequent than observables, it is interpolated in the number of events.
+        Between samples of the observables, the number of events in the frames is used for the
+        interpolation if frames are more frequent than these samples.
 
         Parameters
         ----------
@@ -605,7 +612,7 @@ class Run:
         known, tau = self.collisions_per_disk
         if self.event_count is None or len(known) >= self.n_frames:
             return np.interp(time, known, tau)
-        hits, rising = self.events_per_disk, 1e-12 / max(self.time[-1], 1e-300)  # even without hits
+        hits, rising = self.events_per_disk, 1e-12 / max(self.time[-1], 1e-300)  # also at rest
 
         def clock(t: np.ndarray) -> np.ndarray:
             return np.interp(t, self.time, hits) + rising * np.asarray(t)
@@ -614,17 +621,17 @@ class Run:
 
     @cached_property
     def events_per_disk(self) -> np.ndarray:
-        """(T,) events per disk since the start, at the frames."""
+        """(T,) events per disk since the start at the times of frames."""
         if self.event_count is None:
             raise RunError(f"{self.path}: has no event_count in its frames")
         return np.array([self.event_count[k].mean() for k in range(self.n_frames)])
 
     def accessible_area(self, time: float | np.ndarray) -> np.ndarray:
-        """Return the area that disks can reach at some times: the box less its obstacles.
+        """Return the accessible area at given times: the area of the box without its obstacles.
 
-        A round container replaces the box.  The box is that of the moment where a side moves at
-        constant velocity or is a piston; a side that oscillates counts at its mean position, as in
-        the pressure that the program writes.
+        If disks are in a round container, the area is that of the container.  Sides that move at
+        constant velocity and pistons are at their positions at the given time.  Oscillating sides
+        are at their mean positions, as in the pressure that the program writes.
 
         Parameters
         ----------
@@ -652,11 +659,11 @@ class Run:
         return area
 
     def pressure(self, t1: float, t2: float) -> float:
-        """Return the pressure between two times, which are moved to the nearest samples.
+        """Return the mean pressure between two times, which are rounded to the nearest samples.
 
         It is (<K> + dW / 2 dt) / <A>: K is the kinetic energy relative to the flow of a sheared
-        box, W the virial, A the accessible area.  Means over time are by trapezoids over the
-        samples.
+        box, W the virial, A the accessible area.  Means over time are computed with the trapezoidal
+        rule.
 
         Parameters
         ----------
@@ -688,10 +695,11 @@ class Run:
         return float((self.n_disks * time_mean(time, kinetic) + virial / (2 * duration)) / area)
 
     def pressure_tensor(self, t1: float, t2: float) -> np.ndarray:
-        """Return the pressure tensor (2, 2) between two times, moved to the nearest samples.
+        """Return the mean pressure tensor (2, 2) between two times, rounded to the nearest samples.
 
         It is (<sum of m v_a v_b> + dW_ab / dt) / <A>, with the virial tensor W; its trace is twice
-        the `pressure`.  Some runs need `output.virial_tensor = .true.` for it.
+        the `pressure`.  Some runs contain the virial tensor only with `output.virial_tensor =
+        .true.`.
 
         Parameters
         ----------
@@ -721,7 +729,7 @@ class Run:
         return ((time_mean(time, kinetic) + virial / duration) / area).reshape(2, 2)
 
     def _between(self, name: str, t1: float, t2: float) -> Series:
-        """Return the samples of an observable between those nearest to t1 and to t2."""
+        """Return the samples of an observable between those nearest to t1 and nearest to t2."""
         time, value = self.observable(name)
         first, last = (int(np.argmin(np.abs(time - t))) for t in (t1, t2))
         if not time[first] < time[last]:
@@ -732,7 +740,7 @@ class Run:
         return Series(time[first : last + 1], value[first : last + 1])
 
     def parameter(self, group: str, variable: str, default: Any = None) -> Any:
-        """Return a variable of the input as it was used.
+        """Return the value of an input variable that was used in the run.
 
         Parameters
         ----------
@@ -755,12 +763,12 @@ class Run:
 
     @property
     def restitution(self) -> float:
-        """Restitution of two disks; NaN if it depends on the species or on the velocity."""
+        """Restitution of collisions of two disks; NaN if it depends on species or velocity."""
         return self.contact_law.xi if self.contact_law.law == "constant" else np.nan
 
     @property
     def contact_law(self) -> Restitution:
-        """Restitution of two disks with its law; NaN if it depends on the species."""
+        """Restitution of two disks, with its law; NaN if it depends on the species."""
         contact = self.parameters.get("contact", {})
         values = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
         xi = float(values[0]) if len(values) == 1 else float("nan")
@@ -770,7 +778,7 @@ class Run:
 
     @property
     def time_step(self) -> float:
-        """Time step of a run with time steps; 0 of an event-driven one."""
+        """Time step of a time-stepped run; 0 for an event-driven run."""
         steps = self.parameter("run", "dynamics", "events") == "steps"
         return float(self.parameter("run", "dt")) if steps else 0.0
 
@@ -783,14 +791,14 @@ class Run:
             self.parameters,
             self.mass,
             self.radius,
-            lost=lost / most if most > 1e-300 else 0.0,  # a disk at rest may have that much
+            lost=lost / most if most > 1e-300 else 0.0,  # rounding error of a disk at rest
             turning="all/rotational_energy" in self.observables,
             collapsed="collapse" in str(self.provenance.get("note", "")),
         )
 
     @property
     def termination_note(self) -> str:
-        """Why the run did not end by a stop rule; empty if it did."""
+        """Reason why the run did not end by a stop rule; empty if it did."""
         note = "".join(filter(str.isprintable, str(self.provenance.get("note", ""))))
         if self.path.suffix != ".part":
             early = ":" if note.startswith("an inelastic collapse occurred") else " ended early:"
@@ -805,12 +813,12 @@ class Run:
 
     @property
     def shear_rate(self) -> float:
-        """Gradient along y of the velocity along x; 0 unless the box is sheared."""
+        """Gradient along y of the x velocity; 0 unless the box is sheared."""
         return float(self.parameter("box", "shear_rate", 0.0))
 
     @property
     def gravity(self) -> np.ndarray:
-        """(2,) acceleration of free flight."""
+        """(2,) acceleration by gravity."""
         return np.asarray(self.parameter("box", "gravity", (0.0, 0.0)), dtype=float)
 
 
@@ -860,22 +868,22 @@ class Frame:
         return self.run.speed(self.index)
 
     def per_disk(self, name: str) -> np.ndarray:
-        """Return a quantity of each disk that only some runs have, as `Run.per_disk`."""
+        """Return a quantity of each disk that only some runs contain; see `Run.per_disk`."""
         return self.run.per_disk(name)[self.index]
 
 
 def read_run(path: str | Path) -> Run:
-    """Open the output file of a run, finished or not.
+    """Open the output file of a finished or unfinished run.
 
     Parameters
     ----------
     path : str or Path
-        the file; of a run that goes on its `.part`
+        the output file; for an unfinished run the file NAME.h5.part
 
     Returns
     -------
     Run
-        the run, up to the last frame that is complete
+        the run up to the last complete frame
 
     Raises
     ------
@@ -898,7 +906,7 @@ def read_run(path: str | Path) -> Run:
 
 
 def run_of(path: Path, file: h5py.File) -> Run:
-    """Return the run in an open file."""
+    """Return the run that an open file contains."""
     disks, count = file[DISKS], committed(file, DISKS)
     if {"pressure", "wall_collisions"} & set(file["observables"]):
         old = "was written by an earlier version of Ricochet, with other names"
@@ -937,14 +945,14 @@ def run_of(path: Path, file: h5py.File) -> Run:
 
 
 def outmost(side: Mapping[str, Any]) -> float:
-    """Return how far beyond its mean position a side moves outwards [length]."""
+    """Return the largest outward displacement of a side from its mean position [length]."""
     if side.get("motion") == "constant_velocity":
         return max(0.0, -float(side["velocity"]) * float(side["end_time"] - side["start_time"]))
     return float(side["amplitude"]) if side.get("motion") in ("sine", "parabolic") else 0.0
 
 
 def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
-    """Return how far inwards of its mean position a side is at some times: see docs/theory.md."""
+    """Return the inward displacement of a side from its mean position; see docs/theory.md."""
     if side.get("motion") == "constant_velocity":
         start, end = side["start_time"], side["end_time"]
         return side["velocity"] * (np.clip(time, start, end) - start)
@@ -957,18 +965,18 @@ def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
 
 
 def time_mean(time: np.ndarray, value: np.ndarray) -> np.ndarray:
-    """Average samples (T, ...) over time, by trapezoids."""
+    """Average samples (T, ...) over time with the trapezoidal rule."""
     return np.trapezoid(value, time, axis=0) / (time[-1] - time[0])
 
 
 def span(values: np.ndarray) -> str:
-    """Return a text with the only value, or with the smallest and the largest."""
+    """Return the common value of an array as text, or its smallest and largest value."""
     ends = (f"{values.min():g}", f"{values.max():g}")
     return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 
 def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
-    """Yield the names of the series in a group and in its subgroups."""
+    """Yield the names of the time series in a group and in its subgroups."""
     for name, item in group.items():
         if isinstance(item, h5py.Group):
             if "value" in item:
@@ -989,12 +997,12 @@ def series_of(file: h5py.File, name: str, count: int) -> Series:
 
 
 def committed(file: h5py.File, group: str) -> int:
-    """Return the number of valid samples of a group; a `.part` is allocated in advance."""
+    """Return the number of valid samples of a group; an unfinished file is allocated in advance."""
     return int(file[group]["committed"][()])
 
 
 def rows(data: h5py.Dataset, count: int | None = None) -> np.ndarray:
-    """Return the first rows of a dataset [all]; floating-point numbers in double precision."""
+    """Return the first rows of a dataset [all], with floating-point numbers in double precision."""
     values = data[:count]
     if count is not None and len(values) < count:
         raise Unsound(f"{data.name} holds {len(values)} of {count} samples")
@@ -1019,7 +1027,7 @@ def walls_of(parameters: Mapping[str, Any], group: str = "wall") -> np.ndarray:
 
 
 def groups_of_rows(parameters: Mapping[str, Any], name: str) -> np.ndarray:
-    """Return the number (W,), from 0, of the group that each obstacle belongs to."""
+    """Return the number (W,), from 0, of the group to which each obstacle belongs."""
     rows = parameters.get(f"{name}_rows")
     if rows:
         return np.asarray(rows["group"]) - 1

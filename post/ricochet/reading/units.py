@@ -1,16 +1,16 @@
-"""Names of the units of an input, for the labels of axes.
+"""Names of the units of an input for the labels of axes.
 
-An input consists of plain numbers; only its author knows whether a length is in metres or in
-diameters.  A name changes labels, never a number.
+An input consists of numbers without units, for which its author can choose for example metres or
+diameters.  The names of units change labels only, never numbers.
 """
 
 from typing import NamedTuple
 
 from .files import did_you_mean
 
-#: Powers of length, time and mass of each quantity; a density and a stress are those of a plane.
+#: Powers of length, time and mass in each quantity; density and stress are two-dimensional.
 POWERS = {
-    "number": (0, 0, 0),  # no unit
+    "number": (0, 0, 0),  # dimensionless
     "length": (1, 0, 0),
     "time": (0, 1, 0),
     "mass": (0, 0, 1),
@@ -32,18 +32,18 @@ class Units(NamedTuple):
     length: str = ""
     time: str = ""
     mass: str = ""
-    energy: str = ""  # empty: made of the other three
+    energy: str = ""  # if empty, composed of the other three units
 
     def label(self, words: str, quantity: str = "") -> str:
         """Return the label of an axis, such as 'time (s)', or 'time (reduced units)'.
 
-        `quantity` is one of `POWERS`; without it the words are the quantity.
+        `quantity` is a key of `POWERS`; by default it is equal to the words.
         """
         unit = self.name(quantity or words)
         return f"{words} ({unit})" if unit else words
 
     def name(self, quantity: str) -> str:
-        """Return the unit of one of `POWERS`, or 'reduced units' where a part of it is unknown."""
+        """Return the unit of a key of `POWERS`, or 'reduced units' if a part of it is unknown."""
         if quantity == "energy" and self.energy:
             return self.energy
         powers = zip(POWERS[quantity][::-1], self[2::-1], strict=True)  # mass is written first
@@ -55,7 +55,7 @@ UNNAMED = Units()
 
 
 def product(parts: list[tuple[int, str]]) -> str:
-    """Return powers of units as text: 'cm/s', 'kg m²/s²', '1/cm²'; '' without any."""
+    """Return powers of units as text: 'cm/s', 'kg m²/s²', '1/cm²'; '' if there are none."""
 
     def factors(sign: int) -> str:
         own = [(abs(power), name) for power, name in parts if sign * power > 0]
@@ -70,7 +70,7 @@ def product(parts: list[tuple[int, str]]) -> str:
 
 
 def units_of(text: str) -> Units:
-    """Parse names of units such as 'length=cm,time=s'; ValueError says what is wrong."""
+    """Parse names of units such as 'length=cm,time=s', or raise ValueError."""
     found: dict[str, str] = {}
     for part in text.split(","):
         quantity, equals, name = (word.strip() for word in part.partition("="))
@@ -80,6 +80,6 @@ def units_of(text: str) -> Units:
         if not equals or not name:
             raise ValueError(f"'{part}' has no name of a unit, as length=cm has")
         if quantity in found:
-            raise ValueError(f"{quantity} is there twice")
+            raise ValueError(f"{quantity} is given twice")
         found[quantity] = name
     return Units(**found)

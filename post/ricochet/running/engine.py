@@ -1,4 +1,4 @@
-"""The library of the engine: its functions, which `ricochet.h` describes, and their errors."""
+"""The library of the engine: its functions (described in `ricochet.h`) and their errors."""
 
 import ctypes
 import functools
@@ -13,7 +13,7 @@ ROOM = 100_000  # size of a message [bytes]
 
 
 def c_text(text: str | Path) -> bytes:
-    """Return a text or a path for the library; a zero byte in it is refused."""
+    """Return a text or a path in the encoding of the library; zero bytes are refused."""
     words = os.fsencode(text) if isinstance(text, Path) else text.encode(errors="surrogateescape")
     if b"\0" in words:
         raise ValueError(f"{text!r} has a zero byte")
@@ -21,7 +21,7 @@ def c_text(text: str | Path) -> bytes:
 
 
 def opened(make: Callable[..., int], *arguments: object) -> int:
-    """Return a new handle from a function of the library; raise its error."""
+    """Return a new handle from a function of the library, or raise its error."""
     message, code = ctypes.create_string_buffer(ROOM), ctypes.c_int()
     handle = make(*arguments, message, ROOM, ctypes.byref(code))
     if not handle:
@@ -30,7 +30,7 @@ def opened(make: Callable[..., int], *arguments: object) -> int:
 
 
 def called(function: Callable[..., int], *arguments: object) -> bool:
-    """Call a function of the library; raise its error; return whether to call it again."""
+    """Call a function of the library, raise its error, and return whether to call it again."""
     message = ctypes.create_string_buffer(ROOM)
     code = function(*arguments, message, ROOM)
     if code > 1:
@@ -40,14 +40,14 @@ def called(function: Callable[..., int], *arguments: object) -> bool:
 
 @functools.cache
 def library(files: bool = False) -> ctypes.CDLL:
-    """Load the engine; the version with functions for files needs the HDF5 of the system."""
+    """Load the library; the version with functions for files needs the HDF5 of the system."""
     name = "libricochet_files.so" if files else "libricochet.so"
     wish = os.environ.get("RICOCHET_LIBRARY")  # a folder
     places = [Path(wish)] if wish else [HERE / "lib", HERE.parents[1] / "build"]
     path = next((place / name for place in places if (place / name).is_file()), None)
     if path is None:
         raise ProgramError(f"no {name} in {places[-1]}: run make library in a clone", 3)
-    engine = ctypes.CDLL(str(path))  # its symbols are its own: no clash with the HDF5 of h5py
+    engine = ctypes.CDLL(str(path))  # local symbols do not clash with the HDF5 of h5py
     p, n, text = ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p
     long, real = ctypes.c_int64, ctypes.c_double
     answer = [ctypes.c_char_p, n]

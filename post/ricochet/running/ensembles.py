@@ -1,12 +1,12 @@
-"""Many runs of one input, in parallel, and the table of their results.
+"""Sweeps (many runs of one input in parallel) and tables of their results.
 
     values = {"contact.restitution": [0.8, 0.9], "run.seed": range(8)}
     table = ricochet.sweep("input/gas.nml", values, "runs/scan")
-    table = ricochet.ensemble("runs/scan")       # a row for each member, also of runs/ensemble.sh
+    table = ricochet.ensemble("runs/scan")       # a row per member run; also for runs/ensemble.sh
 
-Both can be stopped and repeated at any time.  A folder of members is that of `runs/ensemble.sh`:
-input.nml, manifest.txt with the overrides of each member, NAME.h5 and NAME.log.  Each of the two
-continues the members that the other has left.
+A sweep can be interrupted and repeated at any time.  Its folder has the layout of
+`runs/ensemble.sh`: input.nml, manifest.txt with the overrides of each member run, NAME.h5 and
+NAME.log.  Therefore `sweep` continues the member runs of `runs/ensemble.sh` and vice versa.
 """
 
 import contextlib
@@ -51,8 +51,8 @@ def sweep(
 ) -> "pandas.DataFrame":
     """Run every combination of values of some variables, or a list of settings.
 
-    Members that are finished are left out, others continue where they were stopped: repeat the call
-    after an interrupt.
+    Finished member runs are left out and interrupted ones continue.  After an interrupt, repeat the
+    same call.
 
     Parameters
     ----------
@@ -63,14 +63,14 @@ def sweep(
         varies slowest.  A list of such dictionaries is run one after the other, so that values of
         several variables can belong together
     folder : str or Path
-        folder for the files of the members
+        folder for the files of the member runs
     executor : concurrent.futures.Executor, optional
-        runs the members, and sees the same folder [all cores of this machine]
+        executor for the member runs, with access to the same folder [all cores of this machine]
 
     Returns
     -------
     pandas.DataFrame
-        the table of the members, as of `ensemble`
+        the table of the member runs, as returned by `ensemble`
 
     Raises
     ------
@@ -79,7 +79,7 @@ def sweep(
     RunError
         if the folder or a member's log cannot be used, or if a member's name would be too long
     ValueError
-        if there are no values
+        if `values` is empty
 
     Examples
     --------
@@ -117,7 +117,7 @@ def sweep(
         for member in waiting:
             member.result()
     finally:
-        mark.unlink(missing_ok=True)  # members stop, with a checkpoint, wherever they are
+        mark.unlink(missing_ok=True)  # running members write a checkpoint and stop
         for member in waiting:
             member.cancel()
         if executor is None:
@@ -196,7 +196,7 @@ def words_of(settings: Mapping[str, object]) -> str:
 
 
 def read_manifest(folder: Path) -> dict[str, str]:
-    """Return the overrides of each member in a manifest."""
+    """Return the overrides of each member run in a manifest."""
     path = folder / "manifest.txt"
     if not path.is_file():
         return {}
@@ -205,10 +205,10 @@ def read_manifest(folder: Path) -> dict[str, str]:
 
 
 def remember(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
-    """Write input.nml and manifest.txt; members that have data must keep their settings."""
+    """Write input.nml and manifest.txt; settings of members with data must not change."""
     door = os.open(folder, os.O_RDONLY)
     try:
-        fcntl.flock(door, fcntl.LOCK_EX)  # one command at a time, as runs/ensemble.sh
+        fcntl.flock(door, fcntl.LOCK_EX)  # one command at a time, as in runs/ensemble.sh
         remember_alone(folder, text, overrides)
     finally:
         os.close(door)
@@ -242,7 +242,7 @@ def put(path: Path, text: str) -> None:
 
 
 def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
-    """Return the finished and the unfinished file of a member; None where there is none."""
+    """Return the paths of the finished and the unfinished file of a member, or None."""
     whole, part = folder / f"{name}.h5", folder / f"{name}.h5.part"
     return whole if whole.is_file() else None, part if part.is_file() else None
 
@@ -263,7 +263,7 @@ def log_of(path: Path) -> TextIO:
 
 
 def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
-    """Run a member to its end unless it is finished or another process runs it; its exit code."""
+    """Run a member that is not finished and not run by another process; return its exit code."""
     if not wanted(mark):
         return STOPPED
     with log_of(folder / f"{name}.log") as log:
@@ -275,7 +275,7 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
         if finished:
             return 0
         if before := last_words(folder, name):
-            print(file=log, flush=True)  # ends the last line of an earlier attempt
+            print(file=log, flush=True)  # separates the log from that of an earlier attempt
         words = [word for pair in pairs_of(overrides) for word in ("--set", "=".join(pair))]
         output = ["-o", folder / f"{name}.h5", "--quiet", *words]
         command = [find_program(), folder / "input.nml", *output]
@@ -283,7 +283,7 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
         pipes = {"stdin": subprocess.DEVNULL, "stdout": log, "stderr": log, "env": environment}
         code = finished_with([*command, *["--resume"] * bool(unfinished)], mark, **pipes)
         if unfinished and BROKE_OFF in last_words(folder, name):
-            code = finished_with(command, mark, **pipes)  # it starts over
+            code = finished_with(command, mark, **pipes)  # the member starts from the beginning
         if code < 0:
             memory = " (out of memory?)" * (-code == signal.SIGKILL)
             moment = time.strftime("%FT%T%z")
@@ -295,16 +295,19 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
 
 
 def is_there(pid: int) -> bool:
-    """Whether a process of this number exists on this machine."""
+    """Return whether a process with this number exists on this machine."""
     try:
         os.kill(pid, 0)
     except OSError as problem:
-        return isinstance(problem, PermissionError)  # somebody else's
+        return isinstance(problem, PermissionError)  # the process belongs to another user
     return True
 
 
 def wanted(mark: Path) -> bool:
-    """Whether the call of `sweep` with this mark goes on; remove the mark of a killed one."""
+    """Return whether the call of `sweep` with this mark continues.
+
+    The mark of a call whose process no longer exists is removed.
+    """
     _, pid, _, host = mark.name.split(" ", 3)
     if host == os.uname().nodename and not is_there(int(pid)):
         mark.unlink(missing_ok=True)
@@ -312,7 +315,7 @@ def wanted(mark: Path) -> bool:
 
 
 def finished_with(command: list[Any], mark: Path, **pipes: Any) -> int:
-    """Return the exit code of a command; stop it, with a checkpoint, once its mark is gone."""
+    """Return the exit code of a command; it is stopped at a checkpoint if its mark vanishes."""
     process: subprocess.Popen[bytes] = subprocess.Popen(tied(command), **pipes)
     try:
         while True:
@@ -321,10 +324,10 @@ def finished_with(command: list[Any], mark: Path, **pipes: Any) -> int:
             if not wanted(mark):
                 process.terminate()
     finally:
-        process.terminate()  # nothing, if it has ended
+        process.terminate()  # has no effect if the command has ended
         parent = multiprocessing.parent_process()
         if parent and parent.pid and not is_there(parent.pid):
-            os._exit(STOPPED)  # this process of a pool would wait for work for ever
+            os._exit(STOPPED)  # otherwise this process of a pool would wait for work forever
 
 
 def pairs_of(overrides: str) -> Iterator[tuple[str, str]]:
@@ -346,7 +349,7 @@ def last_words(folder: Path, name: str) -> str:
 
 
 def failed(folder: Path, name: str) -> bool:
-    """Whether a member reported why it cannot continue."""
+    """Return whether a member has reported a reason why it cannot continue."""
     words = last_words(folder, name)
     return not (files_of(folder, name)[0] or GOES_ON.fullmatch(words))
 
@@ -365,14 +368,14 @@ def ensemble(folder: str | Path) -> "pandas.DataFrame":
     Returns
     -------
     pandas.DataFrame
-        a row for each member: its name; each override, named in full; seed; state: 'finished',
-        'unfinished' or 'failed'; reason, why it is not finished; wall_time [s]; and the last
-        value of each observable that is one number
+        a row for each member run: name; each override by its full name; seed; state ('finished',
+        'unfinished' or 'failed'); reason why the run is not finished; wall_time [s]; and the last
+        value of each scalar observable
 
     Raises
     ------
     RunError
-        if there is no such folder, or no member in it
+        if the folder does not exist or contains no member run
 
     Examples
     --------
@@ -393,7 +396,7 @@ def pandas_module() -> Any:
 
 
 def gathered(folder: Path) -> list[dict[str, Any]]:
-    """Return the rows of `ensemble`."""
+    """Return the rows of the table of `ensemble`."""
     if not folder.is_dir():
         raise RunError(f"{folder}: there is no such folder")
     overrides = read_manifest(folder)
@@ -407,13 +410,13 @@ def gathered(folder: Path) -> list[dict[str, Any]]:
 
 
 def in_order(name: str) -> list[tuple[int, float, str]]:
-    """Return a key that sorts members by name, with the numbers in names by value."""
+    """Return a sort key for names of members, in which numbers are ordered by value."""
     parts = re.split(r"(\d+\.?\d*(?:e[+-]?\d+)?)", name)
     return [(0, float(part), "") if k % 2 else (1, 0.0, part) for k, part in enumerate(parts)]
 
 
 def row_of(folder: Path, name: str, overrides: str) -> dict[str, Any]:
-    """Return the row of a member in the table."""
+    """Return the row of a member run in the table."""
     row: dict[str, Any] = {"member": name}
     row |= {variable: typed(value) for variable, value in pairs_of(overrides)}
     finished, unfinished = files_of(folder, name)
@@ -432,7 +435,7 @@ def row_of(folder: Path, name: str, overrides: str) -> dict[str, Any]:
 
 
 def typed(value: str) -> object:
-    """Convert a value of an override to a number, a truth value, a tuple of numbers, or text."""
+    """Convert the text of an override to a number, a bool, a tuple of numbers, or a string."""
     if not value:
         return None
     if value.strip(".").lower() in ("true", "false", "t", "f"):

@@ -1,4 +1,4 @@
-"""Input files: their text, and those that `Simulation.save` writes."""
+"""Input files: read their text, and write those of `Simulation.save`."""
 
 import os
 import zlib
@@ -21,13 +21,13 @@ def read_input(system: str | Path | Mapping[str, Any]) -> str:
 
 
 def head_of(text: str) -> str:
-    """The first line of an input that `save` writes: it says what the rest was."""
+    """Return the first line of an input of `save`, which contains a checksum of the other lines."""
     crc = zlib.crc32(text.encode(errors="surrogateescape"))
     return f"! Saved by ricochet.Simulation, which may replace it unless it is edited: {crc:08x}\n"
 
 
 def check_input_place(path: Path, output: Path) -> None:
-    """Refuse a place where `save` would write its input over something else."""
+    """Raise an error if `save` would overwrite a file that is not an input of its own."""
     c_text(path)
     try:
         if path.parent.resolve() == output.parent.resolve() and path.name in [
@@ -51,7 +51,7 @@ def check_input_place(path: Path, output: Path) -> None:
 
 
 def write_input(path: Path, text: str) -> None:
-    """Write an input, in place of one that `save` has written; never through a link."""
+    """Write an input; it may replace one that `save` has written, but never through a link."""
     try:
         path.unlink(missing_ok=True)
         with path.open("x", encoding="utf-8", errors="surrogateescape") as file:

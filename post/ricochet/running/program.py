@@ -1,6 +1,7 @@
-"""Start the program from Python: from an input file or a dictionary to a `Run`.
+"""Run the program from Python with an input file or a dictionary, and return a `Run`.
 
-The program reports its progress to a terminal; its standard error is one here.
+The program reports its progress only to a terminal; therefore its standard error is connected to a
+pseudo-terminal.
 """
 
 import atexit
@@ -24,22 +25,22 @@ from ..reading.files import RunError, did_you_mean
 from ..reading.reader import Run, read_run
 
 STOPPED = 75
-PROGRESS = "\033[?7l"  # begins each update of the program's line on a terminal
-PAUSE = 30.0  # s between two lines without a terminal
+PROGRESS = "\033[?7l"  # start of each update of the program's progress line on a terminal
+PAUSE = 30.0  # interval of progress lines without a terminal [s]
 #: Folders of the inputs: inside an installed package, and in a clone.
 INPUTS = (HERE / "input", HERE.parents[1] / "input")
 ESCAPES = re.compile(r"\033\[\??\d*[A-Za-z]")
 
 
 class ProgramError(RunError):
-    """Error for a program that cannot start or finish.
+    """Error for a program that could not start or finish.
 
-    `message` has the lines of the program, `code` its exit code; `path` is the file with the
-    part of the run that was done, or None.
+    `message` contains the lines that the program printed, and `code` its exit code.  `path` is the
+    file with the completed part of the run, or None.
     """
 
     def __init__(self, message: str, code: int, path: Path | None = None):
-        """The message may have several lines if the input has several mistakes."""
+        """Store the message, which has several lines if the input contains several errors."""
         super().__init__(message)
         self.message, self.code, self.path = message, code, path
 
@@ -58,19 +59,19 @@ def run(
     Parameters
     ----------
     system : str, Path or mapping
-        an input file, its text, or its groups, as in `{"species": {"count": 9, "radius": 0.1}}`,
-        with a list of dictionaries for a repeated group
+        an input file, its text, or a dictionary of its groups, as in `{"species": {"count": 9,
+        "radius": 0.1}}`, with a list of dictionaries for a repeated group
     overrides : mapping of str to object, optional
         values of variables, as `{"species.gas.mass": 2}` or `{"contact": {"restitution": 0.9}}`;
         None means the default of a variable
     output : str or Path, optional
         the output file [a temporary file, which is removed when Python ends]
     force, resume : bool
-        the options of these names of the program
+        the options of the program with these names
     threads : int, optional
         `run.threads`
     progress : bool
-        whether progress is shown: continuously on a terminal and in a notebook, else in a line
+        whether progress is shown: continuously on a terminal and in a notebook, otherwise as a line
         every 30 s
 
     Returns
@@ -81,8 +82,8 @@ def run(
     Raises
     ------
     ProgramError
-        if the program reports a problem, with its lines as `message`, its exit code as `code`,
-        and as `path` the file with the part of the run that was done
+        if the program reports an error; `message` contains its lines, `code` its exit code, and
+        `path` is the file with the completed part of the run
 
     Examples
     --------
@@ -108,7 +109,7 @@ def run(
     message = "\n".join(lines).replace(f"{work}{os.sep}", "")
     if code != 0:
         part = output.with_name(f"{output.name}.part")
-        written = part.is_file() and part.stat().st_mtime > began - 1  # else it is another run's
+        written = part.is_file() and part.stat().st_mtime > began - 1  # newer than this run
         message = without_options(named(message, groups), pairs)
         message = message or f"{program} ended with exit code {code}"
         raise ProgramError(message, code, part if written else None)
@@ -150,7 +151,7 @@ def example(name: str) -> Path:
 
 
 def whole_threads(threads: int | None) -> int:
-    """Return the number of threads; 0 if the input decides."""
+    """Return the number of threads; 0 stands for the number given in the input."""
     if threads is None:
         return 0
     if not isinstance(threads, Integral) or not 1 <= threads <= 1024:
@@ -159,7 +160,7 @@ def whole_threads(threads: int | None) -> int:
 
 
 def find_program() -> str:
-    """Return the program that RICOCHET names, else build/ricochet of this clone, else on PATH."""
+    """Return the path of the program: RICOCHET, build/ricochet of this clone, or that on PATH."""
     root = HERE.parents[1]
     if wish := os.environ.get("RICOCHET"):
         places = [Path(wish)]
@@ -172,15 +173,16 @@ def find_program() -> str:
     build = [f"in {root / 'build'}"] if (root / "Makefile").is_file() else []  # else installed
     where = f"at {wish}" if wish else " or ".join([*build, "on PATH"])
     make = "run make" if build else "run make install in a clone of Ricochet"
-    raise ProgramError(f"no program ricochet {where}: {make}, or set RICOCHET to its place", 3)
+    raise ProgramError(f"no program ricochet {where}: {make}, or set RICOCHET to the path of the "
+        "program", 3)
 
 
 def watched(command: list[str], progress: bool = True) -> tuple[int, list[str]]:
-    """Run the command with a progress bar; return its exit code and its messages.
+    """Run the command with a progress bar, and return its exit code and its messages.
 
     If Python is interrupted or killed, the program writes a checkpoint and ends.
     """
-    import pty  # not on Windows, where files can be read nevertheless
+    import pty  # imported here because it does not exist on Windows, where files can be read
 
     ours, its = pty.openpty()
     process = subprocess.Popen(
@@ -206,29 +208,29 @@ def watched(command: list[str], progress: bool = True) -> tuple[int, list[str]]:
     finally:
         if process.poll() is None:
             process.terminate()
-            list(lines_from(ours))  # closed now, the terminal would fail the program's last words
+            list(lines_from(ours))  # closed earlier, it would lose the last messages
         process.wait()
         os.close(ours)
     return process.returncode, lines
 
 
 def tied(command: list[str]) -> list[str]:
-    """Return a command that is stopped, with a checkpoint, when Python ends in any way.
+    """Return a command that writes a checkpoint and stops when Python ends for any reason.
 
-    It uses setpriv of util-linux if there is one: a function between fork and exec is not safe
-    beside threads.
+    The command uses setpriv of util-linux if it is installed, because a function between fork and
+    exec is not safe in a process with threads.
     """
     setpriv = shutil.which("setpriv") if sys.platform == "linux" else None
     return [setpriv, "--pdeathsig", "TERM", "--", *command] if setpriv else command
 
 
 def lines_from(terminal: int) -> Iterator[str]:
-    """Yield the lines that a program writes to its terminal, overwritten ones included."""
+    """Yield the lines that a program writes to its terminal, including overwritten lines."""
     rest = b""
     while True:
         try:
             data = os.read(terminal, 65536)
-        except OSError:  # how Linux says that nobody writes any more
+        except OSError:  # on Linux: no process writes to the terminal any longer
             data = b""
         *lines, rest = re.split(rb"[\r\n]", rest + data)
         yield from (line.decode(errors="replace") for line in (lines if data else [*lines, rest]))
@@ -240,23 +242,25 @@ def lines_from(terminal: int) -> Iterator[str]:
 
 
 def unseen(system: str | Path | Mapping[str, Any]) -> str | None:
-    """Return the text of an input that is no file; None of a file."""
+    """Return the text of an input that is not a file, or None for a file."""
     if isinstance(system, Mapping):
         return namelist(system)
     if not isinstance(system, str | os.PathLike):
         kind = type(system).__name__
-        raise TypeError(f"an input is a file, its text, or a dictionary of its groups, not {kind}")
+        raise TypeError("an input is a file, its text, or a dictionary of groups, not "
+            f"{kind}")
     return system if isinstance(system, str) and ("&" in system or "\n" in system) else None
 
 
 def namelist(groups: Mapping[str, Any]) -> str:
-    """Return the text of an input file for groups of variables; the program checks it."""
+    """Return groups of variables as the text of an input file, which the program checks."""
     text = []
     for name, content in groups.items():
         for group in content if isinstance(content, list | tuple) else [content]:
             if not isinstance(group, Mapping):
                 kind = type(group).__name__
-                raise TypeError(f"{name}: a group is a dictionary, or a list of them, not {kind}")
+                raise TypeError(f"{name}: a group must be a dictionary or a list of dictionaries, "
+                    f"not {kind}")
             lines = [
                 f"  {variable} = {value_text(f'{name}.{variable}', value)}\n"
                 for variable, value in group.items()
@@ -267,7 +271,7 @@ def namelist(groups: Mapping[str, Any]) -> str:
 
 
 def settings_of(overrides: Mapping[str, Any]) -> list[str]:
-    """Return GROUP.VARIABLE=VALUE for each override; without a value it is the default."""
+    """Return GROUP.VARIABLE=VALUE for each override; an empty VALUE stands for the default."""
     return [
         f"{name}={'' if value is None else value_text(name, value)}"
         for name, value in flat(overrides).items()
@@ -300,7 +304,7 @@ def without_options(message: str, settings: Iterable[str]) -> str:
 
 
 def named(message: str, text: str | None) -> str:
-    """Replace line numbers in the program's messages by names, for an input that has no file."""
+    """Replace line numbers in messages of the program by names if the input is not a file."""
     if text is None:
         return message
     input_lines = text.splitlines()
@@ -320,7 +324,7 @@ def value_text(name: str, value: object, separator: str = ", ") -> str:
     if isinstance(value, np.floating):
         value = float(value)
     if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()  # Python's own kinds: of a single value, too
+        value = value.tolist()  # converted to Python's types, also for a single value
     match value:
         case bool():
             return ".true." if value else ".false."
@@ -331,6 +335,6 @@ def value_text(name: str, value: object, separator: str = ", ") -> str:
         case list() | tuple() if len(value) > 0:
             return separator.join(value_text(name, part, separator) for part in value)
         case list() | tuple():
-            raise TypeError(f"{name}: the list is empty; leave the variable out for its default")
+            raise TypeError(f"{name}: the list is empty; omit the variable to use its default")
     kind = type(value).__name__
-    raise TypeError(f"{name}: a value is a number, text, logical, or a list of these, not {kind}")
+    raise TypeError(f"{name}: a value is a number, text, a bool, or a list of these, not {kind}")

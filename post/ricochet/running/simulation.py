@@ -1,11 +1,11 @@
-"""The engine in this process: a simulation to step, look at, save and load.
+"""The engine in this process: simulations that can be advanced, analysed, saved and loaded.
 
     with ricochet.Simulation("input/gas.nml", {"run.seed": 2}) as gas:
         gas.advance(time=1.0)
         gas.position, gas.observable("all/kinetic_energy"), gas.next_events(3)
 
-It is the program's own engine (`make library`), with its bits: in whatever steps a simulation goes
-on, its state is that of `build/ricochet` with the same input.
+The library (`make library`) contains the engine of the program.  The state of a simulation is
+bit-identical to that of `build/ricochet` with the same input, whatever the calls of `advance`.
 """
 
 import ctypes
@@ -40,10 +40,10 @@ from .program import (
 
 PATIENCE = 0.05  # interval of checks for signals [s]
 NEVER = 2**63 - 1
-ROUNDING = 1e-14  # relative rounding of a time
-FASTEST = 1e100  # largest number that an input accepts
+ROUNDING = 1e-14  # relative rounding error of a time
+FASTEST = 1e100  # largest number that is allowed in an input
 ALIVE: "weakref.WeakSet[Simulation]" = weakref.WeakSet()
-#: The arrays of a simulation, and their numbers.
+#: Numbers of the arrays of a simulation in the library, and their names here.
 COLUMNS = {
     "position": float,
     "velocity": float,
@@ -57,7 +57,7 @@ COLUMNS = {
 
 
 class Simulation:
-    """A simulation in memory, at its start.
+    """A simulation in memory, which begins at its initial state.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Simulation:
     Raises
     ------
     ProgramError
-        if the input has a mistake, with the lines of the program
+        if the input contains an error; the message is that of the program
 
     Examples
     --------
@@ -93,7 +93,7 @@ class Simulation:
         overrides: Mapping[str, Any] | None = None,
         threads: int | None = None,
     ):
-        """Start from an input; the class describes the arguments."""
+        """Start a simulation of an input; the arguments are described in the class docstring."""
         text, groups = read_input(system), isinstance(system, Mapping)
         settings = settings_of({} if overrides is None else overrides)
         try:
@@ -114,26 +114,26 @@ class Simulation:
 
     @classmethod
     def _of(cls, text: str, settings: list[str]) -> Self:
-        """Return a simulation of the text of an input with settings GROUP.VARIABLE=VALUE."""
+        """Return a simulation of the text of an input with the settings GROUP.VARIABLE=VALUE."""
         self = cls.__new__(cls)
         self._begin(text, settings)
         return self
 
     def _begin(self, text: str, settings: list[str], threads: int | None = None) -> None:
-        """Start from the text of an input with settings GROUP.VARIABLE=VALUE."""
+        """Start a simulation of the text of an input with the settings GROUP.VARIABLE=VALUE."""
         words = c_text(text), c_text("\n".join(settings))
         engine = library(files=b".h5" in b"".join(words))
         self._take(opened(engine.ricochet_open, *words, whole_threads(threads)))
 
     def _take(self, handle: int) -> None:
         self._handle, self._lock = handle, threading.RLock()
-        self._settled = -1.0  # a time at which all has happened
+        self._settled = -1.0  # a time up to which all events are complete
         ALIVE.add(self)
         self._start_energy = self.observable("all/kinetic_energy") * self.n_disks
 
     @classmethod
     def load(cls, path: str | Path, threads: int | None = None) -> Self:
-        """Return the simulation of the last checkpoint of a run, finished or not.
+        """Return the simulation from the last checkpoint of a finished or unfinished run.
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ class Simulation:
         Raises
         ------
         ProgramError
-            if the file has no checkpoint that can be used
+            if the file contains no usable checkpoint
 
         Examples
         --------
@@ -166,18 +166,18 @@ class Simulation:
     def save(self, path: str | Path, force: bool = False, input: str | Path | None = None) -> Path:
         """Write a file from which `ricochet INPUT -o path --resume` continues.
 
-        It contains the samples of the start and the present state.  After a change INPUT differs
-        from the input of the start: it is the text that is written to `input`.
+        The file contains samples of two states: the initial and the present one.  After a call of
+        `change`, INPUT must be the changed input, which is written to `input`.
 
         Parameters
         ----------
         path : str or Path
-            the output file of the run to be continued
+            the output file of the run that will continue
         force : bool
             whether an existing file may be replaced
         input : str or Path, optional
-            where to write the present input: a new file, or one that `save` has written and that
-            nobody has edited since
+            file to which the present input is written: a new file, or an unedited file that an
+            earlier `save` wrote
 
         Returns
         -------
@@ -206,7 +206,7 @@ class Simulation:
         return path.with_name(f"{path.name}.part")
 
     def close(self) -> None:
-        """Free the memory; the simulation cannot be used afterwards.
+        """Free the memory of the simulation, which cannot be used afterwards.
 
         Examples
         --------
@@ -260,7 +260,7 @@ class Simulation:
         return self.copy()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return a checkpoint for `pickle`."""
+        """Return a checkpoint of the simulation for `pickle`."""
         with tempfile.TemporaryDirectory(prefix="ricochet-") as folder:
             data = self.save(Path(folder) / "state.h5").read_bytes()
         return restored, (type(self), data, self._start_energy)
@@ -275,12 +275,12 @@ class Simulation:
         events: int | None = None,
         on_event: Callable[[Event], object] | None = None,
     ) -> Self:
-        """Continue until the first of these values is reached, counted from the start of the run.
+        """Continue until the first of these limits, counted from the start of the run, is reached.
 
-        Without any, the stop rule of the input decides, if it has one.  As a run of the program,
-        it ends before that when nothing will ever happen, or when a gas that only loses energy has
-        cooled to 1e-25 of its first temperature.  An interrupt (Ctrl-C) leaves the simulation in
-        the state of that moment.
+        Without limits, the stop rules of the input apply.  As in a run of the program, the
+        simulation ends earlier if no further event can occur, or if a gas that only loses energy
+        has cooled to 1e-25 of its initial temperature.  After an interrupt (Ctrl-C) the simulation
+        is in the state at that moment and can continue.
 
         Parameters
         ----------
@@ -289,7 +289,7 @@ class Simulation:
         collisions : int, optional
             number of collisions of two disks
         events : int, optional
-            number of collisions of any kind; events of one moment are never separated
+            number of events (collisions of any kind); simultaneous events are never separated
         on_event : callable, optional
             function of an `Event` that is called after each event, while the simulation is in the
             state of that moment and may be changed; a true result ends the advance after the
@@ -307,7 +307,7 @@ class Simulation:
         RunError
             if nothing will ever happen again, so that none of the values can be reached
         ProgramError
-            if the simulation breaks off, as in an inelastic collapse
+            if the simulation cannot continue, for example after an inelastic collapse
 
         Examples
         --------
@@ -327,16 +327,16 @@ class Simulation:
         given = limits != (math.inf, NEVER, NEVER)
         if not given and self._endless():
             raise ValueError(
-                "advance: how far? The input has no &stop; give time, collisions or events"
+                "advance: no limit; the input has no &stop: give time, collisions or events"
             )
         if math.isnan(limits[0]):
-            raise ValueError("time: nan is no time")
+            raise ValueError("time: nan is not a time")
         before = (self.time, self.collisions, self.events)
         if limits[0] < before[0] * (1 - ROUNDING):
-            raise ValueError(f"time: {time} is past; it is {before[0]:.6g}")
+            raise ValueError(f"time: {time} has passed; it is {before[0]:.6g}")
         for name, limit, now in zip(("collisions", "events"), limits[1:], before[1:], strict=True):
             if limit < now:
-                raise ValueError(f"{name}: {limit} is past; there were {now}")
+                raise ValueError(f"{name}: {limit} has passed; there were {now}")
         if on_event is None:
             while self._go_on(limits, PATIENCE):
                 pass
@@ -355,7 +355,7 @@ class Simulation:
         events: int | None = None,
         on_event: Callable[[Event], object] | None = None,
     ) -> Self:
-        """Continue by a time, or by a number of collisions or events, as `advance` does.
+        """Continue for a time or a number of collisions or events; see `advance`.
 
         Parameters
         ----------
@@ -387,7 +387,7 @@ class Simulation:
         steps = {"time": time, "collisions": collisions, "events": events}
         goals = {name: step for name, step in steps.items() if step is not None}
         if not goals:
-            raise ValueError("advance_by: how far? Give time, collisions or events")
+            raise ValueError("advance_by: give time, collisions or events")
         for name, step in goals.items():
             if not step >= 0:
                 raise ValueError(f"{name}: {step} is not a number from 0")
@@ -395,7 +395,7 @@ class Simulation:
         return self.advance(**goals, on_event=on_event)  # type: ignore[arg-type]
 
     def _report(self, limits: tuple[float, int, int], on_event: Callable[[Event], object]) -> None:
-        """Advance towards these limits; call a function after each event."""
+        """Advance towards the limits and call a function after each event."""
         stopped = False
         while not stopped:
             before = self.events
@@ -451,19 +451,20 @@ class Simulation:
         return EventLog(records[:, 0], ids[:, 0], ids[:, 1], records[:, 3], records[:, 4:])
 
     def _endless(self) -> bool:
-        """Whether no rule of the input stops the run, apart from wall-clock time."""
+        """Return whether the input contains no stop rule except a limit of the wall time."""
         return self.parameters.get("stop", {}).keys() <= {"wall_clock"}
 
     def _go_on(self, limits: tuple[float, int, int], patience: float) -> bool:
-        """Advance towards these limits for a few seconds; return whether they are still ahead."""
+        """Advance towards the limits for a few seconds; return whether they are not yet reached."""
         with self._open() as handle:
             return called(library().ricochet_advance, handle, *limits, patience)
 
     def _settle(self) -> float:
-        """Complete all events up to now; return a time at which another run has the same state.
+        """Complete all events up to the present time, and return a time with a reproducible state.
 
-        At the end of a slice `time` may be rounded, and the engine may be about to change its
-        origin of time; both are over at the next double.
+        At the end of a call `time` may be rounded, and a shift of the engine's origin of time may
+        be due.  At the next representable time both are complete, and another run has the same
+        state at that time.
         """
         if self.time != self._settled:
             self._settled = math.nextafter(self.time, math.inf) if self.time > 0 else 0.0
@@ -471,10 +472,11 @@ class Simulation:
         return self._settled
 
     def change(self, values: Mapping[str, Any]) -> Self:
-        """Change variables of the running simulation from this moment on.
+        """Change variables of the running simulation from the present time on.
 
-        These may be gravity, the drive, and the laws of contacts, sides, walls and obstacles with
-        their temperatures, velocities and motions.  The change of the total energy counts as work.
+        The variables that can change are gravity, the driving, the collision rules of disks and
+        boundaries, and the temperatures, velocities and motions of boundaries.  The resulting
+        change of the total energy is added to the work.
 
         Parameters
         ----------
@@ -489,7 +491,7 @@ class Simulation:
         Raises
         ------
         ProgramError
-            if a variable cannot change; then nothing has changed
+            if a variable cannot change; in this case no variable is changed
 
         Examples
         --------
@@ -521,7 +523,7 @@ class Simulation:
 
     @property
     def input(self) -> str:
-        """The input as it is now, with overrides and changes, as the text of a file."""
+        """The present input, including overrides and changes, as the text of a file."""
         return self._text("input")
 
     @property
@@ -535,7 +537,7 @@ class Simulation:
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """All variables with their values, by groups, as `Run.parameters` has them."""
+        """All variables and their values by group, in the format of `Run.parameters`."""
         found: dict[str, Any] = {}
         for whole, value in self._values().items():
             *groups, name = whole.split(".")
@@ -543,7 +545,7 @@ class Simulation:
             for group in groups:
                 place = place.setdefault(group, {})
             place[name] = value
-        for group in {"obstacle", "wall"} & found.keys():  # the file has columns of them
+        for group in {"obstacle", "wall"} & found.keys():  # the file contains them as columns
             rows = list(found[group].values())
             found |= geometry_of(group, rows)
             found[group] = {name: [row.get(name, np.nan) for row in rows] for name in rows[0]}
@@ -554,13 +556,13 @@ class Simulation:
         return found
 
     def _values(self) -> dict[str, Any]:
-        """Return the values of all variables that have one, by GROUP.NAME.VARIABLE."""
+        """Return the values of all variables that have a value, by GROUP.NAME.VARIABLE."""
         lines = (line.split(" = ", 1) for line in self._text("parameters").splitlines())
         return {name: json.loads(text) if ", ... " not in text else text for name, text in lines}
 
     @property
     def nature(self) -> Nature:
-        """The traits of the simulation so far: see `ricochet.nature`."""
+        """The physical properties of the simulation so far: see `ricochet.nature`."""
         energy = self.observable("all/kinetic_energy") * self.n_disks
         lost = self.observable("dissipated_energy")
         return nature_of(
@@ -596,7 +598,7 @@ class Simulation:
 
     @property
     def events(self) -> int:
-        """Number of collisions of any kind since the start."""
+        """Number of events (collisions of any kind) since the start."""
         return self._counts()[2]
 
     def _column(self, name: str) -> np.ndarray:
@@ -632,7 +634,7 @@ class Simulation:
         self._set("velocity", value, library().ricochet_set_velocities)
 
     def _set(self, name: str, value: ArrayLike, function: Callable[..., int]) -> None:
-        """Give an array (N, 2) to a function of the library."""
+        """Pass an array (N, 2) to a function of the library."""
         array = np.ascontiguousarray(value, dtype=float)
         if array.shape != (self.n_disks, 2):
             raise ValueError(f"{name}: has the shape {array.shape}, not ({self.n_disks}, 2)")
@@ -643,17 +645,17 @@ class Simulation:
 
     @property
     def angular_velocity(self) -> np.ndarray:
-        """(N,) angular velocities [1/time]; AttributeError if the disks cannot turn."""
+        """(N,) angular velocities [1/time]; AttributeError if the disks cannot rotate."""
         return self._column("angular_velocity")
 
     @property
     def orientation(self) -> np.ndarray:
-        """(N,) angles to the x axis [rad], not wrapped; AttributeError without a direction."""
+        """(N,) angles to the x axis [rad], not wrapped; AttributeError without orientations."""
         return self._column("orientation")
 
     @property
     def image(self) -> np.ndarray:
-        """(N, 2) periods that each disk has crossed; AttributeError without a periodic side."""
+        """(N, 2) periods crossed by each disk; AttributeError without a periodic side."""
         return self._column("image")
 
     @property
@@ -690,7 +692,7 @@ class Simulation:
 
     @property
     def observables(self) -> list[str]:
-        """The names of the observables, as in the output file."""
+        """The names of the observables, which are those of the output file."""
         return list(self._observed())
 
     def observable(self, name: str) -> Any:
@@ -699,17 +701,18 @@ class Simulation:
         Parameters
         ----------
         name : str
-            name as in the output file, such as "all/kinetic_energy"; `observables` has all
+            name of the observable in the output file, such as "all/kinetic_energy"; the attribute
+            `observables` lists all names
 
         Returns
         -------
         float, int or numpy.ndarray
-            a number, or an array of its components
+            a number, or an array of the components
 
         Raises
         ------
         RunError
-            if there is no observable of that name
+            if no observable has that name
 
         Examples
         --------
@@ -738,7 +741,7 @@ class Simulation:
         Raises
         ------
         RunError
-            if the simulation is by time steps, which cannot predict events
+            if the simulation is time-stepped, so that events cannot be predicted
 
         Examples
         --------
@@ -751,7 +754,7 @@ class Simulation:
         with self._open() as handle:
             n = library().ricochet_next_events(handle, len(records), records.ctypes.data)
         if n < 0:
-            raise RunError("next_events: time steps do not know what comes")
+            raise RunError("next_events: time steps do not predict events")
         return [(float(t), int(i), int(j)) for t, i, j in records[:n, :3]]
 
 
@@ -766,7 +769,7 @@ def restored(kind: type[Simulation], data: bytes, start_energy: float) -> Simula
 
 
 def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """The table of all obstacles, if a group has a file or points; its own row is emptied."""
+    """Return the table of all obstacles if a group has a file or points; its own row is emptied."""
     if not any({"file", "points"} & row.keys() for row in rows):
         return {}
     wide = {"from": 2, "to": 2} if group == "wall" else {"centre": 2, "radius": 1}
@@ -785,7 +788,7 @@ def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict[str, A
 
 
 def after_fork() -> None:
-    """Close, in a child process, the simulations that another thread was advancing."""
+    """Close, in a child process, the simulations that another thread was advancing at the fork."""
     for simulation in ALIVE:
         if not simulation._lock.acquire(blocking=False):
             simulation._handle = None
@@ -796,10 +799,10 @@ os.register_at_fork(after_in_child=after_fork)
 
 
 class Held:
-    """Lock of a simulation, so that no other thread advances or closes it meanwhile."""
+    """Context manager that locks a simulation, so that no other thread advances or closes it."""
 
     def __init__(self, simulation: Simulation):
-        """Take the simulation; `with` acquires the lock and returns the handle."""
+        """Store the simulation; `with` acquires the lock and returns the handle."""
         self.simulation = simulation
 
     def __enter__(self) -> int:

@@ -1,4 +1,4 @@
-"""Starting files: arrays of disks, as the text that `species.file` reads."""
+"""Starting files: arrays of disks in the text format that `species.file` reads."""
 
 import re
 from pathlib import Path
@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike
 
 from ..reading.files import destination
 
-SPECIES = re.compile(r"[1-9]\d*|[A-Za-z][A-Za-z0-9_-]{0,39}")  # as the program reads them
+SPECIES = re.compile(r"[1-9]\d*|[A-Za-z][A-Za-z0-9_-]{0,39}")  # as read by the program
 
-#: Columns that the text has under a shorter name.
+#: Columns whose name in the text is shorter.
 TURNING = {"angular_velocity": "omega", "orientation": "angle"}
 
 
@@ -26,9 +26,9 @@ def write_start(
 ) -> Path:
     """Write a starting file of disks, for `file = 'PATH'` of a species.
 
-    Variables that are not given follow from the input.  `write_start("bed.txt",
-    **np.load("a.npz"))` writes the arrays of these names in a file of NumPy.  Numbers keep all
-    their digits.
+    Quantities that are not given are determined by the input.  `write_start("bed.txt",
+    **np.load("a.npz"))` writes the arrays with these names from a file of NumPy.  Numbers are
+    written with all digits.
 
     Parameters
     ----------
@@ -41,9 +41,9 @@ def write_start(
     radius, mass : array_like, optional
         (N,) or one value for all
     species : array_like, optional
-        (N,) or one: names or numbers, from 1, of the species of the input
+        (N,) or one value for all: names of species, or numbers of species in the input (from 1)
     angular_velocity, orientation : array_like, optional
-        (N,) or one [1/time], [rad]
+        (N,) or one value for all [1/time], [rad]
 
     Returns
     -------
@@ -53,7 +53,7 @@ def write_start(
     Raises
     ------
     ValueError
-        if an array has another shape, or values that are not allowed
+        if an array has a wrong shape or contains values that are not allowed
 
     Examples
     --------
@@ -91,7 +91,7 @@ def write_start(
 
 
 def table(name: str, values: ArrayLike, count: int | None = None, width: int = 0) -> np.ndarray:
-    """Return finite numbers of the shape (count, width), or (count,) for width 0."""
+    """Return finite numbers as an array of shape (count, width), or (count,) if width is 0."""
     values = np.asarray(values)
     if values.dtype.kind not in "iuf":
         raise ValueError(f"{name}: not an array of numbers")
@@ -104,7 +104,7 @@ def table(name: str, values: ArrayLike, count: int | None = None, width: int = 0
 
 
 def sized(name: str, values: np.ndarray, count: int) -> np.ndarray:
-    """Return `count` values; a single value is repeated."""
+    """Return an array of `count` values; a single value is repeated."""
     if values.ndim == 0:
         return np.full(count, values)
     if len(values) != count or count == 0:
