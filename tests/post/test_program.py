@@ -144,8 +144,8 @@ def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch,
     assert stopped.value.code == STOPPED
 
 
-NO_GROUP = "run: a group is a dictionary, or a list of them, not "
-NO_VALUE = "run.seed: a value is a number, text, logical, or a list of these, not "
+NO_GROUP = "run: a group must be a dictionary or a list of dictionaries, not "
+NO_VALUE = "run.seed: a value is a number, text, a bool, or a list of these, not "
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ NO_VALUE = "run.seed: a value is a number, text, logical, or a list of these, no
         ({"run": [{}, 3]}, NO_GROUP + "int"),
         ({"run": {"seed": [1, {}]}}, NO_VALUE + "dict"),
         ({"run": {"seed": np.array(1j)}}, NO_VALUE + "complex"),
-        ({"run": {"seed": np.zeros(0)}}, "run.seed: the list is empty; leave the variable out"),
+        ({"run": {"seed": np.zeros(0)}}, "run.seed: the list is empty; omit the variable"),
     ],
 )
 def test_what_is_no_input_is_refused(groups, words):
