@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     import pandas
 
 BROKE_OFF = ": its run broke off "
-LOOK = 0.2  # interval of checks whether members are still wanted [s]
+LOOK = 0.2  # interval at which a worker checks for an interrupt [s]
 LONGEST_NAME = 200  # characters in the name of a member
 GOES_ON = re.compile(r"(stopped.*|killed by signal.*|.*--resume continues.*|)")
 
@@ -49,7 +49,7 @@ def sweep(
     folder: str | Path,
     executor: Executor | None = None,
 ) -> "pandas.DataFrame":
-    """Run every combination of values of some variables, or a list of settings.
+    """Run a system with every combination of values of some variables, or a list of settings.
 
     Finished member runs are left out and interrupted ones continue.  After an interrupt, repeat the
     same call.
@@ -57,11 +57,11 @@ def sweep(
     Parameters
     ----------
     system : str, Path or mapping
-        the input, as of `ricochet.run`
+        the input, as for `ricochet.run`
     values : mapping of str to object, or list of them
-        a list of values for each variable, or one value; None is the default; the first variable
-        varies slowest.  A list of such dictionaries is run one after the other, so that values of
-        several variables can belong together
+        a list of values, or a single value, for each variable; None stands for the default of the
+        variable; the first variable varies slowest.  If a list of such dictionaries is given, each
+        one is expanded separately, so that values of several variables can be varied together
     folder : str or Path
         folder for the files of the member runs
     executor : concurrent.futures.Executor, optional
@@ -75,7 +75,7 @@ def sweep(
     Raises
     ------
     ProgramError
-        if a member would refuse its input; no member has run then
+        if the program refuses the input of a member run; this is checked before any of them runs
     RunError
         if the folder or a member's log cannot be used, or if a member's name would be too long
     ValueError
@@ -90,7 +90,7 @@ def sweep(
     >>> list(ricochet.sweep(small, linked, folder / "linked")["collisions"])
     [10, 20]
     """
-    pandas_module()  # who has none hears of it before members run
+    pandas_module()  # a missing package is reported before the runs
     text, folder = read_input(system), Path(folder)
     members = [
         settings
@@ -104,7 +104,7 @@ def sweep(
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
-        raise RunError(f"{folder}: is no folder for members: {problem.strerror}") from None
+        raise RunError(f"{folder}: cannot be a folder of member runs: {problem.strerror}") from None
     remember(folder, text, overrides)
     mark = folder / f".sweep {os.getpid()} {threading.get_ident()} {os.uname().nodename}"
     for left in folder.glob(".sweep * * *"):
@@ -126,7 +126,7 @@ def sweep(
 
 
 def choices_of(values: Mapping[str, Any]) -> dict[str, list[Any]]:
-    """Return the list of values of each variable."""
+    """Return a list of values for each variable."""
     return {
         name: [own] if isinstance(own, str) or not isinstance(own, Iterable) else list(own)
         for name, own in flat(values).items()
@@ -140,9 +140,9 @@ def combinations(choices: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
 
 
 def check(text: str, members: Iterable[Mapping[str, Any]]) -> None:
-    """Refuse values that a member would refuse.
+    """Raise an error for values that the program refuses.
 
-    Each value is checked once, in the first member that has it; seeds are not checked.
+    Each value is checked once, in the first member run with that value; seeds are not checked.
     """
     known: set[str] = set()
     for settings in members:
@@ -156,7 +156,7 @@ def check(text: str, members: Iterable[Mapping[str, Any]]) -> None:
 
 
 def names_of(members: Iterable[Mapping[str, Any]], taken: Mapping[str, str]) -> dict[str, str]:
-    """Return the overrides of each member, as a line of a manifest, by its name."""
+    """Return the overrides of each member run, as a line of a manifest, by its name."""
     found: dict[str, str] = {}
     known = dict(taken)
     for settings in members:
@@ -174,7 +174,7 @@ def names_of(members: Iterable[Mapping[str, Any]], taken: Mapping[str, str]) -> 
 
 
 def name_of(settings: Mapping[str, Any]) -> str:
-    """Return the name of the member with these settings, as runs/ensemble.sh names it."""
+    """Return the name of the member run with these settings, as formed by runs/ensemble.sh."""
     parts = []
     for variable, value in settings.items():
         short = variable.removeprefix("species.")
@@ -187,7 +187,7 @@ def name_of(settings: Mapping[str, Any]) -> str:
 
 
 def words_of(settings: Mapping[str, object]) -> str:
-    """Return overrides as a line of a manifest."""
+    """Return overrides as text for a line of a manifest."""
     words = {
         name: "" if value is None else value_text(name, value, ",")
         for name, value in settings.items()
@@ -248,7 +248,7 @@ def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
 
 
 def log_of(path: Path) -> TextIO:
-    """Open a member's log to append; refuse a link, or a file with two names."""
+    """Open a member's log for appending; links and files with several names are refused."""
     way = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
     try:
         log = os.fdopen(os.open(path, way, 0o666), "a")
@@ -387,7 +387,7 @@ def ensemble(folder: str | Path) -> "pandas.DataFrame":
 
 
 def pandas_module() -> Any:
-    """Return pandas, or say how it is installed."""
+    """Return the module pandas, or raise an error that explains how to install pandas."""
     try:
         import pandas
     except ImportError:

@@ -62,8 +62,8 @@ def run(
         an input file, its text, or a dictionary of its groups, as in `{"species": {"count": 9,
         "radius": 0.1}}`, with a list of dictionaries for a repeated group
     overrides : mapping of str to object, optional
-        values of variables, as `{"species.gas.mass": 2}` or `{"contact": {"restitution": 0.9}}`;
-        None means the default of a variable
+        values of variables, as in `{"species.gas.mass": 2}` or `{"contact": {"restitution": 0.9}}`;
+        None stands for the default of a variable
     output : str or Path, optional
         the output file [a temporary file, which is removed when Python ends]
     force, resume : bool
@@ -320,7 +320,7 @@ def named(message: str, text: str | None) -> str:
 
 
 def value_text(name: str, value: object, separator: str = ", ") -> str:
-    """Return a value as a namelist writes it; an array as the list of its numbers, row by row."""
+    """Return a value in namelist format; an array becomes the list of its numbers, row by row."""
     if isinstance(value, np.floating):
         value = float(value)
     if isinstance(value, np.ndarray | np.generic):
