@@ -1,4 +1,4 @@
-!> Prints what the engine expects of four disks, turn by turn, as lines of JSON for docs/queue_page.py.
+!> Prints the state and the predicted event of each of four disks, event by event, as lines of JSON for docs/queue_page.py.
 program four_disks
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: int32, int64, real64
@@ -11,7 +11,7 @@ program four_disks
   use simulation_state, only: simulation_t
   implicit none
 
-  integer, parameter :: n = 4, turns = 6
+  integer, parameter :: n = 4, iterations = 6
   real(real64), parameter :: radius = 0.3_real64     !! [length]
   real(real64), parameter :: x(2, n) = reshape([0.8_real64, 3.1_real64, 2.0_real64, 1.1_real64, &
     2.0_real64, 2.8_real64, 3.4_real64, 2.7_real64], [2, n])
@@ -20,13 +20,13 @@ program four_disks
   type(simulation_t) :: sim
   type(event_driven_t) :: dynamics
   type(error_t), allocatable :: error
-  integer :: turn
+  integer :: iteration
 
   sim = four()
   allocate (cell_grid_t :: dynamics%search)
   call dynamics%start(sim)
-  do turn = 0, turns
-    if (turn > 0) call dynamics%advance(sim, limits_t(turns=1_int64), error)
+  do iteration = 0, iterations
+    if (iteration > 0) call dynamics%advance(sim, limits_t(iterations=1_int64), error)
     if (allocated(error)) then
       write (error_unit, "(a)") error%message
       stop 1
@@ -55,7 +55,7 @@ contains
     end do
   end function four
 
-  !> The moment, and of each disk its motion and the event that it expects.
+  !> Writes the time, and the motion and the predicted event of each disk.
   subroutine show(sim)
     type(simulation_t), intent(in) :: sim
     integer(int32) :: i, code
@@ -69,7 +69,7 @@ contains
       stale = .false.
       if (code > 0) then
         kind = "disk"
-        stale = sim%disk(code)%stamp /= sim%tag(i)%partner_stamp
+        stale = sim%disk(code)%collision_counter /= sim%tag(i)%partner_counter
         code = sim%tag(code)%id
       else if (is_wall(code)) then
         kind = "side"
