@@ -267,10 +267,10 @@ def test_a_correlator_keeps_few_samples_and_looks_at_many_lags(tmp_path, rng):
 
 def test_what_makes_no_lags_is_refused(tmp_path, rng):
     for times in ([], [1.0], [0.0, 1.0, 1.0], [2.0, 1.0]):
-        with pytest.raises(ValueError, match="two times and more, each later"):
+        with pytest.raises(ValueError, match="at least two times"):
             pairs.lags_of(np.array(times))
     for wrong in ((1, 0.1, 1, 4), (0, 1, 1, 4), (0.1, 1, 0, 4), (0.1, 1, 1, 0.5)):
-        with pytest.raises(ValueError, match="bursts take"):
+        with pytest.raises(ValueError, match="bursts require"):
             pairs.bursts(*wrong)
     x = rng.uniform(size=(9, 4, 2))
     equal, mixed = (

@@ -147,7 +147,7 @@ def test_a_folder_that_cannot_be_used_is_named_in_one_line(tmp_path):
     (tmp_path / "log/seed_1.log").symlink_to(tmp_path / "seed_1.log")
     long = {"run.title": 30 * "very " + "long" + 30 * " text"}
     for values, place, words in (
-        ({"run.seed": 1}, "file", "is no folder"),
+        ({"run.seed": 1}, "file", "cannot be a folder"),
         ({"run.seed": 1}, "log", "is a link; remove it"),
         (long, "long", "allowed: 200"),
     ):

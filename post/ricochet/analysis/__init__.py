@@ -1,1 +1,1 @@
-"""Estimates from runs: means with errors, correlations, structure, fields and transport."""
+"""Analysis of runs: means with errors, correlations, structure, fields and transport."""

@@ -1,7 +1,7 @@
-"""Gases that cool: energies of several runs, Haff's law, temperatures of rough disks.
+"""Cooling gases: energies averaged over runs, Haff's law, temperatures of rough disks.
 
-tau is the number of collisions per disk.  `Curves` contains grids as arrays, and measured
-quantities on them as estimates, by name.
+tau is the number of collisions per disk.  `Curves` is a dictionary by name; grids are arrays, and
+quantities measured on a grid are estimates.
 """
 
 from collections.abc import Sequence
@@ -29,45 +29,45 @@ __all__ = [
 
 Curves = dict[str, np.ndarray | Estimate]
 
-WINDOW = 2.0  # collisions per disk over which a cooling rate is taken
-SLOW = 0.9  # ratio to Haff's rate below which a gas is no longer homogeneous
+WINDOW = 2.0  # collisions per disk over which a cooling rate is averaged
+SLOW = 0.9  # a gas with a lower ratio to Haff's rate is not homogeneous
 SMOOTH = (
     "inelastic",
     "soft_contacts",
     "mixture",
     "rotating",
 )  # traits of gases that cool by Haff's law
-SETTLED = 0.005  # relative distance from the limit at which the ratio has settled
+SETTLED = 0.005  # relative distance from its limit at which the ratio is regarded as steady
 
 
 def on_grid(x: Sequence[Any], y: Sequence[Any], points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Interpolate tracks y (K, T) of each run on a common grid, up to the shortest run."""
+    """Interpolate curves y (K, T) of each run on a common grid, up to the shortest run."""
     grid = np.linspace(0, min(own[-1] for own in x), points)
     each = zip(x, y, strict=True)
     return grid, np.array([[np.interp(grid, own, k) for k in tracks] for own, tracks in each])
 
 
 def energies(runs: list[Run], points: int = 201) -> Curves:
-    """Average the kinetic energies of runs that differ by their seed.
+    """Average the kinetic energies over runs that differ by their seed.
 
     Parameters
     ----------
     runs : list of Run
-        (R,) runs that cool by themselves
+        (R,) runs of gases that cool
     points : int
         number of points of each curve
 
     Returns
     -------
     dict of str to numpy.ndarray or Estimate
-        (points,) each: "K_all" and "K_SPECIES" over the first energy of all, against
-        "collisions_per_disk"; "energy_..." against "time"; "ratio" of the temperatures of the
-        heaviest and the lightest species
+        (points,) each: "K_all" and "K_SPECIES", divided by the initial energy of all disks, against
+        "collisions_per_disk"; "energy_all" and "energy_SPECIES" against "time"; "ratio" of the
+        temperatures of the heaviest and the lightest species
 
     Raises
     ------
     Refused
-        if a run is driven, or starts with disks at rest
+        if a run is driven, or if disks are at rest at its start
 
     Examples
     --------
@@ -77,7 +77,7 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
     """
     names, alone = ("all", *runs[0].names), TRAITS.keys() - SOURCES - {"collapsed", "gravity"}
     for run in runs:
-        allow(run, "it does not cool by itself", *alone)
+        allow(run, "it is not a freely cooling gas", *alone)
     energy = [np.array([moving_energy(run, name) for name in names]) for run in runs]
     first = np.mean([tracks[0, 0] for tracks in energy])
     left = [tracks / tracks[0, 0] for tracks in energy]
@@ -96,10 +96,10 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
 
 
 def moving_energy(run: Run, name: str = "all") -> np.ndarray:
-    """Return the kinetic energy per disk (T,) at the observables; refuse disks at rest."""
+    """Return the kinetic energy per disk (T,) at the observables; it must not start at 0."""
     energy = run.observable(f"{name}/kinetic_energy").value
     if name == "all" and not energy[0] > 0:
-        raise Refused(f"{run.path}: starts with disks at rest; there is nothing to cool")
+        raise Refused(f"{run.path}: starts with disks at rest, which cannot cool")
     return energy
 
 
@@ -107,7 +107,7 @@ def moving_energy(run: Run, name: str = "all") -> np.ndarray:
 
 
 def first_rate(run: Run) -> float:
-    """Return the collision rate per disk at the start, by the equation of state or as counted.
+    """Return the initial collision rate per disk, from the equation of state or by counting.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def first_rate(run: Run) -> float:
 
 
 def counted_rate(run: Run) -> float:
-    """Return w0 from the first collision of each disk, corrected for the cooling meanwhile."""
+    """Return w0 from the first collision of each disk, corrected for the cooling until then."""
     time, tau = run.collisions_per_disk
     first = min(int(np.searchsorted(tau, 1.0)), len(tau) - 1)
     slower = (1 - run.restitution**2) * tau[first] / 4
@@ -151,7 +151,7 @@ def counted_rate(run: Run) -> float:
 
 
 def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the kinetic energy of a gas that cools, at the observables.
+    """Return the kinetic energy of a cooling gas at the times of observables.
 
     Parameters
     ----------
@@ -161,8 +161,8 @@ def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     Returns
     -------
     w0_t, tau, k : numpy.ndarray
-        (T,) time in units of the first mean free time, collisions per disk, energy over that at
-        the start
+        (T,) time in units of the initial mean free time, collisions per disk, energy divided by the
+        initial energy
 
     Examples
     --------
@@ -176,12 +176,12 @@ def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def soft_law(runs: list[Run]) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Return the cooling law of disks whose restitution depends on the impact velocity.
+    """Return the cooling law of disks with velocity-dependent restitution.
 
     Parameters
     ----------
     runs : list of Run
-        (R,) runs of one law of restitution
+        (R,) runs with the same law of restitution
 
     Returns
     -------
@@ -221,13 +221,14 @@ def haff(
     Returns
     -------
     curves : dict of str to numpy.ndarray or Estimate
-        (points,) K / K0 by time and by collisions, each with its law, and the cooling rate
+        (points,) K / K0 against time and against collisions, each with its law, and the cooling
+        rate
     rate : Estimate
-        the cooling rate per collision; with `soft` the `exponent`
+        the cooling rate per collision or, if `soft` is given, the `exponent`
     end : float
-        collisions per disk at which the homogeneous state ends; NaN if it does not
+        collisions per disk at which the homogeneous state ends; NaN if it does not end
     end_error : Estimate
-        the same with its error
+        the same number with its error
 
     Examples
     --------
@@ -284,7 +285,7 @@ def exponent(time: np.ndarray, energy: np.ndarray) -> float:
     Returns
     -------
     float
-        p: 2 by Haff's law, 5/3 for viscoelastic disks
+        p, which is 2 for Haff's law and 5/3 for viscoelastic disks
 
     Examples
     --------
@@ -297,7 +298,7 @@ def exponent(time: np.ndarray, energy: np.ndarray) -> float:
 
 
 def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray) -> float:
-    """Return the tau after which the rate stays below `SLOW` of the law; NaN if it does not."""
+    """Return the tau after which the rate stays below `SLOW` times the law, or NaN."""
     slow = rate < SLOW * law
     if not slow[-1]:
         return float("nan")
@@ -308,7 +309,7 @@ def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray
 
 
 def rough_law(run: Run) -> tuple[float, float, float]:
-    """Return the parameters of a run to which the theory of rough disks applies.
+    """Return the contact parameters of a run of rough disks, if their theory applies.
 
     Parameters
     ----------
@@ -341,14 +342,14 @@ def rough_law(run: Run) -> tuple[float, float, float]:
 
 
 def temperatures(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Return the temperatures of translation and of rotation, (T,) each, at the observables."""
+    """Return translational and rotational temperatures, (T,) each, at the times of observables."""
     kinds = "temperature", "rotational_temperature"
     t, rotational = (run.observable(f"all/{kind}").value for kind in kinds)
     return t, rotational
 
 
 def rough(runs: list[Run], points: int = 200) -> Curves:
-    """Average the temperatures of rough disks that cool, over runs that differ by their seed.
+    """Average the temperatures of cooling rough disks over runs that differ by their seed.
 
     Parameters
     ----------
@@ -376,7 +377,7 @@ def rough(runs: list[Run], points: int = 200) -> Curves:
 
 
 def steady_ratio(runs: list[Run], law: tuple[float, float, float]) -> Estimate:
-    """Estimate the ratio of rotational to translational temperature in the late cooling state.
+    """Estimate the ratio of rotational to translational temperature at late times.
 
     Parameters
     ----------
@@ -388,7 +389,7 @@ def steady_ratio(runs: list[Run], law: tuple[float, float, float]) -> Estimate:
     Returns
     -------
     Estimate
-        the ratio, from the time on at which theory has settled
+        the mean ratio after the time at which the theoretical ratio is steady
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Time correlation functions: displacements, velocities, and F_s(k, t), by species.
+"""Time correlation functions of displacements, velocities and densities for each species.
 
     from ricochet import correlations, read_run
     found = correlations.measured([read_run("runs/glass.h5")], waves=[5.2], skip=0)
@@ -8,24 +8,25 @@ They are means over pairs of samples at times t0 and t, against the lag t - t0, 
 for "all" disks; r is the displacement of a disk from t0 to t:
 
     msd        <r^2>
-    vacf       <v(t0) v(t)>, at the lag 0 the mean square speed
-    diffusion  <v(t0) r> / 2, half the integral of vacf; not for disks that are kicked
-    alpha2     <r^4> / (2 <r^2>^2) - 1, the non-Gaussian parameter: 0 where r is Gaussian
-    overlap    share of the disks with r < `reach` [0.3 mean diameters]
-    F_s(k)     <J0(k r)>, the mean of exp(i k r) over all directions, for each k of `waves`
+    vacf       <v(t0) v(t)>, which is the mean square speed at lag 0 diffusion  <v(t0) r> / 2, half
+    the integral of vacf; not for driven disks alpha2     <r^4> / (2 <r^2>^2) - 1, the non-Gaussian
+    parameter: 0 where r is Gaussian overlap    share of the disks with r < `reach` [0.3 mean
+    diameters] F_s(k)     <J0(k r)>, the mean of exp(i k r) over all directions, for each k of
+    `waves`
 
 Displacements and velocities are relative to the centre of mass along axes where its velocity is
 conserved, or performs a random walk that noise drives (drive.keep_momentum = .false.).
 
-In each twelfth of a power of ten the lag is used that most pairs of samples have, so that samples
-at equal steps, in decades, in bursts, or a mixture of these are all exploited.  Every sample that
-has a partner is an origin.  Where that would take too long, only the first in each sixteenth of a
-lag is: displacements are as accurate then, velocities at lags of many free times are not.  This is
-the multiple-tau correlator of Ramirez et al., J. Chem. Phys. 133, 154103 (2010), without its means
-over neighbouring samples, so that each lag is exact.
+Lags are chosen logarithmically: in each twelfth of a power of ten, the lag that occurs for most
+pairs of samples.  This works for samples at equal steps, in logarithmic steps, in bursts, and for
+mixtures of these.  Every sample that has a partner serves as an origin t0.  If this would take too
+long, only the first sample in each sixteenth of a lag is an origin.  Correlations of displacements
+are equally accurate in this case; those of velocities are less accurate at lags of many free times.
+This is the multiple-tau correlator of Ramirez et al., J. Chem. Phys. 133, 154103 (2010), without
+its means over neighbouring samples, so that each lag is exact.
 
-Errors are over the runs.  For a single run they are over sixteenths of its time, for lags up to an
-eighth of it; longer lags have no error (NaN).
+Errors follow from the scatter of the runs.  For a single run they follow from the scatter of
+sixteenths of its time, for lags up to an eighth of this time; longer lags have no error (NaN).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -52,10 +53,10 @@ __all__ = [
 ]
 
 PER_DECADE = 12
-ORIGINS = 16  # origins in a lag, where not every sample is one
+ORIGINS = 16  # origins per lag if not every sample is an origin
 BLOCKS = 16  # blocks of time, for errors
 REACH = 0.3  # mean diameters
-CLOSE = 1e-9  # relative difference of lags that are equal
+CLOSE = 1e-9  # relative difference of lags that are regarded as equal
 MOST_PAIRS = 2 * 10**6  # largest number of pairs whose lags are compared
 MOST_DISKS = 10**8  # largest number of disks in pairs of samples, if every sample is an origin
 CHUNK = 10**6  # largest number of disks in frames that are read together
@@ -74,7 +75,7 @@ def lags_of(times: np.ndarray) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        (L,) lags [time]: 0, and in each twelfth of a power of ten the lag of most pairs
+        (L,) lags [time]: 0, and in each twelfth of a power of ten the most frequent lag
 
     Raises
     ------
@@ -88,7 +89,7 @@ def lags_of(times: np.ndarray) -> np.ndarray:
     (0.0, 1.0, True)
     """
     if len(times) < 2 or not (np.diff(times) > 0).all():
-        raise ValueError("lags take two times and more, each later than the one before")
+        raise ValueError("lags require at least two times in increasing order")
     origins = np.arange(len(times))
     most = max(16, MOST_PAIRS // len(times))
     if len(times) > most:
@@ -102,7 +103,7 @@ def lags_of(times: np.ndarray) -> np.ndarray:
 
 
 def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
-    """Return times for samples in bursts, which have pairs at all lags and many origins.
+    """Return times of samples in bursts, which provide pairs at all lags with many origins.
 
     Each burst has ten samples in each power of ten from `first` to `last` after its start.
 
@@ -111,9 +112,9 @@ def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
     first, last : float
         the shortest and the longest time after the start of a burst [time]
     apart : float
-        time from the start of one burst to that of the next
+        time from the start of one burst to the start of the next
     until : float
-        no sample is later than this [time]
+        time of the last possible sample [time]
 
     Returns
     -------
@@ -132,7 +133,7 @@ def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
     (0.0, 36, True)
     """
     if not (0 < first <= last <= until and apart > 0):
-        raise ValueError("bursts take 0 < first <= last <= until, and apart > 0")
+        raise ValueError("bursts require 0 < first <= last <= until and apart > 0")
     steps = np.geomspace(first, last, 1 + round(10 * np.log10(last / first)))
     starts = np.arange(0, until - last * (1 - CLOSE), apart)
     times = np.sort(np.add.outer(starts, np.append(0, steps)), axis=None)
@@ -140,10 +141,10 @@ def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
 
 
 class Correlator:
-    """Sums over pairs of samples of a run or a simulation, which are added one after the other.
+    """Sums over pairs of samples of a run or a simulation; samples are added successively.
 
-    Its memory is bounded: it keeps only the samples that have partners still to come, and of long
-    runs about 16 for each lag.  `pickle` saves its whole state, so that a measurement can be
+    The required memory is bounded: only samples that still need partners are stored, in long runs
+    about 16 for each lag.  `pickle` saves the complete state, so that a measurement can be
     continued exactly.
     """
 
@@ -155,9 +156,9 @@ class Correlator:
         reach: float | None = None,
         lags: np.ndarray | None = None,
     ):
-        """Prepare for these times, wavenumbers [1/length] and lags [those of the times]."""
+        """Prepare sums for these times, wavenumbers [1/length] and lags [all lags of the times]."""
         cools = {"inelastic"} if source.nature.cooling else set()
-        what = "ways and memory are those of a steady state without flow"
+        what = "time correlations require a steady state without flow"
         allow(source, what, *TRAITS.keys() - FLOWING - cools)
         self.times, self.waves = np.asarray(times, dtype=float), tuple(waves)
         self.lags = lags_of(self.times) if lags is None else np.asarray(lags, dtype=float)
@@ -177,12 +178,12 @@ class Correlator:
         self.done = 0  # samples
         self.held: dict[
             int, tuple[np.ndarray, np.ndarray, int]
-        ] = {}  # by number: place, velocity, the last partner
-        self.due: dict[int, list[tuple[int, int]]] = {}  # by number: its (origin, lag)
-        self.last = np.full(len(self.lags), -1.0)  # where in the time of a lag its last origin was
+        ] = {}  # by sample: position, velocity, last partner
+        self.due: dict[int, list[tuple[int, int]]] = {}  # by sample: (origin, lag)
+        self.last = np.full(len(self.lags), -1.0)  # interval of each lag that contained its last origin
 
     def follow(self, source: Run | Simulation) -> Self:
-        """Add the missing samples; a simulation is advanced, a run may be growing."""
+        """Add the missing samples of a run, which may be unfinished, or of a simulation."""
         for place, velocity in samples(source, self.times[self.done :]):
             self.add(place, velocity)
         return self
@@ -214,7 +215,7 @@ class Correlator:
     def count(
         self, origins: np.ndarray, lags: np.ndarray, place: np.ndarray, v: np.ndarray
     ) -> None:
-        """Add the pairs of this sample with the origins (P,), at these lags (P,)."""
+        """Add the pairs of this sample with the origins (P,) at the lags (P,)."""
         before, v0 = (np.stack([self.held[k][part] for k in origins]) for part in (0, 1))
         way = place - before
         square, half = np.einsum("pna,pna->pn", way, way), np.einsum("pna,pna->pn", v0, way) / 2
@@ -235,17 +236,17 @@ class Correlator:
         square, fourth = np.moveaxis(self.sums[:, :, species, :2], 2, 0)
         number = np.maximum(self.pairs.sum(axis=1, keepdims=True), 1)
         m2, m4 = (part.sum(axis=1, keepdims=True) / number for part in (square, fourth))
-        m2 = np.where(m2 > 0, m2, np.nan)  # to first order in the deviations of blocks:
+        m2 = np.where(m2 > 0, m2, np.nan)  # to first order in the deviations of the blocks:
         return fourth / (2 * m2**2) - m4 / m2**3 * square + (m4 / m2**2 - 1) * self.pairs
 
     def means(self, name: str, species: int = 0) -> np.ndarray:
-        """Return means (L,) over all pairs; NaN where there are none."""
+        """Return the means (L,) over all pairs; NaN for lags without pairs."""
         number = self.pairs.sum(axis=1)
         return self.amounts(name, species).sum(axis=1) / np.where(number > 0, number, np.nan)
 
 
 def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield positions, continuous in time, and velocities at these times, while there are any."""
+    """Yield the positions (continuous in time) and velocities at these times as far as possible."""
     if isinstance(source, Simulation):
         box = source.parameters["box"]
         edges = np.subtract(box["upper"], box["lower"])
@@ -264,7 +265,7 @@ def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.nd
 
 
 def mean_of(members: Sequence[Correlator], name: str, species: int, lags: np.ndarray) -> Estimate:
-    """Return the mean at these lags, given by number, with its error."""
+    """Return the means, with errors, at the lags with these numbers."""
     means = [one.means(name, species)[lags] for one in members]
     if len(means) > 1:
         return estimate(means)
@@ -278,17 +279,17 @@ def mean_of(members: Sequence[Correlator], name: str, species: int, lags: np.nda
 
 
 def curves(members: Sequence[Correlator]) -> dict[str, dict[str, Curve]]:
-    """Return the curves of correlators, by species and by name.
+    """Return the correlation functions of correlators by species and by name.
 
     Parameters
     ----------
     members : sequence of Correlator
-        (R,) those of runs that differ by their seed, with the same lags
+        (R,) correlators of runs that differ by their seed, with equal lags
 
     Returns
     -------
     dict of str to dict of str to Curve
-        by species and "all", then by name, as in the docstring of the module
+        by species and "all", then by name; the module docstring lists the names
 
     Examples
     --------
@@ -313,7 +314,7 @@ def correlators(
     reach: float | None = None,
     skip: float | None = None,
 ) -> list[Correlator]:
-    """Correlate the steady state of each run at the lags that the first has.
+    """Correlate the steady state of each run at the lags of the first run.
 
     Parameters
     ----------
@@ -322,19 +323,19 @@ def correlators(
     waves : iterable of float
         wavenumbers of F_s(k, t) [1/length]
     reach : float, optional
-        distance up to which a disk counts as unmoved [0.3 mean diameters]
+        distance below which a disk overlaps with its earlier position [0.3 mean diameters]
     skip : float, optional
-        collisions per disk that are left out at the start [until nothing drifts]
+        collisions per disk that are left out at the start [until no observable drifts]
 
     Returns
     -------
     list of Correlator
-        (R,) one for each run
+        (R,) a correlator for each run
 
     Raises
     ------
     RunError
-        if a run has too few frames, or none as far apart as those of the others
+        if a run has too few frames, or no lag in common with the first run
 
     Examples
     --------
@@ -351,26 +352,26 @@ def correlators(
         shared &= found[-1].pairs.any(axis=1)
         if not shared.any():
             raise RunError(
-                f"{run.path}: no two frames are as far apart as in the others, set "
+                f"{run.path}: no two frames have a lag of the first run; set "
                 "output.frames_every_time or frames_per_decade"
             )
     return found
 
 
 def measured(runs: Sequence[Run], **options: Any) -> dict[str, dict[str, Curve]]:
-    """Return the time correlation functions of runs that differ by their seed.
+    """Compute the time correlation functions of runs that differ by their seed.
 
     Parameters
     ----------
     runs : sequence of Run
         (R,) runs of the same disks
     **options : object
-        `waves`, `reach` and `skip`, as of `correlators`
+        `waves`, `reach` and `skip` as for `correlators`
 
     Returns
     -------
     dict of str to dict of str to Curve
-        by species and "all", then by name; the lags are x, the means y
+        by species and "all", then by name; x contains the lags, y the means
 
     Examples
     --------

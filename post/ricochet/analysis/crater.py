@@ -1,7 +1,7 @@
-"""Craters: the projectile, the bed, and the size of the crater.
+"""Craters: identify projectile and bed, and measure the size of the crater.
 
-The projectile is the species of that name, or else the only disk that moves at the start; all other
-disks are the bed.
+The projectile is the species 'projectile', or else the only disk that moves at the start.  All
+other disks form the bed.
 """
 
 from typing import Any, NamedTuple
@@ -29,7 +29,7 @@ __all__ = [
 
 
 class Crater(NamedTuple):
-    """The size of a crater by several definitions, and how the run ended."""
+    """The size of a crater according to several definitions, and the end of the run."""
 
     hit: int
     displaced: int
@@ -37,7 +37,7 @@ class Crater(NamedTuple):
     depth: float
     hole_width: float
     hole_depth: float
-    energy_left: float  # over the energy at the start
+    energy_left: float  # divided by the initial energy
     time: float
     collisions: int
     side_collisions: int
@@ -56,13 +56,13 @@ QUIET = (
     "walls",
 )
 QUIET += ("time_stepped",)
-FEW_HITS = 0.01  # collisions with walls per disk, up to which the box has no influence
-HIT_OVER_LEAST = 3.4  # disks hit over M (1/f - 1) / (1 - xi^2)
-BED_OVER_HIT = 2.2  # disks of a bed that is large enough over those that are hit
+FEW_HITS = 0.01  # wall collisions per disk up to which the box has no influence
+HIT_OVER_LEAST = 3.4  # number of disks hit, divided by M (1/f - 1) / (1 - xi^2)
+BED_OVER_HIT = 2.2  # ratio of the disks of a sufficiently large bed to the disks hit
 
 
 def energy_fraction(run: Run) -> float:
-    """Return the share of the first energy at which a run was to end.
+    """Return the fraction of the initial energy at which the input ends a run.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def energy_fraction(run: Run) -> float:
 
 
 def ended_by_time(run: Run, size: Crater) -> bool:
-    """Tell whether a run ended with more energy than `stop.energy_fraction`.
+    """Determine whether a run ended with more energy than `stop.energy_fraction`.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def ended_by_time(run: Run, size: Crater) -> bool:
 
 
 def box_takes_part(run: Run, side_collisions: float) -> bool:
-    """Tell whether so many disks hit the sides that the crater depends on the box.
+    """Determine whether so many disks hit the sides that the crater depends on the box.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def box_takes_part(run: Run, side_collisions: float) -> bool:
     Returns
     -------
     bool
-        whether there is more than one for each hundred disks
+        whether the number of collisions exceeds one per hundred disks
 
     Examples
     --------
@@ -129,26 +129,26 @@ def box_takes_part(run: Run, side_collisions: float) -> bool:
 
 
 def enough_disks(mass_ratio: float, restitution: float, fraction: float) -> float:
-    """Estimate how many disks a bed must have for the crater not to reach the box.
+    """Estimate the number of disks for which the crater does not reach the sides of the box.
 
-    The projectile hits about 3.4 M (1/f - 1) / (1 - xi^2) disks of a bed that is large enough, and
-    the bed must have 2.2 times as many.  Both factors are measured: beds in the lower half of a
-    square box at a packing of 0.5, M from 10 to 50, xi from 0.3 to 0.8, radius ratios from 2 to 10
-    and f = 0.1.
+    About 3.4 M (1/f - 1) / (1 - xi^2) disks of a sufficiently large bed are hit, and the bed must
+    contain 2.2 times this number.  Both factors were measured for beds in the lower half of a
+    square box at a packing fraction of 0.5, M from 10 to 50, xi from 0.3 to 0.8, radius ratios from
+    2 to 10 and f = 0.1.
 
     Parameters
     ----------
     mass_ratio : float
-        M, mass of the projectile over that of a bed disk
+        M, mass of the projectile divided by the mass of a bed disk
     restitution : float
         xi, below 1
     fraction : float
-        f, share of the energy at which the run ends
+        f, fraction of the initial energy at which the run ends
 
     Returns
     -------
     float
-        number of disks; infinite for elastic disks, or where the run does not end by its energy
+        number of disks; infinite for elastic disks, or if the run does not end by its energy
 
     Examples
     --------
@@ -162,7 +162,7 @@ def enough_disks(mass_ratio: float, restitution: float, fraction: float) -> floa
 
 
 def projectile(run: Run) -> int:
-    """Find the projectile.
+    """Find the projectile of a run.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def projectile(run: Run) -> int:
     60
     """
     if run.n_disks < 2:
-        raise Refused(f"{run.path}: holds one disk; a crater needs a projectile and a bed")
+        raise Refused(f"{run.path}: contains one disk; a crater requires a projectile and a bed")
     if "projectile" in run.names:
         return int(np.flatnonzero(run.of_species("projectile"))[0])
     moving = np.flatnonzero(run.speed(0) > 0)
@@ -195,7 +195,7 @@ def projectile(run: Run) -> int:
 
 
 def bed(run: Run) -> np.ndarray:
-    """Return which disks belong to the bed.
+    """Return the disks that belong to the bed.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def bed(run: Run) -> np.ndarray:
 
 
 def displaced(run: Run, frame: int = -1) -> np.ndarray:
-    """Return which disks of the bed are farther than their radius from their first position.
+    """Return the bed disks that are further than their radius from their first position.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def displaced(run: Run, frame: int = -1) -> np.ndarray:
 
 
 def crater(run: Run) -> Crater:
-    """Measure the crater in the last frame.
+    """Measure the crater in the last frame of a run.
 
     Parameters
     ----------
@@ -251,12 +251,12 @@ def crater(run: Run) -> Crater:
     Returns
     -------
     Crater
-        its sizes by several definitions, and how the run ended
+        the sizes according to several definitions, and the end of the run
 
     Raises
     ------
     Refused
-        if something else than a projectile moves the bed
+        if the bed is moved by anything except a projectile
 
     Examples
     --------
@@ -264,10 +264,10 @@ def crater(run: Run) -> Crater:
     >>> size.hit > 5, size.energy_left <= 0.1
     (True, True)
     """
-    law = "a crater is what a projectile does to a bed that lies still without it"
+    law = "a crater requires a bed that is at rest without the projectile"
     allow(run, law, *QUIET)
     if run.event_count is None:
-        raise RunError(f"{run.path}: has no collisions per disk")
+        raise RunError(f"{run.path}: does not contain the collisions of each disk")
     moved, lying, outline = displaced(run), bed(run), hole(run)
     start = run.position[0]
     rim = np.max((start[:, 1] + run.radius)[lying])
@@ -287,7 +287,7 @@ def crater(run: Run) -> Crater:
 
 
 def hole(run: Run) -> np.ndarray:
-    """Return the outline of the largest region in which half of the bed's packing is gone.
+    """Return the outline of the largest region with less than half of the bed's packing.
 
     Parameters
     ----------
@@ -320,7 +320,7 @@ def area(ring: np.ndarray) -> float:
 
 
 def packing_field(run: Run, frame: int, cells: int = 240) -> tuple[np.ndarray, ...]:
-    """Return the area fraction smoothed over a few disks: x and y of the cells, values (y, x)."""
+    """Return x and y of grid cells and the area fraction (y, x), smoothed over a few disks."""
     here = bed(run)
     side = run.edges.max() / cells
     shape: Any = np.maximum(1, np.round(run.edges / side)).astype(int)

@@ -1,10 +1,10 @@
-"""Fields of a run in its steady state, in the cells of a grid, and the profiles between two walls.
+"""Fields of runs in a steady state on a grid of cells, and profiles between two walls.
 
-The docstring of post/fields.py defines the fields.  Their errors are those of the jackknife over
-blocks of time of all runs; a block is so long that its start and its end are independent.  The
-jackknife also removes a bias: a temperature relative to a flow that was estimated from the same n
-values is too small by 1 / n.  Blocks of unequal weight are treated as in Busing, Meijer and van der
-Leeden, Stat. Comput. 9, 3 (1999).  C cells, G blocks.
+The docstring of post/fields.py defines the fields.  Errors are computed by the jackknife over
+blocks of time of all runs.  A block is so long that its start and its end are independent.  The
+jackknife also removes a bias: if the flow is estimated from the same n values as the temperature,
+the temperature relative to this flow is too small by the fraction 1 / n.  Blocks of unequal weight
+are treated as in Busing, Meijer and van der Leeden, Stat. Comput. 9, 3 (1999).  C cells, G blocks.
 """
 
 from collections.abc import Callable
@@ -32,21 +32,21 @@ __all__ = [
 ]
 
 MOST_BLOCKS = 16  # largest number of blocks of a run
-FEWEST_BLOCKS = 3  # smallest number of blocks of all runs, for an error
-FEWEST_DISKS = 3  # smallest number in a cell without any one block, for kT, stress and heat
-LONG = 1.5  # memories in a block
-POINTS = 1 << 16  # in a box with obstacles, to find where centres can be
-ACROSS = SIDES[:2], SIDES[2:]  # the two sides across each axis
-#: Traits that a gas between two walls may have where the theory applies.
+FEWEST_BLOCKS = 3  # smallest number of blocks of all runs that is required for an error
+FEWEST_DISKS = 3  # fewest disks in a cell without any one block, for kT, stress, heat
+LONG = 1.5  # length of a block in units of the statistical inefficiency
+POINTS = 1 << 16  # used with obstacles to find the accessible area
+ACROSS = SIDES[:2], SIDES[2:]  # the two sides perpendicular to each axis
+#: Traits of gases between two walls to which the theory applies.
 LAWFUL = {"walls", "thermal_walls", "unequal_temperatures", "sliding_surfaces"}
 Cells = tuple[int, int]
 
 
 class Fluxes(NamedTuple):
-    """Fluxes from one wall to the opposite one, per length and time."""
+    """Fluxes from one wall to the opposite wall, per length and time."""
 
     pressure: Any  # momentum along the axis; a number or an `Estimate`
-    shear: Any  # momentum along the walls; likewise
+    shear: Any  # momentum along the walls; a number or an `Estimate`
     energy: Any
 
 
@@ -59,24 +59,24 @@ class Block(NamedTuple):
 
     @property
     def start(self) -> float:
-        """The time of its first frame."""
+        """The time of the first frame of the block."""
         return float(self.run.time[self.frames[0]])
 
 
 class Members(NamedTuple):
-    """Pseudo-values of the jackknife (G, ...), as if each block had been measured alone."""
+    """Pseudo-values of the jackknife (G, ...), one for each block."""
 
     values: np.ndarray
-    share: np.ndarray  # share of the sample that lies in the block
+    share: np.ndarray  # fraction of the sample that is in the block
 
     def mean(self) -> np.ndarray:
-        """Return the mean; NaN where fewer than two blocks have data."""
+        """Return the mean, or NaN if fewer than two blocks contain data."""
         seen = self.share > 0
         mean = np.sum(self.share * np.where(seen, self.values, 0), axis=0)
         return np.where(seen.sum(axis=0) > 1, mean, np.nan)
 
     def rests(self) -> np.ndarray:
-        """Return deviations (G, ...) whose squares add up to the square of the standard error."""
+        """Return deviations (G, ...), the sum of whose squares is the squared standard error."""
         seen = self.share > 0
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.sqrt(self.share / (1 - self.share) / seen.sum(axis=0))
@@ -97,7 +97,7 @@ class Members(NamedTuple):
 def jackknife(
     of: Callable[[np.ndarray], np.ndarray], sums: np.ndarray, weights: np.ndarray
 ) -> Members:
-    """Return the pseudo-values of a function of sums over blocks, each (G, ...) with its weight."""
+    """Return the pseudo-values (G, ...) of a function of sums over blocks, with their weights."""
     with np.errstate(divide="ignore", invalid="ignore"):
         total = sums.sum(axis=0)
         rest = np.stack([of(total - one) for one in sums])
@@ -109,20 +109,20 @@ def jackknife(
 
 
 def steady_frames(run: Run, skip: float | None) -> list[int]:
-    """Return the frames after `skip` collisions per disk, else those of the second half."""
+    """Return the frames after `skip` collisions per disk, by default those of the second half."""
     if any(side.get("motion") in ("constant_velocity", "piston") for side in run.sides):
-        why = "has a side that leaves its place (motion), fields are those of cells that stay"
+        why = "has a side that moves away from its position (motion); fields require fixed cells"
         raise Refused(f"{run.path}: {why}")
     start = run.time[-1] / 2 if skip is None else after_start(run, skip)
     frames = np.flatnonzero(run.time >= start).tolist()
     if len(frames) < FEWEST_BLOCKS:
-        few = f"has {len(frames)} frames in the steady state; it takes {FEWEST_BLOCKS}"
+        few = f"has {len(frames)} frames in the steady state; at least {FEWEST_BLOCKS} are required"
         raise RunError(f"{run.path}: {few}")
     return frames
 
 
 def own_motion(run: Run, frames: list[int]) -> np.ndarray:
-    """Return velocities (F, N, 2) relative to the sheared profile, and to a centre that walks."""
+    """Return velocities (F, N, 2) relative to the shear flow and to a driven centre of mass."""
     v = run.velocity[frames]
     if run.shear_rate:
         height = run.position[frames][..., 1] - run.lower[1]
@@ -135,7 +135,8 @@ def own_motion(run: Run, frames: list[int]) -> np.ndarray:
 def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
     """Return the largest statistical inefficiency of slow quantities, in frames.
 
-    These are mass, momentum and energy, in total and in their longest waves across the cells.
+    These quantities are mass, momentum and energy: their totals and their Fourier components of the
+    longest wavelengths across the cells.
     """
     place, v = (run.position[frames] - run.lower) / run.edges, own_motion(run, frames)
     waves, found = [np.ones(place.shape[:2])], 1.0
@@ -146,16 +147,16 @@ def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
         for amount in (1.0, v[..., 0], v[..., 1], np.sum(v**2, axis=-1)):
             parts = run.mass * amount * wave
             series = parts.sum(axis=1)
-            if np.ptp(series) > 1e-9 * np.mean(np.abs(parts).sum(axis=1)):  # else it is kept
+            if np.ptp(series) > 1e-9 * np.mean(np.abs(parts).sum(axis=1)):  # else conserved
                 found = max(found, statistical_inefficiency(series))
     return found
 
 
 def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[Block], float]:
-    """Return the blocks of the steady state of all runs, and the largest `kinship` to be expected.
+    """Return the blocks of the steady state of all runs, and the largest expected `kinship`.
 
-    The latter is the kinship of means over parts of a series with the autocorrelation exp(-t).  It
-    is NaN if there are too few blocks for an error.
+    The largest expected kinship is that of means over parts of a series with the autocorrelation
+    exp(-t).  It is NaN if there are too few blocks for an error.
     """
     refuse_others(runs)
     steady = [steady_frames(run, skip) for run in runs]
@@ -169,22 +170,23 @@ def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[B
         blocks += [Block(run, list(p), run.time[end]) for p, end in zip(parts, ends, strict=True)]
     if size < FEWEST_BLOCKS:
         return blocks, np.nan
-    t = 2 * length / counts  # in times in which the series falls by 1 / e
+    t = 2 * length / counts  # in units of the decay time of the autocorrelation
     alike = np.expm1(-t) ** 2 / (t + np.expm1(-t))
     return blocks, float(np.sum(alike * (counts - 1)) / size)
 
 
 def kinship(members: Members, blocks: list[Block], most: float) -> np.ndarray:
-    """Return twice the products of neighbouring blocks over the squares, (F,) of fields (G, F, C).
+    """Return the correlation of neighbouring blocks, (F,), of fields (G, F, C).
 
-    It is limited to 0 ... `most` and averaged over all cells, because few blocks of one cell do not
-    determine it.
+    The result is twice the sum of products of neighbouring blocks over the sum of squares.  It is
+    limited to the range from 0 to `most`, and averaged over all cells, because the few blocks of a
+    single cell do not determine it.
     """
     size, same = len(blocks), [a.run is b.run for a, b in pairwise(blocks)]
     rest = np.nan_to_num(members.rests())
     square = np.maximum(np.sum(rest**2, axis=(0, 2)), np.finfo(float).tiny)
     product = np.sum((rest[1:] * rest[:-1])[same], axis=(0, 2)) / square
-    unbiased = product * (size - 1) / size + sum(same) / size**2  # the mean is their own
+    unbiased = product * (size - 1) / size + sum(same) / size**2  # about their own mean
     return np.clip(2 * unbiased, 0, most) + 0 * most
 
 
@@ -192,7 +194,7 @@ def kinship(members: Members, blocks: list[Block], most: float) -> np.ndarray:
 
 
 def reach(run: Run, cells: Cells, axis: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the range of the centres of disks along an axis, in each cell: start and end."""
+    """Return start and end of the accessible range of centres along an axis in each cell."""
     gap = 0 if run.periodic[axis] else radius
     sides = np.linspace(0, run.edges[axis], cells[axis] + 1)
     sides = run.lower[axis] + sides.clip(gap, run.edges[axis] - gap)
@@ -212,7 +214,7 @@ def places(run: Run, cells: Cells) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        (C, 2) centres [length], along x first
+        (C, 2) centres [length]; x varies fastest
 
     Examples
     --------
@@ -224,7 +226,7 @@ def places(run: Run, cells: Cells) -> np.ndarray:
 
 
 def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
-    """Return the area (C,) where centres of disks can be; beside obstacles to 0.5 % of a cell."""
+    """Return the area (C,) accessible to centres, accurate to 0.5 % of a cell beside obstacles."""
     spans, inner = [], []
     step = np.sqrt(run.edges.prod() / POINTS)
     for k in (0, 1):
@@ -255,11 +257,11 @@ def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
 
 
 def sums(block: Block, cells: Cells, areas: list[np.ndarray], own: np.ndarray) -> np.ndarray:
-    """Return sums (12, C) over those disks, a mask (N,), of some frames in each cell.
+    """Return sums (12, C) over the disks of a mask (N,) in each cell in the given frames.
 
-    They are the numbers of frames and of disks, disks per area, and the sums of m, m v, m v v (xx,
-    xy, yy), m v^2 v / 2 and I omega^2.  In a sheared box v is relative to the profile; where noise
-    moves the centre of mass, v is relative to that.
+    The sums are the number of frames, the number of disks, disks per area, and the sums of m, m v,
+    m v v (xx, xy, yy), m v^2 v / 2 and I omega^2.  In a sheared box v is relative to the shear
+    flow.  If noise moves the centre of mass, v is relative to the centre of mass.
     """
     run, frames, _ = block
     place = run.position[frames][:, own].reshape(-1, 2) - run.lower
@@ -286,10 +288,11 @@ BY_FRAMES = np.array([name.startswith(("density", "stress", "heat")) for name in
 
 
 def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
-    """Return the fields (12, C) that follow from `sums`; NaN where there are no disks.
+    """Return the fields (12, C) that follow from `sums`; NaN in cells without disks.
 
-    Cells with fewer than `FEWEST_DISKS` have no kT, stress or heat flux.  A flow that changes by g
-    h across a cell contributes m (g h)^2 / 12 to m v v, which is subtracted.
+    In cells with fewer than `FEWEST_DISKS` disks, kT, stress and heat flux are NaN.  A flow that
+    changes by g h across a cell contributes m (g h)^2 / 12 to m v v; this contribution is
+    subtracted.
     """
     frames, n, dense, mass, mx, my, xx, xy, yy, qx, qy, turning = total
     u, v, density = mx / mass, my / mass, dense / frames
@@ -317,14 +320,14 @@ class Fields(NamedTuple):
     """Fields of runs of one input."""
 
     found: dict[str, Estimate]  # (C,) by name
-    values: dict[str, np.ndarray]  # (G, C) as if each block had been measured alone
-    disks: np.ndarray  # (C,) counted in each cell
+    values: dict[str, np.ndarray]  # (G, C) pseudo-values of the blocks
+    disks: np.ndarray  # (C,) number counted in each cell
     blocks: list[Block]
-    kinship: dict[str, float]  # of the blocks, by name; NaN without errors
+    kinship: dict[str, float]  # correlation of neighbouring blocks by name; NaN without errors
 
 
 def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | None = None) -> Fields:
-    """Measure density, flow, temperature, stress and heat flux in cells, over the steady state.
+    """Measure density, flow, temperature, stress and heat flux in cells in the steady state.
 
     Parameters
     ----------
@@ -335,18 +338,18 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     cells : tuple of int
         numbers of cells along x and y
     species : str, optional
-        the only species that is measured; its kT is relative to its own flow [all disks]
+        name of the species whose disks are measured; kT is relative to its flow [all disks]
 
     Returns
     -------
     Fields
-        means and errors over blocks of time of all runs; NaN in cells where fewer than two
-        blocks had a disk
+        means and errors over blocks of time of all runs; NaN in cells that contain disks in fewer
+        than two blocks
 
     Raises
     ------
     RunError
-        if a run has too few frames, or a side that leaves its position
+        if a run has too few frames, or a side that moves away from its position
 
     Examples
     --------
@@ -361,7 +364,8 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     parts = np.stack([sums(block, cells, areas, own) for block in blocks])
     weights = parts[:, np.where(BY_FRAMES, 0, 1)]
     values, share = jackknife(lambda total: of_sums(total, run, cells), parts, weights)
-    # All disks share what the conserved motion of them all does not have (docs/theory.md).
+    # The conserved motion of the centre of mass reduces the thermal energy of all disks
+    # (docs/theory.md).
     values[:, NAMES.index("temperature")] *= run.n_disks / free_disks(run)
     for axis, name in enumerate(("kT_x", "kT_y")):
         values[:, NAMES.index(name)] *= run.n_disks / (run.n_disks - comoving(run)[axis])
@@ -370,7 +374,7 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     mean, error = members.estimate(near[:, None])
     frames, disks = parts[:, :2].sum(axis=0)
     room = np.max(areas, axis=0)
-    unseen = (disks == 0) & (room > 0)  # where there may be one
+    unseen = (disks == 0) & (room > 0)  # an error requires at least two blocks
     error[0, unseen] += 1 / (frames * room)[unseen]
     turns = "angular_velocity" in run.disk_data
     names = {n: k for k, n in enumerate(NAMES) if turns or n != "rotational_temperature"}
@@ -387,7 +391,7 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
 
 
 def gained(block: Block, name: str) -> np.ndarray:
-    """Return by how much a sum over collisions has grown in a block."""
+    """Return the increase of a cumulative observable during a block."""
     time, value = block.run.observable(name)
     if len(time) < 2:
         raise RunError(f"{block.run.path}: too few observables in the steady state")
@@ -396,7 +400,7 @@ def gained(block: Block, name: str) -> np.ndarray:
 
 
 def fluxes(blocks: list[Block], axis: int) -> Members:
-    """Return the `Fluxes` (G, 3) from the impulses and energies that both walls received."""
+    """Return the `Fluxes` (G, 3) from the momentum and energy transferred to both walls."""
     run, (near, far) = blocks[0].run, ACROSS[axis]
     length = 2 * run.edges[1 - axis]
     parts = []
@@ -413,11 +417,11 @@ def fluxes(blocks: list[Block], axis: int) -> Members:
 def expected(
     run: Run, axis: int, x: np.ndarray, flux: Fluxes, middle: tuple[float, float]
 ) -> np.ndarray:
-    """Integrate flow along the walls, kT and density (P, 3) from the middle to the positions x.
+    """Integrate flow along the walls, kT and density (P, 3) from the middle to positions x.
 
     The pressure is uniform; dT/dx = -(energy - shear u) / conductivity, du/dx = -shear / viscosity.
-    Raises ValueError if a gas of these fluxes would need a negative temperature, or a density
-    beyond that of close packing.
+    Raises ValueError if a gas with these fluxes would require a negative temperature or a density
+    above close packing.
     """
     diameter, mass = 2 * run.radius[0], run.mass[0]
     per_disk = np.pi * diameter**2 / 4
@@ -451,7 +455,7 @@ def expected(
 
 
 def has_theory(runs: list[Run], axis: int) -> bool:
-    """Tell whether Enskog's theory applies to the gas between two opposite walls.
+    """Determine whether Enskog's theory applies to the gas between two opposite walls.
 
     Parameters
     ----------
@@ -463,7 +467,7 @@ def has_theory(runs: list[Run], axis: int) -> bool:
     Returns
     -------
     bool
-        whether there are two such walls, and smooth elastic disks of one species
+        whether two such walls exist and the disks are smooth, elastic and of one species
 
     Examples
     --------
@@ -478,7 +482,7 @@ def has_theory(runs: list[Run], axis: int) -> bool:
 def prediction(
     measured: Fields, axis: int, x: np.ndarray
 ) -> tuple[dict[str, Estimate] | None, Fluxes]:
-    """Predict profiles between two walls from the measured fluxes, by Enskog's theory.
+    """Predict profiles between two walls from the measured fluxes with Enskog's theory.
 
     Parameters
     ----------
@@ -494,12 +498,12 @@ def prediction(
     profiles : dict of str to Estimate or None
         (P,) "flow", "temperature" and "density"; None if no gas has such fluxes
     fluxes : Fluxes
-        pressure, shear stress and heat flux that were measured at the walls
+        pressure, shear stress and heat flux measured at the walls
 
     Raises
     ------
     RunError
-        if there are no disks in the middle
+        if there are too few disks in the middle
 
     Examples
     --------
@@ -514,7 +518,7 @@ def prediction(
     weight = measured.disks[cells] / measured.disks[cells].sum()
     middle = np.stack([measured.values[name][:, cells] @ weight for name in names], axis=1)
     if not np.all(np.isfinite(middle)):
-        raise RunError(f"{run.path}: too few disks in the middle; take fewer --cells")
+        raise RunError(f"{run.path}: too few disks in the middle; use fewer --cells")
     flux = fluxes(measured.blocks, axis)
     share = flux.share[:, :1]
     given = Members(np.hstack([flux.values, middle]), np.tile(share, 5))

@@ -1,4 +1,4 @@
-"""The true paths of disks between frames, from the event log: free flights between collisions."""
+"""Exact paths of disks between frames, from the event log: free flights between collisions."""
 
 from typing import NamedTuple
 
@@ -9,34 +9,34 @@ from ..reading.reader import EventLog, Run
 
 
 class Turns(NamedTuple):
-    """Velocities after collisions, ordered by frame, then by disk, then by time."""
+    """Velocities after collisions, sorted by frame, then by disk, then by time."""
 
-    frame: np.ndarray  # (M,) which of the frames comes before
+    frame: np.ndarray  # (M,) index of the previous frame
     disk: np.ndarray  # (M,) indices
     time: np.ndarray  # (M,)
     velocity: np.ndarray  # (M, 2) afterwards
 
 
 def why_unknown(run: Run, log: EventLog) -> str:
-    """Return why the log does not determine the paths between frames; empty if it does."""
+    """Return the reason why the log does not determine the paths; empty if it does."""
     if log.momentum_change is None:
         return "the log has no momentum_change"
     if run.nature & KICKED:
-        return "kicks bend the paths between"
+        return "the driving bends the paths between"
     return "images slide" if run.shear_rate else ""
 
 
 def seen(run: Run, log: EventLog, frames: list[int]) -> np.ndarray:
-    """Return how many events (T,) of the log precede each frame."""
+    """Return the number of events (T,) of the log before each frame."""
     if run.event_count is None:
         return np.searchsorted(log.time, run.time[frames], "right")
-    # This is clear even if several events have the same time.
+    # The number is unambiguous even if several events have the same time.
     hits = run.event_count[frames].sum(axis=1, dtype=np.int64)
     return np.searchsorted(np.cumsum(1 + (log.j > 0)), hits, "right")
 
 
 def turns_between(run: Run, log: EventLog, frames: list[int], ends: np.ndarray) -> Turns:
-    """Return all collisions between these frames; `ends` are the event numbers of the frames."""
+    """Return all collisions between these frames; `ends` are the numbers of events before each."""
     if log.momentum_change is None:
         raise ValueError("the log has no momentum_change")
     some = slice(ends[0], ends[-1])
@@ -49,7 +49,7 @@ def turns_between(run: Run, log: EventLog, frames: list[int], ends: np.ndarray) 
     signs = np.where(order < len(i), 1, -1)[:, None]
     event, disk, frame = event[order] + ends[0], disk[order], frame[order]
     gain = signs * log.momentum_change[event] / run.mass[disk, None]
-    # Sums that begin anew with each disk and each frame.
+    # Cumulative sums that are reset for each disk and each frame.
     first = np.flatnonzero(np.diff(frame * run.n_disks + disk, prepend=-1))
     sums = np.cumsum(gain, axis=0)
     sums -= np.repeat(sums[first] - gain[first], np.diff(first, append=len(disk)), axis=0)
