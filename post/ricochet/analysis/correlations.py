@@ -180,7 +180,7 @@ class Correlator:
             int, tuple[np.ndarray, np.ndarray, int]
         ] = {}  # by sample: position, velocity, last partner
         self.due: dict[int, list[tuple[int, int]]] = {}  # by sample: (origin, lag)
-        self.last = np.full(len(self.lags), -1.0)  # interval of each lag that contained its last origin
+        self.last = np.full(len(self.lags), -1.0)  # slot of its last origin
 
     def follow(self, source: Run | Simulation) -> Self:
         """Add the missing samples of a run, which may be unfinished, or of a simulation."""
