@@ -1,4 +1,4 @@
-!> Circular obstacles. Disks are outside, or are enclosed inside.
+!> Circular obstacles. The disks are outside of the circle, or the circle encloses the disks.
 module circles
   use free_flight, only: time_to_circle
   use kinds, only: pi, real64
@@ -21,7 +21,7 @@ module circles
 
 contains
 
-  !> The circle with this centre and radius. `encloses`: the disks are inside.
+  !> The circle with the given centre and radius. With `encloses` the disks are inside the circle.
   pure function new_circle(centre, radius, encloses) result(circle)
     real(real64), intent(in) :: centre(2)       !! [length]
     real(real64), intent(in) :: radius          !! [length]
@@ -35,7 +35,7 @@ contains
     circle%area = pi*radius**2
   end function new_circle
 
-  !> Distance between the two centres at contact.
+  !> Distance between the centres of the circle and of a disk at contact.
   pure function distance_at_contact(self, radius) result(rho)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: radius          !! radius of the disk [length]

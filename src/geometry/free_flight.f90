@@ -1,17 +1,19 @@
 !> Kinematics of free flight as pure functions: the position of a disk after some time, and the time until it touches a line or a
-!> circle. Times count from the state that is passed in. Contacts of two disks are predicted in `neighbour_search`.
+!> circle. Times are relative to the time of the state that is passed as argument. Contacts of two disks are predicted in
+!> `neighbour_search`.
 module free_flight
   use kinds, only: never, real64
   implicit none
   private
   public :: flight, flight_velocity, time_to_line, time_to_circle, slowest
 
-  !> Speeds below this value count as rest, because times would overflow. [length/time]
+  !> Speeds below this value are treated as zero, because times would overflow. [length/time]
   real(real64), parameter :: slowest = 1/never
 
   !> Relative margin above all rounding errors, for a test that may only err in one direction.
   real(real64), parameter :: spare = 1.0e-6_real64
-  integer, parameter :: most_halvings = 3   !! how often a time interval is halved, to bound the distance in each part
+  integer, parameter :: most_halvings = 3   !! largest number of times that an interval is halved to obtain a bound on the distance
+                                            !! in each part
 
 contains
 
@@ -37,7 +39,7 @@ contains
   !> Time until a line at `distance` ahead is crossed in the forward direction; `never` if it is not crossed.
   !> Each branch uses the form of the root of the quadratic that is free of cancellation.
   pure function time_to_line(distance, speed, acceleration) result(s)
-    real(real64), intent(in) :: distance      !! along the normal; negative if the line is behind [length]
+    real(real64), intent(in) :: distance      !! distance to the line along its normal; negative if the line is behind [length]
     real(real64), intent(in) :: speed         !! along the normal [length/time]
     real(real64), intent(in) :: acceleration  !! along the normal [length/time**2]
     real(real64) :: s, root
@@ -60,15 +62,16 @@ contains
     end if
   end function time_to_line
 
-  !> Time until the centre of a disk reaches a circle of radius rho around the origin, from outside or, with `inside`, from
-  !> inside. Zero if the disk is already on the circle (or beyond it, by rounding) and moves further.
+  !> Time until the centre of a disk reaches a circle of radius rho around the origin, from outside or, with `inside`, from inside.
+  !> The result is 0 if the disk is already on the circle, or beyond the circle because of rounding, and moves further in this
+  !> direction.
   pure function time_to_circle(d, v, g, rho, inside, within) result(s)
-    real(real64), intent(in) :: d(2)      !! centre of the disk relative to that of the circle [length]
+    real(real64), intent(in) :: d(2)      !! centre of the disk relative to the centre of the circle [length]
     real(real64), intent(in) :: v(2)      !! [length/time]
     real(real64), intent(in) :: g(2)      !! [length/time**2]
     real(real64), intent(in) :: rho       !! [length]
     logical, intent(in) :: inside
-    real(real64), intent(in), optional :: within      !! contacts later than this may come out as `never` [time]
+    real(real64), intent(in), optional :: within      !! for contacts later than this time the result may be `never` [time]
     real(real64) :: s, b, c, speed2, disc
 
     s = never
@@ -96,16 +99,17 @@ contains
     end if
   end function time_to_circle
 
-  !> Whether a falling point certainly does not enter a circle around the origin for some time. The point may start on the
-  !> circle. Its squared distance minus the squared radius is a quartic in time. A polynomial is never below the smallest of
-  !> its Bernstein coefficients, and the coefficients approach its values as the interval is halved.
+  !> Whether a falling point certainly does not enter a circle around the origin during a given time. The point may start on the
+  !> circle. The squared distance of the point minus the squared radius is a quartic polynomial in time. A polynomial is never below
+  !> the smallest of its Bernstein coefficients. The coefficients converge to the values of the polynomial when the interval is
+  !> halved repeatedly.
   pure function misses_circle(d, v, g, rho, within) result(yes)
     real(real64), intent(in) :: d(2), v(2), g(2), rho, within
     logical :: yes
     real(real64) :: c(0:4), step(4), slack
 
     yes = .false.
-    if (within > sqrt(never)) return                   ! the path may be too long for a number
+    if (within > sqrt(never)) return                   ! the length of the path may overflow
     step(1) = 0.5_real64*within*(d(1)*v(1) + d(2)*v(2))
     step(2) = within**2*((v(1)*v(1) + v(2)*v(2)) + (d(1)*g(1) + d(2)*g(2)))/6
     step(3) = 0.25_real64*within**3*(v(1)*g(1) + v(2)*g(2))
@@ -120,7 +124,8 @@ contains
 
   contains
 
-    !> Whether the quartic with these Bernstein coefficients is positive; `from_start`: except at its start.
+    !> Whether the quartic with the given Bernstein coefficients is certainly positive in the interval. With `from_start` the start
+    !> of the interval is excluded.
     pure recursive function is_positive(c, from_start, halvings) result(yes)
       real(real64), intent(in) :: c(0:4)
       logical, intent(in) :: from_start
@@ -139,10 +144,10 @@ contains
     end function is_positive
   end function misses_circle
 
-  !> The same on a parabola. F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic. It is monotonic between the roots of F', which in
-  !> turn are bracketed by the roots of the quadratic F''. Each root is therefore found by bisection in an interval that contains
-  !> exactly one root, and the first contact cannot be missed. F itself is evaluated from the actual position, so that a small
-  !> circle is not lost in the square of its distance.
+  !> The same as `time_to_circle`, for a disk on a parabolic path. F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic. It is
+  !> monotonic between the roots of F', which in turn are bracketed by the roots of the quadratic F''. Each root is therefore found
+  !> by bisection in an interval that contains exactly one root, and the first contact cannot be missed. F itself is evaluated from
+  !> the actual position, so that the squared radius of a small circle is not lost in rounding.
   pure function time_to_circle_falling(d, v, g, rho, inside) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside
@@ -222,7 +227,7 @@ contains
     bound = scale(2.0_real64, power)
   end function root_bound
 
-  !> The root of a cubic between lo and hi, where it has one change of sign. Found by bisection to the last bit.
+  !> The root of a cubic between lo and hi, where the cubic changes its sign once. The root is found by bisection to the last bit.
   pure function root_between(cubic, lo, hi) result(s)
     real(real64), intent(in) :: cubic(0:3), lo, hi
     real(real64) :: s, left, right

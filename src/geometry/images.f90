@@ -1,8 +1,8 @@
-!> Periodic images of the box: their displacements and velocities. Used by the search, the start, obstacles and collisions.
-!>
-!> In a sheared box (Lees and Edwards, J. Phys. C 5, 1921 (1972)) the image above moves along x. The position of an image depends on
-!> the time alone: it follows from its displacement at the epoch and its velocity. The separation of two disks through an image is
-!> therefore a function of their states and of the time.
+!> Periodic images of the box: their displacements and velocities. The search, the placement of disks, obstacles and collisions use
+!> this module.
+!>  In a sheared box (Lees and Edwards, J. Phys. C 5, 1921 (1972)) the image above the box moves along x. The position of an image
+!> depends on the time alone: it follows from its displacement at the epoch and its velocity. The separation of two disks through an
+!> image is therefore a function of their states and of the time.
 module images
   use kinds, only: never, real64
   implicit none
@@ -15,13 +15,13 @@ module images
     real(real64) :: velocity = 0.0_real64       !! velocity of the image along x [length/time]
   end type image_t
 
-  !> All images of the box. An image has an index along each axis: (0, 0) is the box itself, (0, 1) the image above. Indices are
-  !> integers stored as reals, because disks may be any number of periods apart.
+  !> All images of the box. An image has an index along each axis: (0, 0) is the box itself, (0, 1) the image above the box. Indices
+  !> are integers stored as reals, because disks may be any number of periods apart.
   type :: images_t
     real(real64) :: period(2) = never           !! `never` along axes with walls [length]
-    real(real64) :: velocity = 0.0_real64       !! velocity of the image above [length/time]
-    real(real64) :: offset = 0.0_real64         !! displacement of that image at the epoch, modulo the period [length]
-    real(real64) :: removed_periods = 0.0_real64  !! number of periods removed from it
+    real(real64) :: velocity = 0.0_real64       !! velocity of the image above the box [length/time]
+    real(real64) :: offset = 0.0_real64         !! displacement of the image above the box at the epoch, modulo the period [length]
+    real(real64) :: removed_periods = 0.0_real64  !! number of periods by which `offset` has been reduced
   contains
     procedure :: count => count_around
     procedure :: around
@@ -36,8 +36,8 @@ module images
 
 contains
 
-  !> The images of a box whose image above is displaced by velocity*t at the time t of the run. The clocks count from `epoch`.
-  !> The displacement is reduced modulo the period without rounding error, so that late times are as precise as early ones.
+  !> The images of a box, for clocks relative to `epoch`. The image above the box is displaced by velocity*t at the time t of the
+  !> run. The displacement is reduced modulo the period without rounding error, so that late times are as precise as early ones.
   pure function moving_images(period, velocity, epoch) result(images)
     real(real64), intent(in) :: period(2)       !! [length]
     real(real64), intent(in) :: velocity        !! [length/time]
@@ -56,17 +56,17 @@ contains
     end associate
   end function moving_images
 
-  !> Splits a number into two with half the digits each. Products of such halves are exact.
+  !> Splits a number into a sum of two numbers, each with half of its digits. Products of such numbers are exact.
   pure function halves(x)
     real(real64), intent(in) :: x
     real(real64) :: halves(2)
-    integer, parameter :: half = 26             ! of 53 binary digits
+    integer, parameter :: half = 26             ! half of the 53 binary digits of a double
 
     halves(1) = scale(aint(scale(fraction(x), half)), exponent(x) - half)
     halves(2) = x - halves(1)
   end function halves
 
-  !> Number of images in reach, including the box itself.
+  !> Number of images in reach (see `reach`), including the box itself.
   pure function count_around(self) result(n)
     class(images_t), intent(in) :: self
     integer :: n
@@ -87,7 +87,7 @@ contains
   !> Index of the k-th image in reach, in the order of rows.
   pure function around(self, k, now) result(number)
     class(images_t), intent(in) :: self
-    integer, intent(in) :: k                    !! counted from 1
+    integer, intent(in) :: k                    !! number of the image, which starts at 1
     real(real64), intent(in), optional :: now   !! since the epoch; needed in a sheared box [time]
     real(real64) :: number(2)
     integer :: reach(2)
@@ -100,7 +100,7 @@ contains
       number(1) = number(1) - anint(self%displacement(number(2), now)/self%period(1))
   end function around
 
-  !> Displacement along x of the image `rows` above.
+  !> Displacement along x of the image that is `rows` periods above the box.
   pure function displacement(self, rows, now)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: rows
@@ -110,7 +110,8 @@ contains
     displacement = rows*(self%offset + self%velocity*now)
   end function displacement
 
-  !> Time until which only the images in reach now, and images displaced from these by up to `distance`, have to be considered.
+  !> Time until which it is sufficient to consider the images that are in reach now, and images displaced from these by up to
+  !> `distance`.
   pure function valid_until(self, now, distance) result(t)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: now             !! [time]
@@ -123,7 +124,7 @@ contains
     if (abs(self%velocity) > farthest/never) t = now + farthest/abs(self%velocity)
   end function valid_until
 
-  !> Index of the image through which an object at the separation dx is nearest; almost always (0, 0).
+  !> Index of the image through which an object at the separation dx is nearest. The result is almost always (0, 0).
   pure function nearest_image(self, dx, now) result(number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: dx(2)           !! [length]
@@ -137,7 +138,7 @@ contains
       number(1) = -anint((dx(1) + self%displacement(number(2), now))/self%period(1))
   end function nearest_image
 
-  !> Displacement of the image with this index at the epoch.
+  !> Displacement, at the epoch, of the image with the given index.
   pure function shift(self, number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: number(2)
@@ -147,7 +148,7 @@ contains
     shift(1) = shift(1) + number(2)*self%offset
   end function shift
 
-  !> The image with this index.
+  !> The image with the given index.
   pure function image(self, number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: number(2)
@@ -156,14 +157,14 @@ contains
     image = image_t(self%shift(number), number(2)*self%velocity)
   end function image
 
-  !> Transforms the state of a disk into the frame of the image `rows` above. The disk itself does not move.
+  !> Transforms the state of a disk into the frame of the image that is `rows` periods above the box. The disk itself does not move.
   pure subroutine enter_image_frame(self, rows, clock, x, v, periods)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: rows
-    real(real64), intent(in) :: clock           !! time to which x belongs [time]
+    real(real64), intent(in) :: clock           !! time at which x is the position of the disk [time]
     real(real64), intent(inout) :: x(2)         !! [length]
     real(real64), intent(inout) :: v(2)         !! [length/time]
-    real(real64), intent(inout) :: periods(2)   !! number of periods that the disk has travelled
+    real(real64), intent(inout) :: periods(2)   !! number of periods by which the disk has moved
 
     x = x - [self%displacement(rows, clock), rows*self%period(2)]
     v(1) = v(1) - rows*self%velocity

@@ -1,8 +1,7 @@
 !> Straight walls between two points, impenetrable from both sides. Disks also collide with their ends.
-!>
-!> A disk touches the wall when its centre reaches the stadium around it: two straight sides at the distance of the radius, and two
-!> half circles around the ends. The stadium is convex. Its straight sides are therefore only entered from outside, and a disk that
-!> misses them by rounding touches a half circle at the same time.
+!>  A disk touches the wall when its centre reaches the stadium around it: two straight sides at the distance of the radius, and two
+!> half circles around the ends. The stadium is convex. The centre of a disk can therefore reach a straight side only from outside.
+!> If rounding causes a contact with a straight side to be missed, the disk touches a half circle at the same time.
 module segments
   use free_flight, only: flight, time_to_circle, time_to_line
   use images, only: images_t
@@ -42,7 +41,8 @@ contains
     if (segment%length > 0) segment%along = segment%half/segment%length
   end function new_segment
 
-  !> Tangential direction from one end to the other, projected on the tangent: around an end the surface moves more slowly.
+  !> Tangential velocity of the surface for a unit velocity along the wall: the direction from the first to the second end,
+  !> projected on the tangent. Around an end the surface therefore moves more slowly.
   pure function direction(self, normal) result(along)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: normal(2)
@@ -51,7 +51,8 @@ contains
     along = self%along - dot_product(self%along, normal)*normal
   end function direction
 
-  !> Vector from the middle of the nearest image to x. For a long wall this is not always the image whose middle is nearest.
+  !> Vector to x from the middle of the nearest periodic image of the wall. For a long wall this is not always the image whose
+  !> middle is nearest.
   pure function from_nearest(self, x, images, heading) result(d)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: x(2)
@@ -94,13 +95,13 @@ contains
 
   contains
 
-    !> Time until a disk touches one straight side, where `across` points away from the wall; `never` if it
-    !> passes beyond an end. A side is entered at most once, because its distance is a parabola in time.
+    !> Time until a disk touches one straight side, where `across` points away from the wall; `never` if the disk passes beyond an
+    !> end. A straight side is reached at most once, because the distance is a quadratic function of time.
     pure function time_to_side() result(t)
       real(real64) :: t, away, speed, fall, disc
 
       away = dot_product(d, across) - radius
-      speed = -dot_product(v, across)             ! towards the wall, like `fall`
+      speed = -dot_product(v, across)             ! positive towards the wall, like `fall`
       fall = -dot_product(g, across)
       if (away > -radius .and. abs(dot_product(d, self%along)) <= self%length) away = max(away, 0.0_real64)
       t = never
@@ -151,7 +152,8 @@ contains
     end if
   end function normal
 
-  !> Whether a disk whose centre is in a rectangle can touch the wall. Uses separating axes, without rounding the corners.
+  !> Whether a disk whose centre is in a rectangle can touch the wall. The test uses separating axes and treats the rounded corners
+  !> as square corners.
   pure function reaches(self, d, half, radius) result(yes)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -164,7 +166,7 @@ contains
       abs(dot_product(d, across)) <= dot_product(room, abs(across)) + spare*sqrt(dot_product(d, d))
   end function reaches
 
-  !> Whether the wall excludes disks from a whole rectangle. The stadium is convex, so that the corners decide.
+  !> Whether the wall excludes disks from a whole rectangle. The stadium is convex, so that it is sufficient to test the corners.
   pure function covers(self, d, half, radius) result(yes)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -174,7 +176,7 @@ contains
     yes = all([((self%gap(d + [i, j]*half, radius) < 0, i=-1, 1, 2), j=-1, 1, 2)])
   end function covers
 
-  !> Checks that the wall has a length and that both ends are in the box.
+  !> Checks that the length of the wall is positive and that both ends are in the box.
   pure function misfit(self, lower, upper, periodic) result(problem)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: lower(2), upper(2)

@@ -13,7 +13,7 @@ module shapes
   !> The outline of an obstacle. Points are given relative to its middle.
   type, abstract :: shape_t
     real(real64) :: middle(2) = 0.0_real64      !! [length]
-    logical :: encloses = .false.               !! disks are inside, not outside
+    logical :: encloses = .false.               !! the disks are inside the obstacle, not outside
     real(real64) :: extent(2) = 0.0_real64      !! half the edges of the bounding rectangle [length]
     real(real64) :: area = 0.0_real64           !! area of the obstacle or, if it encloses the disks, area inside [length**2]
   contains
@@ -28,8 +28,8 @@ module shapes
   end type shape_t
 
   abstract interface
-    !> Time until the boundary of a disk touches the outline. Zero if they touch already (or overlap by rounding)
-    !> and approach; `never` if there is no contact.
+    !> Time until the boundary of a disk touches the outline. The result is 0 if the disk already touches the outline (or overlaps
+    !> it because of rounding) and moves towards it. The result is `never` if there is no contact.
     pure function contact_time(self, d, v, g, radius, within) result(s)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -41,7 +41,7 @@ module shapes
       real(real64) :: s
     end function contact_time
 
-    !> Distance between the outline and the boundary of a disk; negative if they overlap.
+    !> Distance between the outline and the boundary of a disk; negative if the disk overlaps the outline.
     pure function gap(self, d, radius) result(length)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -57,7 +57,7 @@ module shapes
       real(real64) :: direction(2)
     end function normal
 
-    !> Whether a disk whose centre is in the rectangle d +- half can touch the outline. .true. if in doubt.
+    !> Whether a disk whose centre is in the rectangle d +- half can touch the outline; .true. if this is uncertain.
     pure function reaches(self, d, half, radius) result(yes)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -65,8 +65,8 @@ module shapes
       logical :: yes
     end function reaches
 
-    !> Whether the obstacle excludes disk centres from the whole rectangle d +- half. .false. if in doubt, but exact for a
-    !> point (half = 0).
+    !> Whether the obstacle excludes disk centres from the whole rectangle d +- half. The result is .false. if this is uncertain;
+    !> for a point (half = 0) the result is exact.
     pure function covers(self, d, half, radius) result(yes)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -74,7 +74,7 @@ module shapes
       logical :: yes
     end function covers
 
-    !> Reports why the obstacle does not fit into a box, as `variable: problem`; empty if it fits.
+    !> Reports why the obstacle does not fit into a box, as `variable: problem`. The text is empty if the obstacle fits.
     pure function misfit(self, lower, upper, periodic) result(problem)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -86,8 +86,8 @@ module shapes
 
 contains
 
-  !> Length of a vector. If the vector is multiplied by a power of two, so is the result, exactly. This does not hold for
-  !> `norm2` of gfortran, which rounds in its scaling.
+  !> Length of a vector. If the vector is multiplied by a power of two, the result is multiplied by exactly this power of two. The
+  !> function `norm2` of gfortran does not have this property, because its scaling introduces rounding errors.
   pure function magnitude(v)
     real(real64), intent(in) :: v(2)
     real(real64) :: magnitude
@@ -95,12 +95,12 @@ contains
     magnitude = sqrt(v(1)*v(1) + v(2)*v(2))
   end function magnitude
 
-  !> Vector from the middle of the nearest image to x. Obstacles that enclose disks have no images. If x is in the middle between
-  !> two images, both of which a disk may touch, `heading` selects the image from which it points away.
+  !> Vector to x from the middle of the nearest periodic image of the obstacle. Obstacles that enclose disks have no images. If x is
+  !> at equal distances from two images, a disk at x may touch both; `heading` then selects the image from which it points away.
   pure function from_nearest(self, x, images, heading) result(d)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
-    type(images_t), intent(in) :: images        !! of the box
+    type(images_t), intent(in) :: images        !! images of the box
     real(real64), intent(in), optional :: heading(2)
     real(real64) :: d(2)
     integer :: axis
@@ -115,7 +115,8 @@ contains
     end do
   end function from_nearest
 
-  !> Tangential unit vector where the outline has this normal, counter-clockwise around the middle.
+  !> Tangential unit vector at the point where the outline has the given normal. Its direction is counter-clockwise around the
+  !> middle.
   pure function direction(self, normal) result(along)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: normal(2)       !! unit vector from the outline to a disk

@@ -1,9 +1,8 @@
 !> Motion of a side of the box, and the time when it touches a disk in free flight. All quantities are components along the inner
 !> normal of the side.
-!>
-!> Where the acceleration of a disk relative to the side has a constant sign, their gap is a convex or concave function of time, and
-!> its first zero can be bracketed. A period consists of a few such intervals. No contact can therefore be missed, however long the
-!> side and the disk stay close together.
+!>  While the acceleration of a disk relative to the side has a constant sign, the gap between them is a convex or concave function
+!> of time, whose first zero can be bracketed. A period of the motion consists of a few such intervals. No contact can therefore be
+!> missed, even if the side and the disk stay close together for a long time.
 module side_motion
   use free_flight, only: flight, flight_velocity, time_to_line
   use kinds, only: never, pi, real64
@@ -14,28 +13,33 @@ module side_motion
   !> Names of the motions in the input. A motion is represented by its position in this list.
   character(len=*), parameter :: motions = "still sine parabolic sawtooth constant_velocity piston"
   integer, parameter, public :: still = 1, sine = 2, parabolic = 3, sawtooth = 4, constant_velocity = 5, piston = 6
-  real(real64), parameter :: small_angle = 0.5_real64       !! angle below which differences would suffer from cancellation [radian]
-  !> Fraction of a period. Accelerations that act for a shorter time do not change the gap within its precision.
+  real(real64), parameter :: small_angle = 0.5_real64       !! angle below which a series is used, because differences would suffer
+                                                            !! from cancellation [radian]
+  !> A time interval, as a fraction of a period. An acceleration that acts for a shorter time does not change the gap within its
+  !> precision.
   real(real64), parameter :: negligible = 1.0e-10_real64
-  integer, parameter :: intervals_in_reach = 6  !! number of intervals that is longer than a period, even if some are negligible
+  integer, parameter :: intervals_in_reach = 6  !! number of successive intervals that together exceed a period, even if some of
+                                                !! them are negligible
 
   !> The state of a piston, which changes in its collisions.
   type :: side_state_t
     real(real64) :: position = 0.0_real64            !! displacement inwards from its mean position, at `clock` [length]
     real(real64) :: velocity = 0.0_real64            !! velocity inwards, at `clock` [length/time]
-    real(real64) :: clock = 0.0_real64               !! time at which these were set, since the epoch [time]
+    real(real64) :: clock = 0.0_real64               !! time at which position and velocity were set, since the epoch [time]
   end type side_state_t
 
   type :: side_motion_t
     integer :: kind = still                          !! position in `motions`
     real(real64) :: offset = 0.0_real64              !! displacement inwards at which the motion starts [length]
-    real(real64) :: amplitude = 0.0_real64  !! amplitude; constant velocity: offset and path; piston: width of the box [length]
+    real(real64) :: amplitude = 0.0_real64  !! amplitude; for a motion at constant velocity, the offset plus the length of the path;
+                                            !! for a piston, the width of the box [length]
     real(real64) :: period = 1.0_real64              !! [time]
-    real(real64) :: phase = 0.0_real64               !! phase at t = 0, in periods
-    real(real64) :: prescribed_velocity = 0.0_real64  !! velocity inwards, of a sawtooth or constant motion [length/time]
-    real(real64) :: start_time = 0.0_real64          !! beginning of a motion at constant velocity [time]
+    real(real64) :: phase = 0.0_real64               !! phase at t = 0, in units of the period
+    real(real64) :: prescribed_velocity = 0.0_real64  !! velocity inwards of a sawtooth or of a motion at constant velocity
+                                                      !! [length/time]
+    real(real64) :: start_time = 0.0_real64          !! start of a motion at constant velocity [time]
     real(real64) :: end_time = 0.0_real64            !! end of a motion at constant velocity [time]
-    ! Of a piston, which is moved by disks and by a force:
+    ! For a piston, which is moved by disks and by a force:
     real(real64) :: mass = 1.0_real64                !! [mass]
     real(real64) :: pull = 0.0_real64                !! acceleration inwards due to the force [length/time**2]
   contains
@@ -60,7 +64,7 @@ contains
     yes = self%kind == sine .or. self%kind == parabolic .or. self%moves_permanently()
   end function moves
 
-  !> Whether the position changes permanently, and with it the accessible area.
+  !> Whether the position of the side, and therefore the accessible area, changes permanently.
   elemental function moves_permanently(self) result(yes)
     class(side_motion_t), intent(in) :: self
     logical :: yes
@@ -89,8 +93,8 @@ contains
     if (self%kind == piston) speed = sqrt(2*abs(self%pull)*self%amplitude)
   end function highest_speed
 
-  !> Time since the beginning of the period, of the motion, or of the free flight of a piston, at the time epoch + t of the run. The
-  !> remainders are exact, so that late times are as precise as early ones.
+  !> Local time of the motion at the time epoch + t of the run: the time since the start of the period, of the motion at constant
+  !> velocity, or of the free flight of a piston. The remainders are exact, so that late times are as precise as early ones.
   elemental function local_time(self, epoch, t, state) result(tau)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! [time]
@@ -148,7 +152,7 @@ contains
     end if
   end function velocity
 
-  !> Acceleration of the side inwards, just after a time.
+  !> Acceleration of the side inwards, just after a given time.
   elemental function acceleration(self, tau) result(a)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! time as returned by `local_time` [time]
@@ -185,12 +189,12 @@ contains
 
     if (self%kind == sine) then
       yes = s < small_angle*self%period/(2*pi)
-    else                                             ! still on the same parabola
+    else                                             ! the side is still on the same parabola
       yes = s <= 0.5_real64*self%period - modulo(tau, 0.5_real64*self%period)
     end if
   end function is_short
 
-  !> Displacement relative to a side that keeps its velocity of the time tau, in full precision.
+  !> Displacement relative to an imaginary side that continues with the velocity at the time tau, in full precision.
   elemental function excess_displacement(self, tau, s) result(distance)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -224,8 +228,8 @@ contains
     end if
   end function velocity_change
 
-  !> Time from tau on during which the gap to a disk with the acceleration g stays convex or concave: until the acceleration
-  !> of the side equals g. At most half a period.
+  !> Duration, from the time tau, for which the gap to a disk with the acceleration g stays convex or concave. It ends when the
+  !> acceleration of the side equals g, and is at most half a period.
   elemental function curvature_interval(self, tau, g) result(s)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! time as returned by `local_time` [time]
@@ -233,7 +237,7 @@ contains
     real(real64) :: s                                !! [time]
     real(real64) :: bend(2), ratio
 
-    bend = [0.0_real64, 0.5_real64]                  ! in periods
+    bend = [0.0_real64, 0.5_real64]                  ! in units of the period
     if (self%kind == sine) then
       ratio = g/(self%amplitude*(2*pi/self%period)**2)
       if (abs(ratio) < 1) bend = bend + [-1, 1]*asin(ratio)/(2*pi)
@@ -243,12 +247,12 @@ contains
     s = minval(bend)
   end function curvature_interval
 
-  !> Time until the side touches the boundary of a disk on a parabola; `never` if it does not. A disk that stays in the range of the
-  !> side for a whole period is touched, unless it is at the very end of the range and hardly moves; then more and more periods are
-  !> skipped.
+  !> Time until the side touches the boundary of a disk on a parabola; `never` if it does not. The side touches every disk that
+  !> stays in the range of the side for a whole period, except a disk at the very end of the range that hardly moves. For such a
+  !> disk the search skips an increasing number of periods.
   pure function contact_time(self, tau, gap, v, g, state) result(s)
     class(side_motion_t), intent(in) :: self         !! a moving side
-    real(real64), intent(in) :: tau                  !! time from which the result counts [time]
+    real(real64), intent(in) :: tau                  !! local time to which the result is relative [time]
     real(real64), intent(in) :: gap                  !! gap between the side and the boundary of the disk, not negative [length]
     real(real64), intent(in) :: v                    !! velocity of the disk [length/time]
     real(real64), intent(in) :: g                    !! acceleration of the disk [length/time**2]
@@ -263,7 +267,7 @@ contains
       s = time_to_line(gap, self%velocity(tau, state) - v, self%pull - g)
       return
     end if
-    above = gap + self%position(tau) - self%amplitude  ! distance from the range of the side
+    above = gap + self%position(tau) - self%amplitude  ! distance of the disk from the range of the side
     entry = time_to_line(above, -v, -g)              ! time of the last entry into the range
     s = never
     from = 0
@@ -306,7 +310,7 @@ contains
     s = never
   end function contact_time_of_stroke
 
-  !> Time of contact within an interval in which the gap is convex or concave; `never` if there is none.
+  !> Time of contact within an interval in which the gap is convex or concave; `never` if there is no contact.
   pure function contact_time_between(motion, tau, gap, v, g, from, to) result(s)
     class(side_motion_t), intent(in) :: motion
     real(real64), intent(in) :: tau, gap, v, g       !! as in `contact_time`
@@ -324,7 +328,7 @@ contains
     if (.not. gap_at(from) > 0 .and. gap_rate(from) < 0) return
     s = never
     high = to
-    if (curvature > 0) then                          ! the gap has its minimum where it stops decreasing
+    if (curvature > 0) then                          ! the gap has its minimum where its rate of change is 0
       if (.not. gap_rate(from) < 0) return
       low = from
       if (gap_rate(to) > 0) call bisect(.true., low, high)
@@ -356,7 +360,7 @@ contains
       speed = relative + (g*t - motion%velocity_change(tau, t))
     end function gap_rate
 
-    !> Bisects an interval to the last bit. Beyond the result the gap increases, or is negative.
+    !> Bisects an interval to the last bit. After the result the gap increases or is negative.
     pure subroutine bisect(to_smallest, left, right)
       logical, intent(in) :: to_smallest
       real(real64), intent(inout) :: left, right

@@ -1,6 +1,6 @@
-!> The exchange between domains. After each time window a domain compares its copies of disks with the disks themselves, which
-!> other domains own. If none of its own disks can have met a copy whose history was wrong, the copies are corrected; otherwise
-!> the window is invalid. docs/theory.md states this criterion and proves that it is sufficient.
+!> The exchange between domains. After each time window a domain compares its copies of disks with the original disks, which other
+!> domains own. If no disk of the domain can have touched a copy whose history (record of its motion in the window) was wrong, the
+!> copies are corrected. Otherwise the window is invalid. docs/theory.md states this criterion and proves that it is sufficient.
 module domain_borders
   use kinds, only: int16, int32, int64
   use domains, only: correction_t, domain_t, forever, list_copies, slot_of_copy
@@ -12,8 +12,8 @@ module domain_borders
 
 contains
 
-  !> Determines whether the own disks of the k-th domain can have met a disk with a wrong or missing history, and lists the
-  !> corrections for its copies. Reads the states of the neighbouring domains.
+  !> Determines whether the disks that the k-th domain owns can have touched a disk with a wrong or missing history, and lists the
+  !> corrections for the copies of this domain. The procedure reads the states of the neighbouring domains.
   subroutine compare_copies(domain, k)
     type(domain_t), intent(inout) :: domain(:)
     integer(int32), intent(in) :: k
@@ -30,7 +30,7 @@ contains
     end associate
   end subroutine compare_copies
 
-  !> Compares the copies with the disks that one neighbour owns.
+  !> Compares the copies with the disks that one neighbouring domain owns.
   subroutine compare(self, other, found)
     type(domain_t), intent(inout) :: self
     type(domain_t), intent(in) :: other
@@ -49,8 +49,8 @@ contains
           found = found + 1
           associate (history => mine%history(mine%history_of(s)))
             same = history%digest == theirs%history(r)%digest .and. same_state() &
-              .and. self%patch%holds(self%sim%tag(s)%cell)  ! a copy that has left the patch is wrong from then on, even if it is
-                                                            ! back
+              .and. self%patch%holds(self%sim%tag(s)%cell)  ! a copy is wrong from the time when it leaves the patch, even if it
+                                                            ! returns later
             if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
             near = came_near(theirs%history(r), met)
             if (.not. met) met = mine%could_have_met(int(history%low, int32), int(history%high, int32))
@@ -67,8 +67,8 @@ contains
     end associate
   contains
 
-    !> Whether a disk of the neighbour was inside the patch during the window, in any periodic image; `met`: whether it was where it
-    !> could have met an own disk.
+    !> Whether a disk of the neighbour was inside the patch during the window, in any periodic image. `met` is .true. if the disk
+    !> could have touched a disk that this domain owns.
     function came_near(history, met) result(near)
       type(history_t), intent(in) :: history
       logical, intent(out) :: met
@@ -89,7 +89,8 @@ contains
       end do
     end function came_near
 
-    !> Whether the copy in slot s and the neighbour's disk in slot t have the same state, last collision partner included.
+    !> Whether the copy with the index s in this domain and the disk with the index t in the neighbouring domain have the same
+    !> state, including the last collision partner.
     pure function same_state() result(yes)
       logical :: yes
 
@@ -104,7 +105,7 @@ contains
       yes = all(transfer(self%sim%extra(s), [0_int64]) == transfer(other%sim%extra(t), [0_int64]))
     end function same_state
 
-    !> Adds the true state of the disk in the neighbour's slot t to the list of corrections.
+    !> Adds the true state of a disk, which has the index t in the neighbouring domain, to the list of corrections.
     subroutine add_correction()
       if (.not. allocated(self%corrections)) allocate (self%corrections(256))
       if (self%n_corrections == size(self%corrections)) self%corrections = [self%corrections, self%corrections]
@@ -118,10 +119,11 @@ contains
     end subroutine add_correction
   end subroutine compare
 
-  !> Applies the corrections: updates copies, adds those of disks that have entered the patch, removes those that have left.
+  !> Applies the corrections: updates copies, adds copies of disks that have entered the patch, and removes copies of disks that
+  !> have left the patch.
   subroutine correct_copies(self)
     type(domain_t), intent(inout) :: self
-    integer(int32), allocatable :: waiting(:)      ! (n_waiting) slots whose events have to be predicted
+    integer(int32), allocatable :: waiting(:)      ! (n_waiting) indices of disks whose events have to be predicted
     integer(int32) :: k, n_waiting, slot
 
     allocate (waiting(self%n_corrections))
@@ -156,7 +158,7 @@ contains
       end if
       if (s == 0) then
         s = self%vacant
-        self%valid = s > 0 .and. self%valid          ! no vacant slot: the domain has to be loaded again
+        self%valid = s > 0 .and. self%valid          ! if there is no vacant slot, the domain has to be loaded again
         if (s == 0) return
         self%vacant = self%global_index(s)
       else if (self%patch%holds(self%sim%tag(s)%cell)) then
@@ -175,7 +177,7 @@ contains
       waiting(n_waiting) = s
     end subroutine apply_correction
 
-    !> Removes the copy in slot s, whose disk has left the patch.
+    !> Removes the copy with the index s, because its disk has left the patch.
     subroutine leave(s)
       integer(int32), intent(in) :: s
 

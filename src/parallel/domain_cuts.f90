@@ -1,5 +1,6 @@
-!> Spatial decomposition of a simulation into domains: slabs of columns of cells, each divided into rectangles that contain about
-!> equal numbers of disks. The patch of a domain is its rectangle and the halo of cells around it.
+!> Spatial decomposition of a simulation into domains. The columns of cells are grouped into slabs, and each slab is divided into
+!> rectangles that contain about equal numbers of disks. Each rectangle is a domain. The patch of a domain consists of its rectangle
+!> and of the halo of cells around the rectangle.
 module domain_cuts
   use kinds, only: int16, int32, real64
   use cell_faces, only: patch_t
@@ -62,8 +63,8 @@ contains
     end do
   contains
 
-    !> Numbers of slabs and of domains in each slab. The product is not much smaller than wanted, no domain is too narrow, and the
-    !> estimated work is smallest.
+    !> Chooses the number of slabs and the number of domains in each slab. The choice minimises the estimated work, under the
+    !> conditions that the product of the numbers is not much smaller than `wanted` and that no domain is too narrow.
     pure function numbers() result(n)
       integer(int32) :: n(2), most(2), columns, rows
 
@@ -76,7 +77,8 @@ contains
       end do
     end function numbers
 
-    !> Estimated work of one thread: its number of domains times the number of cells in the largest patch, for equal pieces.
+    !> Estimated work of one thread: the number of domains per thread times the number of cells in the largest patch, if all domains
+    !> have equal sizes.
     pure function work(n)
       integer(int32), intent(in) :: n(2)
       real(real64) :: work

@@ -1,6 +1,8 @@
-!> One domain of a simulation that is divided among threads. It has an engine of its own for the disks in a rectangle of cells
-!> and for copies of the disks in the halo around it; rectangle and halo form the patch. Disks that would enter the patch during
-!> a window are missing, so that wrong histories spread inwards from its edge, until `domain_borders` corrects the copies.
+!> One domain of a simulation that is divided among threads. A domain owns the disks in a rectangle of cells. It also contains
+!> copies of the disks in the halo of cells around this rectangle; the rectangle and the halo form the patch of the domain. Each
+!> domain has its own event-driven engine. Disks that would enter the patch during a time window are missing in the domain. Errors
+!> in the motion of copies therefore spread inwards from the edge of the patch during the window, until `domain_borders` corrects
+!> the copies.
 module domains
   use kinds, only: int32, int64, real64
   use cell_faces, only: patch_t
@@ -20,15 +22,17 @@ module domains
   real(real64), parameter :: forever = 2.0e150_real64      !! later than any event
   real(real64), parameter :: longest_window = 5.0_real64  !! longest wall time for a window of one domain, after which the window is
                                                           !! given up [s]
-  integer(int64), parameter :: iterations_between_checks = 100000  !! between two checks of signals and of the clock
-  integer(int32), parameter :: spare = 32, spare_at_least = 200  !! vacant slots for disks that enter: a fraction 1/spare of the
-                                                                 !! disks, plus spare_at_least
+  integer(int64), parameter :: iterations_between_checks = 100000  !! number of iterations between two checks of signals and of the
+                                                                   !! clock
+  integer(int32), parameter :: spare = 32, spare_at_least = 200  !! number of vacant slots (array elements without a disk) for disks
+                                                                 !! that enter: a fraction 1/spare of the disks, plus spare_at_least
 
   !> Correction: the true state of a disk whose copy in this domain is wrong or missing, or has to be removed.
   type, extends(whole_disk_t) :: correction_t
     integer(int32) :: global_index = 0             !! index of the disk in the whole simulation
-    integer(int32) :: cell(2) = 0                  !! cell relative to this domain's patch; may lie outside of it
-    integer(int32) :: slot = 0                     !! slot of the copy; 0: there is none
+    integer(int32) :: cell(2) = 0                  !! column and row relative to the patch of this domain; the cell may be outside
+                                                   !! the patch
+    integer(int32) :: slot = 0                     !! index of the copy in this domain; 0 if there is no copy
   end type correction_t
 
   type :: domain_t
@@ -36,15 +40,16 @@ module domains
     integer(int32) :: halo = 0                     !! width of the halo in cells
     integer(int32), allocatable :: neighbour(:)    !! domains that own disks in this domain's patch
     type(patch_t) :: patch
-    type(simulation_t) :: sim  !! own disks and copies in slots; times count from the same epoch as in the whole simulation
+    type(simulation_t) :: sim  !! the disks that the domain owns, and copies; some array elements (slots) are vacant. The origin of
+                               !! time is that of the whole simulation
     type(event_driven_t) :: engine
-    !> (slots) Index of the disk in the whole simulation; in a vacant slot: the next vacant slot.
+    !> (slots) Index of each disk in the whole simulation. The elements of vacant slots form a linked list of these slots.
     integer(int32), allocatable :: global_index(:)
     integer(int32) :: vacant = 0                   !! first vacant slot; 0: none
-    type(event_log_t), allocatable :: log          !! log of the collisions recorded here
-    integer(int64) :: iterations = 0               !! iterations of the engine in this window
+    type(event_log_t), allocatable :: log          !! log of the collisions that this domain counts
+    integer(int64) :: iterations = 0               !! number of iterations of the engine in this window
     logical :: done = .false.                      !! the engine has reached the end of the window
-    logical :: valid = .false.                     !! no own disk can have met a wrong copy
+    logical :: valid = .false.                     !! no disk that the domain owns can have touched a wrong copy
     integer(int32) :: n_corrections = 0
     type(correction_t), allocatable :: corrections(:)  !! (at least n_corrections) corrections to be applied
     integer(int32), allocatable, private :: key(:), slot(:)  !! (0:last_key) ids and slots of the copies: a hash table
@@ -53,11 +58,11 @@ module domains
 
 contains
 
-  !> Loads the disks that are in the domain's patch, and predicts their events.
+  !> Loads the disks that are in the patch of the domain, and predicts their events.
   subroutine load(self, sim, disks)
     type(domain_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: disks(:)         !! indices of these disks
+    integer(int32), intent(in) :: disks(:)         !! indices of the disks in the patch
     integer(int32) :: i, n, slots
 
     n = size(disks, kind=int32)
@@ -83,7 +88,7 @@ contains
     call start()
   contains
 
-    !> Allocates slots for n disks and some vacant ones.
+    !> Allocates slots for n disks, and further slots that are vacant at first.
     subroutine make_room()
       integer(int32) :: slots
 
@@ -198,7 +203,7 @@ contains
     integer(int64) :: iterations_left
 
     self%done = .false.
-    if (.not. self%valid) return                   ! there was no slot for all copies
+    if (.not. self%valid) return                   ! there were not enough slots for all copies
     began = seconds()
     limits%time = t_end
     iterations_left = iterations
@@ -225,7 +230,7 @@ contains
     t = self%sim%disk(i)%event_time
   end function next_time
 
-  !> Copies the states of the own disks to the whole simulation.
+  !> Copies the states of the disks that the domain owns to the whole simulation.
   subroutine write_back(self, sim)
     type(domain_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim
@@ -237,8 +242,8 @@ contains
     end do
   end subroutine write_back
 
-  !> Moves the log entries of all domains to the log of the whole simulation, sorted by time. The order of simultaneous
-  !> collisions in different domains is unknown; if there are any, `good` is .false.
+  !> Moves the log entries of all domains to the log of the whole simulation, sorted by time. The order of simultaneous collisions
+  !> in different domains is unknown; `good` is .false. if such collisions exist.
   subroutine merge_logs(domain, log, good)
     type(domain_t), intent(inout) :: domain(:)
     type(event_log_t), intent(inout) :: log

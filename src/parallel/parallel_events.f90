@@ -1,8 +1,8 @@
-!> Parallel event-driven dynamics: on several cores, or on one core with domains that fit into its cache. The results are
-!> bit-identical to those of the serial engine. The box is divided into domains, each with its own engine; after each time
-!> window the domains are compared (see `partition` and `domains`). If a window turns out to be invalid, all domains are rolled
-!> back to the state before these windows. Rare and difficult situations are left to the serial engine: small or inactive systems,
-!> a stop within simultaneous collisions, and inelastic collapse.
+!> Parallel event-driven dynamics, which uses several cores, or one core with domains that fit into its cache. The results are
+!> bit-identical to those of the serial engine. The box is divided into domains, each of which has its own engine. The domains
+!> advance by time windows, and after each window they are compared (see `partition` and `domains`). If a window is invalid, the
+!> simulation returns to its state before the present series of windows. The serial engine is used in rare and difficult situations:
+!> small or inactive systems, a stop within simultaneous collisions, and inelastic collapse.
 module parallel_events
   use kinds, only: int32, int64, real64
   use domains, only: merge_logs
@@ -18,11 +18,12 @@ module parallel_events
   public :: parallel_events_t
 
   integer, parameter :: most_windows = 24                      !! largest number of windows in one call of `run_domains`
-  real(real64), parameter :: shortest = 0.1_real64             !! shortest window that is tried, relative to the normal one
-  !> Smallest numbers of events per disk before the limit of a count with which domains are continued, and are started.
+  real(real64), parameter :: shortest = 0.1_real64             !! shortest window that is tried, relative to the usual length
+  !> Smallest remaining numbers of events per disk, before a count reaches its limit, for which domains are continued and for which
+  !> domains are started.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
   ! Shortest and longest periods of the serial engine [events per disk]:
-  integer(int64), parameter :: brief(2) = 5                         !! to pass a situation that domains cannot handle
+  integer(int64), parameter :: brief(2) = 5                         !! used in a situation that domains cannot handle
   integer(int64), parameter :: after_failures(2) = [5, 5*2**20]     !! while windows are invalid
   integer(int64), parameter :: while_busy(2) = [50, 1600]           !! while the cores are busy with other programs
 
@@ -30,13 +31,14 @@ module parallel_events
   integer, parameter :: no_engine = 0, serial_engine = 1, all_domains = 2
 
   type, extends(evolution_t) :: parallel_events_t
-    type(event_driven_t) :: serial                 !! initial state of the serial engine, which is copied to use it
+    type(event_driven_t) :: serial                 !! initial state of the serial engine; a copy of it is used when the serial
+                                                   !! engine is needed
     type(partition_t) :: parts
-    integer(int32) :: least_disks = 1250  !! smallest number of disks in a domain; doubled in a periodic box, which is cut at twice
-                                          !! as many places
+    integer(int32) :: least_disks = 1250  !! smallest number of disks in a domain; it is doubled in a periodic box, in which each
+                                          !! slab is bounded by twice as many cuts
     integer(int32) :: most_disks = 62000           !! largest number of disks in a domain that fits into the cache
-    real(real64) :: least_cores = 1.25_real64  !! average number of cores below which the serial engine is faster than several
-                                               !! threads
+    real(real64) :: least_cores = 1.25_real64  !! average number of active cores below which the serial engine is faster than
+                                               !! several threads
     integer(int64) :: windows_done = 0, windows_failed = 0
     ! The serial engine exists only while there are no domains, to save memory.
     type(event_driven_t), allocatable, private :: engine   !! the serial engine in use
@@ -52,7 +54,7 @@ module parallel_events
 
 contains
 
-  !> Prepares a run. Events are not predicted before it is clear which engine will execute them.
+  !> Prepares a run. Events are not predicted here, because it is not known yet which engine will execute them.
   subroutine start(self, sim)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -69,7 +71,8 @@ contains
     if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
   end subroutine start
 
-  !> Updates the events after changes to disks. Only the serial engine can do this; domains are loaded again.
+  !> Updates the predicted events after disks have been changed. The serial engine predicts them again. Domains cannot be updated
+  !> and are loaded again.
   subroutine renew(self, sim, changed)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -83,7 +86,8 @@ contains
     end if
   end subroutine renew
 
-  !> Number of domains that justifies the cost of their copies; this is also the number of threads that can be used.
+  !> Largest number of domains for which the cost of the copies is justified. It is also the largest number of threads that can be
+  !> used.
   pure function most_domains(self, n_disks, periodic) result(n)
     class(parallel_events_t), intent(in) :: self
     integer(int32), intent(in) :: n_disks
@@ -109,7 +113,7 @@ contains
     if (serially) call advance_serially()
     if (self%parts%wanted > self%parts%threads .and. allocated(self%parts%domain) .and. &
       (sim%now >= sim%epoch_end .or. sim%tally%events >= most_events(sim))) then
-      deallocate (self%parts%domain)               ! to leave memory for sorting the disks
+      deallocate (self%parts%domain)               ! frees memory for sorting the disks
       self%predicted_by = no_engine
     end if
   contains
@@ -124,8 +128,8 @@ contains
         .and. limits%collisions - sim%tally%collisions > least .and. limits%time > sim%now
     end function domains_pay
 
-    !> Advances the domains by several windows. If one of these is invalid, the simulation keeps its state from before, and the
-    !> next call tries shorter windows.
+    !> Advances the domains by several windows. If one of these windows is invalid, the simulation keeps the state before the call,
+    !> and the next call tries shorter windows.
     subroutine run_domains()
       real(real64) :: t
       integer :: windows, listed
@@ -168,15 +172,17 @@ contains
       if (all(self%parts%domain%engine%idle)) call use_serial_engine(brief)
     end subroutine run_domains
 
-    !> Number of windows in a call. It decreases with the number of recent failures, because an invalid window discards them all.
+    !> Number of windows in a call. The number decreases with the number of recent failures, because an invalid window invalidates
+    !> all windows of the call.
     pure function most_windows_now() result(n)
       integer :: n
 
       n = max(1, int(most_windows*self%parts%shortening**4))
     end function most_windows_now
 
-    !> Makes windows longer after a call in which all were valid. Within a call their length is constant. If it increased after
-    !> each window, windows that are discarded later could make up for each halving, and the run would make no progress.
+    !> Makes windows longer after a call in which all windows were valid. Within a call their length is constant. If the length
+    !> increased after each window, it could grow within a call as much as it was reduced after the last failure, although the
+    !> windows of the call may be discarded later; the run would then make no progress.
     subroutine lengthen_windows(windows)
       integer, intent(in) :: windows               !! number of windows in the call
 
@@ -185,7 +191,8 @@ contains
       end associate
     end subroutine lengthen_windows
 
-    !> Makes windows shorter after an invalid one. If they are already shortest, the serial engine is used for a while.
+    !> Makes windows shorter after an invalid window. If windows already have the shortest length, the serial engine is used for a
+    !> period.
     subroutine shorten_windows()
       self%windows_failed = self%windows_failed + 1
       associate (shortening => self%parts%shortening)
@@ -196,8 +203,9 @@ contains
       call use_serial_engine(after_failures)
     end subroutine shorten_windows
 
-    !> Selects the serial engine for a period: twice the last one, unless domains have been successful for longer than that
-    !> since. A run for which domains are unsuitable therefore costs hardly more than with the serial engine alone.
+    !> Selects the serial engine for a period. The period is twice as long as the last one, unless domains have been successful for
+    !> longer than the last period since then. A run for which domains are unsuitable therefore costs hardly more than with the
+    !> serial engine alone.
     subroutine use_serial_engine(periods)
       integer(int64), intent(in) :: periods(2)      !! shortest and longest period [events per disk]
 
@@ -207,7 +215,7 @@ contains
       serially = .true.
     end subroutine use_serial_engine
 
-    !> Advances the serial engine, at most to the end of its period.
+    !> Advances the simulation with the serial engine, at most to the end of its period.
     subroutine advance_serially()
       type(limits_t) :: goal
       integer(int64) :: events

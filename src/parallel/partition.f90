@@ -1,6 +1,6 @@
-!> A simulation that is divided into domains, which advance together by time windows. The predicted events belong to the domains;
-!> the simulation itself keeps its old state until the states of the domains are written back. After an invalid window the
-!> domains are useless and have to be loaded again.
+!> A simulation that is divided into domains, which advance together by time windows. The domains contain the predicted events. The
+!> simulation itself keeps its old state until the states of the domains are copied back. After an invalid window the domains cannot
+!> be continued and have to be loaded again.
 module partition
   use kinds, only: int16, int32, int64, real64
   use cell_faces, only: patch_t
@@ -18,17 +18,19 @@ module partition
   private
   public :: partition_t
 
-  real(real64), parameter :: longest_call = 1.0_real64         !! time after which the caller can check signals and clocks [s]
+  real(real64), parameter :: longest_call = 1.0_real64         !! wall-clock time after which the caller can check signals and
+                                                               !! clocks [s]
   real(real64), parameter :: averaging_time = 0.1_real64       !! averaging time for the number of active cores [s]
-  real(real64), parameter :: few_events = 20.0_real64  !! number of events before a limit below which domains advance event by event
+  real(real64), parameter :: few_events = 20.0_real64  !! remaining number of events before a limit below which the domains advance
+                                                       !! one event at a time
 
-  !> The next step of all threads. One thread decides on it while the others wait.
+  !> The next step of all threads. One thread determines this step while the other threads wait.
   type :: plan_t
     logical :: continues = .true.
-    integer :: windows = 0                         !! number of windows begun
-    real(real64) :: until = 0.0_real64             !! wall-clock time after which no further window begins [s]
+    integer :: windows = 0                         !! number of windows started
+    real(real64) :: until = 0.0_real64             !! wall-clock time after which no further window is started [s]
     real(real64) :: t_begin = 0.0_real64, t_end = 0.0_real64   !! beginning and end of the window, since the epoch [time]
-    integer(int64) :: events = 0                   !! number of events in the domains at its beginning
+    integer(int64) :: events = 0                   !! number of events in the domains at the start of the window
     logical :: corrects = .false.                  !! domains apply the corrections of the previous window first
     real(real64) :: t = 0.0_real64                 !! time up to which domains advance, since the epoch [time]
     integer(int64) :: iterations = 0               !! largest number of iterations of an engine in this step
@@ -41,16 +43,16 @@ module partition
     integer(int32) :: wanted = 1                   !! number of domains
     real(real64) :: window = 0.5_real64            !! length of a window [collisions per disk]
     integer(int32) :: halo = 6                     !! width of the halo around a domain [cells]
-    real(real64) :: overload = 4.0_real64  !! limit of the iterations of one engine in a step, relative to the number expected in
-                                           !! all domains
-    type(patch_t) :: whole                         !! the cells of the box, which are constant during a run
+    real(real64) :: overload = 4.0_real64  !! limit of the iterations of one engine in a step, relative to the number of iterations
+                                           !! expected in all domains
+    type(patch_t) :: whole                         !! all cells of the box, which are constant during a run
     type(domain_cuts_t) :: cuts
     type(domain_t), allocatable :: domain(:)
-    real(real64) :: event_rate = 0.0_real64        !! event rate; 0: not known yet [1/time]
-    real(real64) :: iterations_per_event = 10.0_real64  !! iterations of an engine per event
+    real(real64) :: event_rate = 0.0_real64        !! event rate; 0 if it is not known yet [1/time]
+    real(real64) :: iterations_per_event = 10.0_real64  !! number of iterations of an engine per event
     real(real64) :: shortening = 1.0_real64        !! factor by which windows are shortened after failures
-    integer(int32) :: widening = 0                 !! widening of the halo after failures [cells]
-    real(real64) :: cores = 0.0_real64             !! number of cores used recently, on average; 0: not known yet
+    integer(int32) :: widening = 0                 !! increase of the width of the halo after failures [cells]
+    real(real64) :: cores = 0.0_real64             !! recent average of the number of active cores; 0 if it is not known yet
   contains
     procedure :: fill
     procedure :: run_windows
@@ -101,7 +103,7 @@ contains
     !$omp end parallel do
   end subroutine fill
 
-  !> Updates the event rate and the iterations per event, which determine the length of windows, from a measurement.
+  !> Updates, from a measurement, the event rate and the number of iterations per event. Both determine the length of windows.
   pure subroutine update_rates(self, events, iterations, time)
     class(partition_t), intent(inout) :: self
     integer(int64), intent(in) :: events, iterations
@@ -125,18 +127,17 @@ contains
     end do
   end function total_tally
 
-  !> Runs successive windows in all domains while they are valid, until a limit is reached or the caller has waited long enough. A
-  !> window ends early at the limit of a count. `good` is .true. if all windows are valid.
-  !>
-  !> The threads synchronise twice in each window: before the domains are compared, and before the states used in the comparison are
-  !> changed.
+  !> Executes successive windows in all domains, until a window is invalid, a limit is reached, or the caller has waited long
+  !> enough. A window ends early when a count reaches its limit. `good` is .true. if all windows are valid.
+  !>  The threads synchronise twice in each window: before the domains are compared, and before the states that the comparison uses
+  !> are changed.
   subroutine run_windows(self, sim, limits, most, t, windows, good)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(limits_t), intent(in) :: limits
     integer, intent(in) :: most                    !! largest number of windows
     real(real64), intent(out) :: t                 !! end of the last window, since the epoch [time]
-    integer, intent(out) :: windows                !! number of windows begun
+    integer, intent(out) :: windows                !! number of windows started
     logical, intent(out) :: good
     type(plan_t) :: plan
     type(barrier_t) :: barrier
@@ -194,7 +195,8 @@ contains
       real(real64) :: length
 
       length = self%window*self%shortening*sim%n_disks()/(2*self%event_rate)
-      if (self%wanted > self%threads) length = 2*length      ! each window loads each domain into the cache once
+      if (self%wanted > self%threads) length = 2*length      ! longer windows, because each window loads each domain into the cache
+                                                             ! once
       plan%windows = plan%windows + 1
       plan%t_begin = plan%t
       plan%t_end = plan%t + length
@@ -205,9 +207,9 @@ contains
       call choose_target()
     end subroutine begin_window
 
-    !> Chooses the time up to which all domains advance next. This is the end of the window, unless a count would exceed its limit.
-    !> In that case it is most of the way to the limit and finally the next event of any domain. The number of iterations of each
-    !> engine is bounded, however wrong the estimated event rate is.
+    !> Chooses the time up to which all domains advance next. This is the end of the window, unless a count would exceed its limit
+    !> in the window. In that case the domains first advance through most of the remaining events, and finally one event at a time.
+    !> The number of iterations of each engine is bounded, even if the estimated event rate is wrong.
     subroutine choose_target()
       real(real64) :: expected, sure, next
       integer(int32) :: k
@@ -229,9 +231,9 @@ contains
       plan%t = min(next, plan%t_end)
     end subroutine choose_target
 
-    !> Decides after the comparison whether the window is valid, and whether another one begins.
+    !> Determines after the comparison whether the window is valid, and whether another window is started.
     subroutine end_window()
-      ! With events_left() < 0 simultaneous events have exceeded the limit.
+      ! If events_left() is negative, simultaneous events have exceeded the limit.
       plan%valid = all(self%domain%done) .and. all(self%domain%valid) .and. events_left() >= 0
       if (plan%valid) then
         call self%update_rates(sum(self%domain%sim%tally%events) - plan%events, sum(self%domain%iterations), plan%t - plan%t_begin)
@@ -243,7 +245,7 @@ contains
       if (plan%continues) call begin_window()
     end subroutine end_window
 
-    !> Number of events before a count reaches its limit.
+    !> Number of remaining events before a count reaches its limit.
     pure function events_left() result(events)
       real(real64) :: events
 
@@ -252,7 +254,7 @@ contains
     end function events_left
   end subroutine run_windows
 
-  !> Copies the present states of the domains to the whole simulation; the domains can continue from there.
+  !> Copies the present states of the domains to the whole simulation. The domains can be continued afterwards.
   subroutine write_back_all(self, sim, now)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

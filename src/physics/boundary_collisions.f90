@@ -14,7 +14,7 @@ module boundary_collisions
   private
   public :: collide_wall
 
-  !> A disk at rest on a surface stays away from it for at least this many contact durations.
+  !> A disk at rest on a surface has its next contact with this surface after at least this many contact durations.
   real(real64), parameter :: shortest_separation = 0.4_real64
 
 contains
@@ -45,10 +45,11 @@ contains
     else
       sim%disk(i)%v = wall_rebound(law, v - normal_velocity, normal, elastic)
       if (any(abs(normal_velocity) > 0)) then
-        sim%disk(i)%v = sim%disk(i)%v + normal_velocity  ! rounding is monotonic, so that the disk is not slower than the side
+        sim%disk(i)%v = sim%disk(i)%v + normal_velocity  ! rounding is monotonic, so that the rounded velocity of the disk is not
+                                                         ! less than that of the side
         if (law%restitution < 1 .and. .not. elastic) call end_bouncing(sim%disk(i)%v, v, normal_velocity, normal)
       end if
-      ! Not in time-stepped dynamics.
+      ! This does not apply to time-stepped dynamics.
       if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call separate_from_surface(sim, i, code, normal)
       if (law%tangential%is_rough()) call apply_tangential_impulse_at_wall(sim, i, law%tangential, normal, u, v)
     end if
@@ -62,7 +63,8 @@ contains
   !> otherwise be infinite. The disk then moves with the side.
   pure subroutine end_bouncing(v, before, normal_velocity, normal)
     real(real64), intent(inout) :: v(2)          !! velocity of the disk after the collision [length/time]
-    real(real64), intent(in) :: before(2), normal_velocity(2)  !! of the disk before, of the side [length/time]
+    real(real64), intent(in) :: before(2), normal_velocity(2)  !! velocity of the disk before the collision, velocity of the side
+                                                               !! [length/time]
     real(real64), intent(in) :: normal(2)        !! unit vector inwards
     real(real64) :: left
 
@@ -70,9 +72,9 @@ contains
     if (left >= -dot_product(before - normal_velocity, normal)) v = v - left*normal
   end subroutine end_bouncing
 
-  !> Applies the momentum transfer between a disk and a piston. The disk has rebounded as from a piston of infinite mass; both
-  !> receive the fraction of this impulse that follows from their masses. On return u contains the mean velocity of the piston
-  !> before and after, with which its work is calculated.
+  !> Applies the momentum transfer between a disk and a piston. On entry the disk has rebounded as from a piston of infinite mass.
+  !> The disk and the piston receive the fraction of this impulse that follows from their masses. On return u contains the mean of
+  !> the velocities of the piston before and after the collision, from which the work of the piston is calculated.
   pure subroutine move_piston(sim, i, code, normal, before, u, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -92,14 +94,15 @@ contains
       ! The piston is placed at the disk, as computed in `side_time`; otherwise rounding would separate it from a disk at rest.
       side%position = merge(disk%x(axis) - (sim%box%lower(axis) + disk%radius), &
         (sim%box%upper(axis) - disk%radius) - disk%x(axis), sense_of(code) < 0)
-      side%velocity = min(v - given, dot_product(disk%v, normal))       ! not faster than the disk by rounding
+      side%velocity = min(v - given, dot_product(disk%v, normal))       ! rounding must not make the piston faster than the disk
       side%clock = t
       u = u + (0.5_real64*(side%velocity - v))*normal
     end associate
   end subroutine move_piston
 
-  !> Draws the velocity of disk i after a collision with a thermal wall, as if it came from a gas of that temperature: the normal
-  !> component has the density (m v/kT) exp(-m v**2/2kT); the tangential component and the angular velocity are Gaussian.
+  !> Draws the velocity of disk i after a collision with a thermal wall, as if the disk came from a gas with the temperature of the
+  !> wall: the normal component has the density (m v/kT) exp(-m v**2/2kT); the tangential component and the angular velocity are
+  !> Gaussian.
   pure subroutine draw_thermal_velocity(sim, i, temperature, normal, u)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -117,9 +120,9 @@ contains
     if (sim%features%rotation) sim%extra(i)%spin = sqrt(temperature/sim%inertia_of(i))*normals(2)
   end subroutine draw_thermal_velocity
 
-  !> Separates disk i from a surface on which it rests. With restitution 0 the TC model cannot conserve a normal velocity,
-  !> and the next collision would follow at once, infinitely often. The disk gets a normal velocity with which its next contact
-  !> is 0.4 to 0.8 contact durations later.
+  !> Separates disk i from a surface on which it rests. With restitution 0 there is no normal velocity that the TC model could
+  !> conserve, and infinitely many collisions would follow at the same time. The normal velocity of the disk is therefore set such
+  !> that its next contact is 0.4 to 0.8 contact durations later.
   pure subroutine separate_from_surface(sim, i, code, normal)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -159,8 +162,8 @@ contains
     end associate
   end subroutine apply_tangential_impulse_at_wall
 
-  !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk consists of the work of the
-  !> moving surface and of heat from a thermal wall or, at other walls, dissipation.
+  !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk is the work of the moving
+  !> surface, plus the heat from a thermal wall or minus the energy dissipated at any other wall.
   pure subroutine add_wall_sums(sim, i, k, heats, u, v, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

@@ -1,5 +1,5 @@
-!> The container: four sides, which are walls or periodic along each axis, fixed obstacles, and gravity.
-!> Contact times are pure functions of the state of a disk. They count from the epoch, like its clock.
+!> The container: four sides, which are walls or periodic along each axis, fixed obstacles, and gravity. Contact times are pure
+!> functions of the state of a disk. They are relative to the epoch, like the clock of the disk.
 module box_geometry
   use collisions, only: wall_law_t
   use disks, only: disk_t
@@ -14,16 +14,17 @@ module box_geometry
   public :: find_image_contact, free_area, next_obstacle, normal_surface_velocity, obstacle_gap, tangential_surface_velocity
   public :: wall_normal
 
-  !> A side of the box, or a group of obstacles. All obstacles of a group share one contact law, and sums over their collisions.
+  !> A side of the box, or a group of obstacles. All obstacles of a group have the same contact law, and their collisions are added
+  !> to the same sums.
   type :: surface_t
     character(len=:), allocatable :: name
     type(wall_law_t) :: law
-    type(side_motion_t) :: motion               !! prescribed or free motion of a side
+    type(side_motion_t) :: motion               !! motion of a side, which is prescribed or that of a piston
   end type surface_t
 
   type :: obstacle_t
     class(shape_t), allocatable :: shape
-    integer(int32) :: surface = 0               !! index of the surface of its group
+    integer(int32) :: surface = 0               !! index of the surface that represents its group
   end type obstacle_t
 
   type :: box_t
@@ -32,10 +33,11 @@ module box_geometry
     logical :: periodic(2) = .false.            !! periodic boundary along each axis
     real(real64) :: gravity(2) = 0.0_real64     !! [length/time**2]
     real(real64) :: shear_rate = 0.0_real64     !! shear rate of a box with Lees-Edwards boundary conditions [1/time]
-    !> Left, right, bottom, top (only walls are used), then the groups of obstacles.
+    !> The sides in the order left, right, bottom, top, then the groups of obstacles. Only the elements of sides that are walls are
+    !> used.
     type(surface_t), allocatable :: surface(:)
     type(obstacle_t), allocatable :: obstacle(:)   !! obstacles of a group are adjacent; see `partners` for their codes
-    ! Variable state besides that of the disks. The input determines the initial state of the sides.
+    ! Variable state of the box. The input determines the initial state of the sides.
     real(real64) :: epoch = 0.0_real64          !! origin of all clocks, since the start of the run [time]
     type(side_state_t) :: side(n_sides)
   contains
@@ -122,7 +124,7 @@ contains
     lengths = merge(self%upper - self%lower, never, self%periodic)
   end function periods
 
-  !> The periodic images of the box, for clocks that count from `epoch`. Without `epoch` the images are those at the start.
+  !> The periodic images of the box, for clocks relative to `epoch`. Without `epoch` the images are those at the start of the run.
   pure function images_of(self, epoch) result(images)
     class(box_t), intent(in) :: self
     real(real64), intent(in), optional :: epoch    !! [time]
@@ -141,7 +143,7 @@ contains
     yes = any(abs(self%gravity) > 0)
   end function has_gravity
 
-  !> Whether the box is sheared (Lees and Edwards, J. Phys. C 5, 1921 (1972)): the image above moves along x.
+  !> Whether the box is sheared (Lees and Edwards, J. Phys. C 5, 1921 (1972)): the periodic image above the box moves along x.
   pure function is_sheared(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -149,7 +151,7 @@ contains
     yes = abs(self%shear_rate) > 0
   end function is_sheared
 
-  !> Velocity of the image above along x.
+  !> Velocity along x of the periodic image above the box.
   pure function shear_velocity(self) result(v)
     class(box_t), intent(in) :: self
     real(real64) :: v                           !! [length/time]
@@ -157,7 +159,7 @@ contains
     v = self%shear_rate*(self%upper(2) - self%lower(2))
   end function shear_velocity
 
-  !> Velocity profile imposed by the shear at x. Properties relative to this profile are uniform.
+  !> Velocity at the point x of the profile that the shear imposes. Properties relative to this profile are uniform in space.
   pure function shear_profile(self, x) result(v)
     class(box_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
@@ -230,7 +232,8 @@ contains
     highest = maxval(self%surface%law%temperature)
   end function highest_temperature
 
-  !> Highest speed of a surface along itself, of a moving side, or of the image above in a sheared box.
+  !> Highest of these speeds: the tangential speed of a surface, the speed of a moving side, and the speed of the periodic image
+  !> above a sheared box.
   pure function highest_speed(self) result(highest)
     class(box_t), intent(in) :: self
     real(real64) :: highest                     !! [length/time]
@@ -238,7 +241,7 @@ contains
     highest = max(maxval(abs(self%surface%law%speed)), maxval(self%surface%motion%highest_speed()), abs(self%shear_velocity()))
   end function highest_speed
 
-  !> Whether boundaries can do work on disks: by tangential or normal motion, as a piston, or by shear.
+  !> Whether boundaries can do work on disks: by tangential or normal motion, by the force on a piston, or by shear.
   pure function does_work(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -254,7 +257,7 @@ contains
     yes = self%highest_temperature() > 0 .or. self%does_work()
   end function gives_energy
 
-  !> Largest distances of moving sides from their mean positions, outwards, where disks can be as well.
+  !> Largest outward displacements of moving sides from their mean positions. Disks can be in this range as well.
   pure function side_excursion(self) result(length)
     class(box_t), intent(in) :: self
     real(real64) :: length(2, 2)                !! (axis, lower or upper) [length]
@@ -262,7 +265,7 @@ contains
     length = transpose(reshape(self%surface(:n_sides)%motion%amplitude, [2, 2]))
   end function side_excursion
 
-  !> Displacement of side k at a time, inwards from its mean position.
+  !> Displacement of side k from its mean position at a given time, positive inwards.
   pure function side_position(self, k, t) result(x)
     class(box_t), intent(in) :: self
     integer, intent(in) :: k
@@ -274,7 +277,7 @@ contains
     end associate
   end function side_position
 
-  !> Velocity of side k at a time, inwards.
+  !> Velocity of side k at a given time, positive inwards.
   pure function side_velocity(self, k, t) result(v)
     class(box_t), intent(in) :: self
     integer, intent(in) :: k
@@ -286,13 +289,14 @@ contains
     end associate
   end function side_velocity
 
-  !> Finds the first contact of a disk with the listed obstacles, if it is earlier than a known event. A disk stays in the box
-  !> until it passes a periodic side; images of an obstacle at a distance of one period are therefore sufficient. An obstacle
+  !> Finds the first contact of a disk with the listed obstacles, if it is earlier than a known event. A disk stays in the box until
+  !> it passes a periodic side. Images of an obstacle that are shifted by at most one period are therefore sufficient. An obstacle
   !> that encloses the disks has no images.
   pure subroutine next_obstacle(box, disk, last, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    integer(int32), intent(in) :: last          !! code of the obstacle that the disk left last, if it has had no event since
+    integer(int32), intent(in) :: last          !! code of the obstacle with which the disk collided last, if the disk has had no
+                                                !! later event
     integer(int32), intent(in) :: list(:)       !! codes of the obstacles to be tested, in descending order
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
@@ -307,13 +311,14 @@ contains
     end do
   end subroutine next_obstacle
 
-  !> Finds the contact of a disk with one image of an obstacle, if it is earlier than a known event. Obstacles that disks touch
-  !> from outside are convex: a disk that leaves one on a straight line cannot return, and contacts predicted from rounding errors
-  !> are skipped.
+  !> Finds the contact of a disk with one image of an obstacle, if it is earlier than a known event. Obstacles that disks touch from
+  !> outside are convex. A disk that leaves such an obstacle on a straight line cannot return. Contacts predicted because of
+  !> rounding errors are therefore skipped.
   pure subroutine find_image_contact(box, disk, last, obstacle, shift, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    integer(int32), intent(in) :: last          !! code of the obstacle that the disk left last, if it has had no event since
+    integer(int32), intent(in) :: last          !! code of the obstacle with which the disk collided last, if the disk has had no
+                                                !! later event
     integer(int32), intent(in) :: obstacle      !! code of the obstacle
     real(real64), intent(in) :: shift(2)        !! shift from the obstacle to its image [length]
     real(real64), intent(inout) :: t
@@ -334,8 +339,9 @@ contains
     code = obstacle
   end subroutine find_image_contact
 
-  !> Whether a point that falls for some time surely stays outside of a rectangle around the origin; .false. if in doubt. The
-  !> rectangle around the path is a rough but cheap bound compared with the roots of a quartic.
+  !> .true. if a falling point certainly stays outside of a rectangle around the origin during a given time; .false. if this is
+  !> uncertain. The test uses the bounding rectangle of the path, which is a coarse bound but costs much less than the roots of a
+  !> quartic.
   pure function stays_outside(d, v, g, s, half) result(yes)
     real(real64), intent(in) :: d(2)            !! initial position [length]
     real(real64), intent(in) :: v(2)            !! [length/time]
@@ -347,7 +353,7 @@ contains
     integer :: axis
 
     yes = .false.
-    if (s > sqrt(never)) return                 ! the path may overflow
+    if (s > sqrt(never)) return                 ! the length of the path may overflow
     do axis = 1, 2
       low = s*min(v(axis), v(axis) + g(axis)*s, 0.0_real64)
       high = s*max(v(axis), v(axis) + g(axis)*s, 0.0_real64)
@@ -356,7 +362,7 @@ contains
     end do
   end function stays_outside
 
-  !> Distance between the m-th obstacle and the boundary of a disk at x; negative if they overlap.
+  !> Distance between the m-th obstacle and the boundary of a disk at x; negative if the disk overlaps the obstacle.
   pure function obstacle_gap(box, m, x, radius) result(length)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: m
@@ -368,7 +374,7 @@ contains
     end associate
   end function obstacle_gap
 
-  !> Tangential velocity of a surface at a point where it has this normal.
+  !> Tangential velocity of a surface at the point where the surface has the given normal.
   pure function tangential_surface_velocity(box, code, normal) result(u)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
@@ -417,7 +423,7 @@ contains
     end if
   end function wall_normal
 
-  !> Accessible area: the box, or the smallest obstacle that encloses disks, without the other obstacles.
+  !> Accessible area: the area of the box, or of the smallest obstacle that encloses disks, minus the areas of the other obstacles.
   pure function free_area(box) result(area)
     type(box_t), intent(in) :: box
     real(real64) :: area                        !! [length**2]

@@ -1,5 +1,5 @@
-!> The sides of the box: their positions, and the times at which disks reach them. These times are pure functions of the state
-!> of a disk and count from the epoch, like its clock.
+!> The sides of the box: their positions, and the times at which disks reach them. These times are pure functions of the state of a
+!> disk. They are relative to the epoch, like the clock of the disk.
 module box_sides
   use box_geometry, only: box_t
   use disks, only: disk_t
@@ -16,7 +16,7 @@ module box_sides
 
 contains
 
-  !> Positions of the sides at a time.
+  !> Positions of the sides at a given time.
   pure subroutine bounds(box, t, lower, upper)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: t               !! since the epoch [time]
@@ -32,9 +32,10 @@ contains
     upper = box%upper - inwards([2, 4])
   end subroutine bounds
 
-  !> Time when the boundary of a disk touches a wall, or its centre reaches a periodic side. A gap that is negative by
-  !> rounding counts as zero: a disk at a wall that still moves outwards is reflected now and cannot leave the box. At a moving
-  !> side, gaps within the rounding error also count as zero, because otherwise ever faster bounces would never end.
+  !> Time when the boundary of a disk touches a wall, or its centre reaches a periodic side. A gap that is negative by rounding
+  !> counts as zero: if a disk at a wall still moves outwards, it is reflected immediately and cannot leave the box. At a moving
+  !> side, a gap smaller than the rounding error also counts as zero, because the series of ever faster bounces would otherwise be
+  !> infinite.
   pure function side_time(box, disk, side) result(t)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -54,7 +55,7 @@ contains
       if (motion%moves()) then
         since = disk%clock
         v = -sense*disk%v(axis)
-        if (motion%kind == piston) then             ! neither clock is later than the contact
+        if (motion%kind == piston) then             ! the clocks of the disk and of the piston are not later than the contact
           since = max(since, state%clock)
           after = since - disk%clock
           gap = gap + flight(0.0_real64, v, -sense*box%gravity(axis), after)
@@ -70,7 +71,7 @@ contains
     end associate
   end function side_time
 
-  !> The first side that a disk reaches. Of simultaneous ones the first in the order of sides is chosen.
+  !> The first side that a disk reaches. If a disk reaches two sides at the same time, the first in the order of sides is chosen.
   pure subroutine next_side(box, disk, t, side)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -90,9 +91,9 @@ contains
     end do
   end subroutine next_side
 
-  !> Moves a disk away from the sides that it would touch before `now`, after a change of the origin of its clock. The change
-  !> also rounds the position and velocity of a moving side, so that a disk almost in contact could collide in the past. The
-  !> displacement is of the order of the rounding error.
+  !> Moves a disk away from the sides that it would touch before `now`, after a change of the origin of its clock. The change also
+  !> rounds the position and velocity of a moving side, so that a disk almost in contact could collide in the past. The displacement
+  !> of the disk is of the order of the rounding error.
   pure subroutine separate_from_sides(box, disk, now)
     type(box_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk

@@ -8,10 +8,10 @@ module collisions
 
   !> Names of the wall rules in the input. A rule is represented by its position in this list.
   character(len=*), parameter :: wall_rules = "velocity normal"
-  integer, parameter :: normal_rule = 2              !! the rule of a smooth wall
+  integer, parameter :: normal_rule = 2              !! position of the rule 'normal', which applies to smooth walls
 
-  !> Names of the dependences of restitution on impact velocity in the input, and the coefficient c of `speed_law_t` for each.
-  !> It is 3/5 in the series for viscoelastic spheres.
+  !> Names in the input of the laws by which the restitution depends on the impact velocity, and the coefficient c of `speed_law_t`
+  !> in each law. In the series for viscoelastic spheres c is 3/5.
   character(len=*), parameter :: restitution_laws = "constant power viscoelastic"
   real(real64), parameter :: series_terms(3) = [0.0_real64, 0.0_real64, 0.6_real64]
 
@@ -71,7 +71,7 @@ contains
   !> Coefficient of restitution at an impact velocity.
   elemental function restitution_at(self, restitution, g) result(xi)
     class(speed_law_t), intent(in) :: self
-    real(real64), intent(in) :: restitution          !! coefficient at g0
+    real(real64), intent(in) :: restitution          !! coefficient of restitution at the impact velocity g0
     real(real64), intent(in) :: g                    !! normal impact velocity [length/time]
     real(real64) :: xi, y
 
@@ -81,7 +81,7 @@ contains
     xi = 1 - y + self%c*y**2
   end function restitution_at
 
-  !> Smallest coefficient at g0 for which the law is monotonic: there the series has its minimum at g0.
+  !> Smallest coefficient of restitution at g0 for which the law is monotonic. With this value the series has its minimum at g0.
   elemental function least(self) result(xi)
     class(speed_law_t), intent(in) :: self
     real(real64) :: xi
@@ -110,8 +110,8 @@ contains
     yes = self%restitution > -1
   end function is_rough
 
-  !> Tangential impulse on a body whose surface slips at a contact. It changes the slip velocity to -beta times its value, unless
-  !> Coulomb's law limits the force.
+  !> Tangential impulse on a body whose surface slips at a contact. The impulse multiplies the slip velocity by -beta, where beta is
+  !> the tangential restitution, unless Coulomb's law limits the impulse.
   pure function tangential_impulse(law, inertia, mass, slip, normal_impulse) result(impulse)
     type(tangential_law_t), intent(in) :: law
     real(real64), intent(in) :: inertia              !! moment of inertia over mass times radius squared, equal for both bodies
@@ -125,13 +125,14 @@ contains
     if (abs(impulse) > law%friction*normal_impulse) impulse = sign(law%friction*normal_impulse, impulse)
   end function tangential_impulse
 
-  !> Velocity after a collision with a wall at rest. The normal velocity afterwards points away from the wall, whatever its
-  !> sign was before, so that a second collision caused by rounding cannot send a disk through the wall.
+  !> Velocity after a collision with a wall at rest. The normal velocity after the collision points away from the wall for both
+  !> signs of the normal velocity before it. A second collision that is caused by rounding therefore cannot move a disk through the
+  !> wall.
   pure function wall_rebound(law, v, normal, elastic) result(after)
     type(wall_law_t), intent(in) :: law
     real(real64), intent(in) :: v(2)                 !! [length/time]
     real(real64), intent(in) :: normal(2)            !! unit vector from the wall to the disk
-    logical, intent(in) :: elastic                   !! the previous contact is not over yet (TC model)
+    logical, intent(in) :: elastic                   !! the previous contact of the disk has not ended yet (TC model)
     real(real64) :: after(2), approach, restitution
 
     approach = v(1)*normal(1) + v(2)*normal(2)

@@ -1,6 +1,6 @@
-!> Data of the disks, grouped by frequency of access: a record of one cache line, which is read in every prediction; a tag of
-!> half a cache line, which is needed only in events of the disk itself; and arrays that exist only in some simulations.
-!> Derived data are not stored in checkpoints; they are recomputed at every start.
+!> Data of the disks, grouped by the frequency of access. The record of a disk occupies one cache line and is read in every
+!> prediction. The tag of a disk occupies half a cache line and is needed only in events of the disk itself. Other arrays exist only
+!> in some simulations. Derived data are not stored in checkpoints, because they are recomputed at every start.
 module disks
   use free_flight, only: flight, flight_velocity
   use kinds, only: int16, int32, int64, real64
@@ -9,15 +9,15 @@ module disks
   public :: disk_t, extra_t, species_t, tag_t, whole_disk_t
   public :: disks_before, advance_disk, longest_name, names_of, species_by_id
 
-  !> Position, velocity and clock of a disk change only in its own collisions, and when it passes a periodic side. Positions at
-  !> other times are extrapolated.
+  !> Position, velocity and clock of a disk change only in the collisions of this disk, and when the disk passes a periodic side.
+  !> Positions at other times are extrapolated.
   type :: disk_t
     real(real64) :: x(2) = 0.0_real64           !! position at `clock` [length]
     real(real64) :: v(2) = 0.0_real64           !! velocity at `clock` [length/time]
     real(real64) :: clock = 0.0_real64          !! time at which x and v were set, since the epoch [time]
     real(real64) :: radius = 0.0_real64         !! [length]
-    ! Derived data. The collision counter (changes of x and v in this epoch), by which stale events are recognised, and the next
-    ! event, as predicted by the search.
+    ! Derived data: the collision counter, and the next event as predicted by the search. The collision counter is the number of
+    ! changes of x and v in this epoch; it serves to recognise stale events.
     integer(int32) :: collision_counter = 0
     integer(int32) :: partner = 0               !! index of a disk (> 0), or another code of `partners`
     real(real64) :: event_time = 0.0_real64     !! since the epoch [time]
@@ -30,13 +30,13 @@ module disks
     integer(int32) :: last_partner = 0          !! id of a disk, code of an obstacle, or 0; see `partners: repeated`
     ! Derived data of search and event queue.
     integer(int16) :: cell(2) = 0_int16         !! column and row in the cell grid
-    integer(int32) :: window = 0                !! time window in which the queue has filed the event
+    integer(int32) :: window = 0                !! time window to which the event queue has assigned the event
     integer(int32) :: partner_counter = 0       !! collision counter of the partner at the time of the prediction
   end type tag_t
 
-  integer, parameter :: longest_name = 40            !! longest name of a species
+  integer, parameter :: longest_name = 40            !! largest length of the name of a species
 
-  !> Disks of a species share the contact law and, unless a file contains individual masses, their mass.
+  !> A species: all its disks have the same contact law and, unless a file contains individual masses, the same mass.
   type :: species_t
     character(len=:), allocatable :: name
     integer :: count = 0
@@ -45,7 +45,8 @@ module disks
 
   !> Data of a disk that exist only in some simulations: see `simulation_state: has_extra`.
   type :: extra_t
-    real(real64) :: image(2) = 0.0_real64       !! number of periods travelled, integers: the unfolded position is x + image*edges
+    real(real64) :: image(2) = 0.0_real64       !! number of periods by which the disk has moved along each axis, an integer; the
+                                                !! unwrapped position is x + image*edges
     real(real64) :: last_contact = 0.0_real64   !! time of the last contact, since the epoch, for the TC model [time]
     real(real64) :: spin = 0.0_real64           !! angular velocity [1/time]
     real(real64) :: angle = 0.0_real64          !! orientation at `clock`, unwrapped [radian]
@@ -55,7 +56,7 @@ module disks
   type :: whole_disk_t
     type(disk_t) :: disk
     type(tag_t) :: tag
-    real(real64) :: own_mass = 0.0_real64       !! mass, if it differs from that of the species [mass]
+    real(real64) :: own_mass = 0.0_real64       !! mass of the disk, if masses within a species differ [mass]
     type(extra_t) :: extra
   end type whole_disk_t
 
@@ -85,7 +86,7 @@ contains
     end do
   end function names_of
 
-  !> Number of disks of the species before species s. These have lower ids.
+  !> Number of disks of the species that precede species s. These disks have lower ids.
   pure function disks_before(species, s) result(n)
     class(species_t), intent(in) :: species(:)
     integer, intent(in) :: s

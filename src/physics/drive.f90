@@ -1,5 +1,5 @@
-!> Driving of the disks at regular intervals: white noise, Andersen thermostat, Brownian or active motion. The velocity changes
-!> are carried out by `kicks`.
+!> Driving of the disks at regular intervals: white noise, Andersen thermostat, Brownian or active motion. The module `kicks`
+!> executes the velocity changes.
 module drive
   use kinds, only: int64, never, real64
   implicit none
@@ -15,7 +15,7 @@ module drive
     real(real64) :: interval = never                 !! time between kicks [time]
     real(real64) :: strength = 0.0_real64  !! noise strength: growth rate of the variance of each velocity component
                                            !! [velocity**2/time]
-    logical :: keep_momentum = .false.               !! the noise conserves the total momentum; false of other kinds
+    logical :: keep_momentum = .false.               !! the noise conserves the total momentum; .false. for other kinds
     real(real64) :: fraction = 1.0_real64            !! fraction of the disks that a kick of 'andersen' affects, on average
     real(real64) :: temperature = 0.0_real64         !! kT of the velocities drawn by 'andersen', 'brownian' and 'active' [energy]
     real(real64) :: speed = 0.0_real64               !! self-propulsion speed of active disks [length/time]
@@ -66,7 +66,7 @@ contains
     if (self%is_on()) t = k*self%interval
   end function time_of
 
-  !> Mean square of the velocity that a kick sets or adds, for disks of a species and a mass; 0 if they are not driven.
+  !> Mean square of the velocity that a kick sets or adds, for disks of a given species and mass; 0 if these disks are not driven.
   elemental function speed2(self, species, mass)
     class(drive_t), intent(in) :: self
     integer, intent(in) :: species                   !! index of the species

@@ -1,5 +1,5 @@
-!> Executes events: applies the contact law when two disks or a disk and a wall collide, moves disks through periodic sides,
-!> and updates counters and sums. Used by the event-driven and the time-stepped dynamics.
+!> Executes events: applies the contact law when two disks or a disk and a wall collide, moves disks through periodic sides, and
+!> updates counters and sums. Both the event-driven and the time-stepped dynamics use this module.
 module encounters
   use kinds, only: int32, int64, real64
   use collisions, only: pair_impulse, tangential_impulse
@@ -17,10 +17,10 @@ module encounters
   private
   public :: collide, collide_pair, encounter_text, is_periodic_side, pass_side
 
-  !> Limits for the detection of an inelastic collapse: the number of simultaneous collisions of a pair that any series may have,
-  !> and the approach velocity below which further collisions only result from rounding errors. The latter is relative to the
-  !> velocities and to the loss per collision. Where walls slow all disks down it is an absolute value, far below all velocities
-  !> that an input may contain [length/time].
+  !> Limits for the detection of an inelastic collapse. The first is the number of simultaneous collisions of a pair up to which a
+  !> series is not considered a collapse. The second is the approach velocity below which further collisions only result from
+  !> rounding errors, relative to the velocities and to the loss per collision. The third is an absolute approach velocity, for
+  !> systems in which walls slow all disks down; it is far below all velocities that an input may contain [length/time].
   integer(int32), parameter :: most_visible = most_repeats - 3
   real(real64), parameter :: rounded = 1.0e-12_real64, slowest = 1.0e-120_real64
 
@@ -31,7 +31,7 @@ contains
 
   !> Executes the collision of disk i at the time t with the partner `code`: another disk, a side or an obstacle. This is the
   !> general version, which handles rotation, friction, velocity-dependent restitution, the virial tensor and the event log;
-  !> `collide_pair` is the fast one. The log entry does not depend on which of the two disks predicted the event. Two disks that
+  !> `collide_pair` is the fast version. The log entry does not depend on which of the two disks predicted the event. Two disks that
   !> are still in contact are skipped.
   subroutine collide(sim, i, code, t, counts, log)
     type(simulation_t), intent(inout) :: sim
@@ -107,21 +107,23 @@ contains
     dx = sim%disk(j)%x - sim%disk(i)%x
     dv = sim%disk(j)%v - sim%disk(i)%v
     if (any(sim%box%periodic)) then
-      if (any(abs(dx) >= 0.5_real64*sim%box%edges())) call use_nearest_image(sim, t, dx, dv)  ! rarely needed
+      if (any(abs(dx) >= 0.5_real64*sim%box%edges())) call use_nearest_image(sim, t, dx, dv)  ! needed only for a few pairs
     end if
     b = dx(1)*dv(1) + dx(2)*dv(2)
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
     mass_i = sim%species(si)%mass
     mass_j = sim%species(sj)%mass
-    if (allocated(sim%own_mass)) then                ! as in `mass_of`, with one test for both
+    if (allocated(sim%own_mass)) then                ! as in `mass_of`, with a single test for the two disks
       mass_i = sim%own_mass(i)
       mass_j = sim%own_mass(j)
     end if
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
-    sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx  ! multiplication by a reciprocal would be rounded in the same direction each time
+    sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx  ! a division, because rounding errors of a stored reciprocal mass would always
+                                                   ! have the same sign
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     dv = sim%disk(j)%v - sim%disk(i)%v
-    if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call remove_residual_approach(sim, i, j)  ! the pair still approaches, by rounding
+    if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call remove_residual_approach(sim, i, j)  ! because of rounding the two disks still approach
+                                                                                 ! each other
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(j)%collisions = sim%tag(j)%collisions + 1
     sim%tag(i)%last_partner = sim%tag(j)%id
@@ -151,10 +153,10 @@ contains
     g = abs(dot_product(dx, dv))/magnitude(dx)
   end function impact_velocity
 
-  !> Counts a lossy collision of two disks both of which have already collided at exactly this time. This is common when more than
-  !> two disks are in contact, and the series usually ends. An inelastic collapse is an infinite series: the same disks collide
-  !> again and again until their approach velocity is no more than the rounding error of their velocities. Elastic disks and
-  !> disks with a contact duration (TC model) cannot collapse.
+  !> Counts an inelastic collision of two disks both of which have already collided at exactly this time. Such a series of
+  !> simultaneous collisions is common when more than two disks are in contact, and is usually finite. An inelastic collapse is an
+  !> infinite series: the same disks collide again and again until their approach velocity is no more than the rounding error of
+  !> their velocities. Elastic disks and disks with a contact duration (TC model) cannot collapse.
   pure subroutine count_simultaneous_collision(sim, i, j, t, counts, n)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
@@ -168,7 +170,7 @@ contains
     restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(j)%species)
     if (sim%law%contact_time > 0 .or. .not. restitution < 1) return
     last_partner = sim%tag([i, j])%last_partner
-    ! If one of the disks has collided with a wall in between, the count of the other one is used.
+    ! If one of the disks has collided with a wall since the last collision of the pair, the count of the other disk is used.
     n = minval(merge(repeats(last_partner), most_repeats, last_partner > 0)) + 1
     fastest = max(magnitude(sim%disk(i)%v), magnitude(sim%disk(j)%v))
     if (impact_velocity(sim, i, j, t) > max(rounded*(1 - restitution)*fastest, slowest)) n = min(n, most_visible)
@@ -212,7 +214,7 @@ contains
   pure function momentum_change(sim, i, j, v, w) result(change)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: j              !! index of the partner; not positive if there is none
+    integer(int32), intent(in) :: j              !! index of the partner disk; not positive if the partner is a surface
     real(real64), intent(in) :: v(2), w(2)       !! velocities before the collision [length/time]
     real(real64) :: change(2)                    !! [mass length/time]
 
@@ -223,11 +225,11 @@ contains
     end if
   end function momentum_change
 
-  !> Magnitude of this change.
+  !> Magnitude of the momentum change of disk i.
   pure function impulse_between(sim, i, j, v, w) result(impulse)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: j              !! index of the partner; not positive if there is none
+    integer(int32), intent(in) :: j              !! index of the partner disk; not positive if the partner is a surface
     real(real64), intent(in) :: v(2), w(2)       !! velocities before the collision [length/time]
     real(real64) :: impulse                      !! [mass length/time]
 
@@ -272,8 +274,8 @@ contains
     energy_gain = 0.5_real64*sim%mass_of(i)*dot_product(sim%disk(i)%v - before, sim%disk(i)%v + before)
   end function energy_gain
 
-  !> Adds a collision of disks i and j to the virial tensor, to the collisional heat flux, and to the work of the shear. The
-  !> latter is zero unless the disks collide across the lower or upper boundary.
+  !> Adds a collision of disks i and j to the virial tensor, to the collisional heat flux, and to the work of the shear. The work of
+  !> the shear is zero unless the disks collide across the lower or upper boundary.
   subroutine add_pair_sums(sim, i, j, change, transferred_energy)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
@@ -296,7 +298,8 @@ contains
     call remove_residual_approach(sim, i, j)
   end subroutine add_pair_sums
 
-  !> Replaces the separation and relative velocity of two disks at the time t by those to the nearest image of the second disk.
+  !> Replaces the separation and relative velocity of two disks at the time t by the separation from, and the velocity relative to,
+  !> the nearest image of the second disk.
   pure subroutine use_nearest_image(sim, t, dx, dv)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: t
@@ -312,8 +315,9 @@ contains
     dv(1) = dv(1) + image%velocity
   end subroutine use_nearest_image
 
-  !> True if disks i and j, which touch at the time t, are still in contact after their last collision, through the same
-  !> periodic image. Without forces between them, an approach is then a rounding error, from the shift of one disk by a period.
+  !> True if disks i and j, which touch at the time t, are still in contact after their last collision, through the same periodic
+  !> image. There are no forces between the disks. An approach of two such disks is therefore a rounding error, which results from
+  !> the shift of one disk by a period.
   pure function are_in_contact(sim, i, j, t) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
@@ -360,7 +364,7 @@ contains
     end associate
   end subroutine remove_residual_approach
 
-  !> Whether a code is that of a periodic side.
+  !> Whether a code represents a periodic side.
   pure function is_periodic_side(sim, code) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: code
@@ -370,7 +374,7 @@ contains
     if (is_side(code)) yes = sim%box%periodic(axis_of(code))
   end function is_periodic_side
 
-  !> Moves disk i by one period when it passes a periodic side at the time t. Its clock does not change.
+  !> Moves disk i by one period when it passes a periodic side at the time t. The clock of the disk does not change.
   subroutine pass_side(sim, i, code, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -415,7 +419,7 @@ contains
   !> Disk i, its partner and the time, as a text for messages.
   pure function encounter_text(sim, i, code) result(text)
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i, code           !! as in `partners`
+    integer(int32), intent(in) :: i, code           !! index of the disk and code of its partner: see `partners`
     character(len=:), allocatable :: text
 
     text = disk_text(i)

@@ -8,7 +8,8 @@ module event_log
   integer, parameter :: record_length = 6, first_room = 1024
 
   type :: event_log_t
-    integer :: most = huge(0)                     !! number of entries at which the dynamics returns to the caller
+    integer :: most = huge(0)                     !! largest number of entries; the dynamics returns to the caller when the log
+                                                  !! reaches it
     integer :: n = 0                              !! number of entries
     !> (6, at least n) Time since the start of the run, ids i and j in the order of the input, and the momentum change of disk
     !> i: magnitude and two components [mass length/time]. For a wall, j is the code of the surface: see `partners`.
@@ -40,7 +41,7 @@ contains
     self%record(:, self%n) = record
   end subroutine append
 
-  !> Drops the oldest entries of a log that has become twice as long as it has to be.
+  !> Deletes the oldest entries of a log that has become twice as long as necessary.
   pure subroutine keep(self, least)
     class(event_log_t), intent(inout) :: self
     integer, intent(in) :: least                    !! number of latest entries that are needed

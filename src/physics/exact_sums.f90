@@ -1,4 +1,4 @@
-!> Sums whose value does not depend, to the last bit, on the order of their terms. They are fixed-point numbers.
+!> Sums that are bit-identical for any order of their terms. They are stored as fixed-point numbers.
 module exact_sums
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use kinds, only: int64, int128, real64
@@ -11,14 +11,16 @@ module exact_sums
   real(real64), parameter :: most_units = 2.0_real64**digits_of_bound
   real(real64), parameter :: rare_unit = 2.0_real64**digits_of_rare
   integer, parameter :: digits_of_most = 125
-  integer(int128), parameter :: most = 2_int128**digits_of_most    !! limit of both numbers; the sum is lost beyond it
+  integer(int128), parameter :: most = 2_int128**digits_of_most    !! limit of the two integers of a sum; beyond this limit the sum
+                                                                   !! is NaN
 
-  !> A fixed-point sum. Terms may exceed the bound that was passed to `choose_unit`; adding them takes slightly longer. 2**35
+  !> A fixed-point sum. A term may exceed the bound that was passed to `choose_unit`; its addition then takes slightly longer. 2**35
   !> terms of any size below 2**90 units cannot overflow; multiples of 2**90 units in larger terms are counted separately.
   type :: exact_sum_t
     integer(int128) :: units = 0
     integer(int128) :: rare = 0                          !! multiples of 2**90 units
-    real(real64) :: per_one = 0.0_real64                 !! units per 1, a power of two; 0: not chosen yet
+    real(real64) :: per_one = 0.0_real64                 !! reciprocal of the unit, a power of two; 0 if the unit has not been
+                                                         !! chosen yet
   contains
     procedure :: choose_unit
     procedure :: add
@@ -30,7 +32,7 @@ module exact_sums
 
 contains
 
-  !> Chooses a unit that is fine enough for terms up to a bound. A sum that already has terms keeps its value.
+  !> Chooses a unit that is fine enough for terms up to a bound. The value of a sum that already contains terms does not change.
   elemental subroutine choose_unit(self, bound)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: bound
@@ -76,7 +78,7 @@ contains
     self%rare = left
   end subroutine make_coarser
 
-  !> Adds a term; the part below one unit is cut off.
+  !> Adds a term, which is truncated to a multiple of the unit.
   elemental subroutine add(self, term)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: term
@@ -92,7 +94,8 @@ contains
     end if
   end subroutine add
 
-  !> Adds a very large term in two parts. Both are exact, because a double has fewer digits than either number.
+  !> Adds a very large term in two parts. Both parts are exact, because a number in double precision has fewer digits than each of
+  !> the two integers of the sum.
   elemental subroutine add_rare(self, units)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: units

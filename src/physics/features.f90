@@ -1,5 +1,5 @@
-!> Features of a run beyond free flight and collisions that change only two velocities. They determine the arrays of the
-!> disks, the observables, the version of the collision procedure, and the inputs that are refused.
+!> Optional features of a run. A run without them has only free flight and collisions that change two velocities and nothing else.
+!> They determine the arrays of the disks, the observables, the version of the collision procedure, and the inputs that are refused.
 module features
   implicit none
   private
@@ -9,7 +9,7 @@ module features
     logical :: own_sizes = .false.      !! disks have individual masses and radii
     logical :: rotation = .false.       !! disks can rotate
     logical :: orientation = .false.    !! disks have an orientation; true for all disks that can rotate
-    logical :: stress = .false.         !! momentum changes in collisions are summed and logged
+    logical :: stress = .false.         !! the momentum changes in collisions are added to sums and to the log
     logical :: helfand = .false.        !! the Helfand moments are accumulated as well
   contains
     procedure :: need_general_collision

@@ -32,20 +32,20 @@ module observables
   !> Indices of sums over the disks of a species, or over all disks.
   integer, parameter :: disks = 1, mass = 2, speed = 3, momentum = 4       !! momentum has two components
   integer, parameter :: kinetic = 6, potential = 7, rotational = 8         !! energies
-  integer, parameter :: own_kinetic = 9, own_momentum = 10  !! relative to the velocity profile of a sheared box; momentum has two
-                                                            !! components
-  integer, parameter :: flux = 12               !! five components: see `tally: kinetic_flux`; relative to the profile as well
+  integer, parameter :: own_kinetic = 9, own_momentum = 10  !! kinetic energy and momentum relative to the velocity profile of a
+                                                            !! sheared box; the momentum has two components
+  integer, parameter :: flux = 12               !! five components, see `tally: kinetic_flux`; also relative to the velocity profile
   integer, parameter :: tensor(*) = flux + [0, 1, 1, 2]                    !! components xx, xy, yx, yy of the momentum flux
   !> Total energy and the rounding error of its sum, precise enough for an energy balance. Zero unless `is_driven`.
   integer, parameter :: energy = 17, lost = 18
 
 contains
 
-  !> All observables with their present values. A new observable needs one more line here.
+  !> All observables with their present values. To introduce a new observable, add a line in this procedure.
   pure function observed(sim) result(list)
     type(simulation_t), intent(in) :: sim
     type(observable_list_t) :: list
-    real(real64) :: sums(lost, 0:size(sim%species))   ! by species; index 0: all disks
+    real(real64) :: sums(lost, 0:size(sim%species))   ! sums for each species; those with index 0 are for all disks
     character(len=:), allocatable :: path
     real(real64) :: flux_integral(5)                          ! time integrals of the fluxes [energy time], [energy length]
     real(real64) :: at(2, 2)                          ! positions of the lower and upper sides [length]
@@ -103,8 +103,8 @@ contains
     now = total(sim, sums(:, 0))
   end function total_energy
 
-  !> Adds averages per disk over a species. The temperature is kT in two dimensions, from the kinetic energy relative to the
-  !> mean motion and to the velocity profile of a sheared box.
+  !> Adds averages per disk over the disks of a species. The temperature is kT in two dimensions. It is computed from the kinetic
+  !> energy relative to the mean velocity and, in a sheared box, relative to the velocity profile.
   pure subroutine add_means(list, group, sums, rotation)
     type(observable_list_t), intent(inout) :: list
     character(len=*), intent(in) :: group         !! name of the species
@@ -170,13 +170,13 @@ contains
     empty%drive%kind = noise
     call empty%tally%make_room(n_sides)
     empty%box = box_t()
-    empty%box%surface%law%temperature = 1         ! enables all observables
+    empty%box%surface%law%temperature = 1         ! a thermal law for all surfaces enables all observables
     empty%box%surface%law%speed = 1
     empty%features%stress = .true.
     empty%features%helfand = .true.
     list = observed(empty)
     allocate (names(list%n + 1))
-    names(list%n + 1) = "obstacles"                 ! the empty box has no obstacles
+    names(list%n + 1) = "obstacles"                 ! added here, because the empty box has no obstacles
     do k = 1, list%n
       associate (name => list%row(k)%name)
         names(k) = name(:index(name//"/", "/") - 1)

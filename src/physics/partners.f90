@@ -1,6 +1,7 @@
-!> Partners of a disk in an event, each represented by an integer code: another disk (> 0), a surface of the box (0, -1, -2, -3:
-!> left, right, bottom and top side; -4, -5, ...: an obstacle), or the boundary of its cell (large negative codes). The event
-!> log contains the same codes for disks and surfaces. Side k of the box has the code 1 - k; the codes of obstacles follow.
+!> Defines integer codes for the partners of a disk in an event. The partner is another disk (> 0), a surface of the box (0, -1, -2,
+!> -3 for the left, right, bottom and top side; -4, -5, ... for an obstacle), or the boundary of the cell of the disk (large
+!> negative codes). The event log contains the same codes for disks and surfaces. Side k of the box has the code 1 - k. The codes of
+!> obstacles continue this sequence.
 module partners
   use kinds, only: int32
   implicit none
@@ -11,17 +12,18 @@ module partners
 
   integer(int32), parameter :: n_sides = 4
   integer(int32), parameter :: first_crossing = -2000000000
-  !> Code of a repeated search: the disk leaves the region in which contacts were searched, inside its cell. One less if that
-  !> region ends to the right or above.
+  !> Code of an event that requires a new search: the disk leaves the region in which contacts were searched, but stays in its cell.
+  !> The code is reduced by 1 if the disk leaves this region through its right or upper edge.
   integer(int32), parameter :: looks_again = first_crossing - n_sides
   integer(int32), parameter :: nothing = -huge(1_int32)
-  integer(int32), parameter :: most_repeats = 11           !! largest number of simultaneous collisions of a series that is counted
+  integer(int32), parameter :: most_repeats = 11           !! largest length of a series of simultaneous collisions that can be
+                                                           !! stored
   integer(int32), parameter :: per_repeat = 2_int32**27    !! larger than any id of a disk
   character(len=6), parameter :: side_name(n_sides) = ["left  ", "right ", "bottom", "top   "]
 
 contains
 
-  !> Whether a code, which is not that of a disk, is a side of the box.
+  !> Whether a code that does not represent a disk represents a side of the box.
   elemental function is_side(code) result(yes)
     integer(int32), intent(in) :: code
     logical :: yes
@@ -29,7 +31,7 @@ contains
     yes = code > -n_sides
   end function is_side
 
-  !> Whether a code, which is not that of a disk, is a side or an obstacle, and not the boundary of a cell.
+  !> Whether a code that does not represent a disk represents a side or an obstacle, and not the boundary of a cell.
   elemental function is_wall(code) result(yes)
     integer(int32), intent(in) :: code
     logical :: yes
@@ -45,7 +47,7 @@ contains
     code = 1 - n_sides - m
   end function obstacle_code
 
-  !> The index of the obstacle with this code.
+  !> The index of the obstacle with the given code.
   elemental function obstacle_number(code) result(m)
     integer(int32), intent(in) :: code
     integer(int32) :: m
@@ -61,7 +63,7 @@ contains
     axis = 1 - side/2
   end function axis_of
 
-  !> Direction in which a side is passed outwards: +1 right and top, -1 left and bottom.
+  !> Direction of the outward normal of a side along its axis: +1 for the right and top side, -1 for the left and bottom side.
   elemental function sense_of(side) result(sense)
     integer(int32), intent(in) :: side
     integer(int32) :: sense
@@ -88,7 +90,7 @@ contains
   !> The value of `last_partner` for a disk that has collided with its partner as the n-th in a series of simultaneous collisions.
   !> Such series are rare; all other collisions store the plain id of the partner.
   elemental function repeated(id, n) result(last_partner)
-    integer(int32), intent(in) :: id               !! id of the partner, a disk
+    integer(int32), intent(in) :: id               !! id of the partner, which is a disk
     integer(int32), intent(in) :: n                !! length of the series, at most `most_repeats`
     integer(int32) :: last_partner
 

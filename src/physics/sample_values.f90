@@ -15,14 +15,14 @@ module sample_values
     logical :: is_count = .false.
   end type frame_column_t
 
-  !> Columns of a frame: first those of all runs, then those of some runs only.
+  !> Columns of a frame: first the columns that exist in all runs, then those that exist only in some runs.
   type(frame_column_t), parameter :: columns(*) = [frame_column_t("position", 2), frame_column_t("velocity", 2), &
     frame_column_t("event_count", is_count=.true.), frame_column_t("image", 2, is_count=.true.), &
     frame_column_t("angular_velocity"), frame_column_t("orientation")]
 
 contains
 
-  !> Columns of the frames of a simulation: the positions, and those of the others that are wanted [all].
+  !> Columns of the frames of a simulation: the positions, and the other columns in `wanted` [default: all].
   pure function frame_columns(sim, wanted) result(list)
     type(simulation_t), intent(in) :: sim
     character(len=*), intent(in), optional :: wanted(:)   !! names of the wanted columns
@@ -43,7 +43,7 @@ contains
     real(real64) :: x(2), v(2), image(2)
     integer(int32) :: i, k, n
     integer :: c, first
-    integer :: at(size(columns))                  ! first element of each column in the sample; 0: not wanted
+    integer :: at(size(columns))                  ! first element of each column in the sample; 0 if the column is not wanted
 
     n = sim%n_disks()
     allocate (sample(2 + n*sum(list%width), 1))
@@ -75,13 +75,13 @@ contains
     !$omp end parallel do
   end function frame_sample
 
-  !> Moves a disk by whole periods into the box, which includes only its lower sides, and counts the periods. Rows come first,
-  !> because in a sheared box they change the column.
+  !> Moves a disk by whole periods into the box and counts the periods. Points on the left and lower side belong to the box, points
+  !> on the right and upper side do not. Shifts along y are applied first, because in a sheared box they also change x.
   pure subroutine wrap(sim, x, v, image)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(inout) :: x(2)           !! [length]
     real(real64), intent(inout) :: v(2)           !! [length/time]
-    real(real64), intent(inout) :: image(2)       !! number of periods travelled
+    real(real64), intent(inout) :: image(2)       !! number of periods by which the disk has moved
     real(real64) :: periods
     integer :: axis
 
@@ -96,7 +96,7 @@ contains
           x(1) = x(1) - periods*(upper - lower)
           image(1) = image(1) + periods
         end if
-        x(axis) = max(x(axis), lower)             ! outside only by rounding
+        x(axis) = max(x(axis), lower)             ! the position can be outside only because of rounding
       end associate
     end do
   end subroutine wrap

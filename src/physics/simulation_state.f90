@@ -14,14 +14,14 @@ module simulation_state
   private
   public :: specification_t, simulation_t, system_t
 
-  !> Largest factor by which terms of sums usually exceed the typical terms of the heaviest disks, and largest factor for the
-  !> typical terms of the lightest disks.
+  !> Factors for the bounds of sums: the largest factor by which terms usually exceed the typical terms of the heaviest disks, and
+  !> the corresponding factor for the lightest disks.
   real(real64), parameter :: common = 2.0_real64**7, rare = 2.0_real64**22
-  !> Walls and kicks may do far less work than their parameters suggest, and none before they first act. The units are therefore
-  !> refined by this factor, so that they resolve the energies before that.
+  !> The work of walls and kicks may be far less than their parameters suggest, and it is zero before they first act. The units of
+  !> sums are therefore refined by this factor, so that they also resolve the energies of the undriven disks.
   real(real64), parameter :: finer = 2.0_real64**(-30)
 
-  !> Everything that acts on disks.
+  !> The system: box, contact law, driving and features, which together determine the motion of the disks.
   type :: system_t
     type(box_t) :: box
     type(contact_law_t) :: law
@@ -37,24 +37,25 @@ module simulation_state
 
   !> The values given by the input and the state that a checkpoint stores.
   type, extends(specification_t) :: simulation_t
-    type(disk_t), allocatable :: disk(:)          !! (n) sorted by cells; `tag%id` is the number in the input
+    type(disk_t), allocatable :: disk(:)          !! (n) the disks, sorted by cells; `tag%id` is the position of a disk in the input
     type(tag_t), allocatable :: tag(:)            !! (n)
     real(real64), allocatable :: own_mass(:)      !! (n) individual masses, allocated if those of a species differ [mass]
     type(extra_t), allocatable :: extra(:)        !! (n) allocated if `has_extra`
     real(real64) :: now = 0.0_real64              !! present time, since the epoch [time]
     logical :: events_done = .false.              !! all events up to and including `now` have been executed
-    real(real64) :: epoch_begin = 0.0_real64      !! beginning of the epoch on its own clock [time]
+    real(real64) :: epoch_begin = 0.0_real64      !! start of the epoch, relative to the origin of time of this epoch [time]
     real(real64) :: epoch_end = 0.0_real64        !! end of the epoch, since the epoch; 0: not known yet [time]
-    integer(int64) :: epoch_events = 0            !! number of events at the beginning of the epoch
+    integer(int64) :: epoch_events = 0            !! number of events before the start of the epoch
     ! For the detection of a collapse, an infinite series of events during which time does not advance:
-    real(real64) :: negligible_time = 0.0_real64  !! time in which no disk moves noticeably; 0: not known yet [time]
-    real(real64) :: last_advance = 0.0_real64     !! time of the last advance by more than that, since the epoch [time]
-    integer(int64) :: events_then = 0             !! number of events at that time
+    real(real64) :: negligible_time = 0.0_real64  !! time in which no disk moves noticeably; 0 if it is not known yet [time]
+    real(real64) :: last_advance = 0.0_real64     !! time of the last advance by more than `negligible_time`, since the epoch [time]
+    integer(int64) :: events_then = 0             !! number of events at the time `last_advance`
     integer(int64) :: kicks = 0                   !! number of kicks since the start of the run
     integer(int64) :: changes = 0                 !! number of changes to forces, laws or velocities since the start of the run
     type(tally_t) :: tally                        !! counters and sums since the start of the run
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
-    real(real64) :: reference_energy = 0.0_real64  !! kinetic energy when the velocities were last set, at the start or by a change
+    real(real64) :: reference_energy = 0.0_real64  !! kinetic energy at the time when the velocities were last set, at the start or
+                                                   !! by a change
     real(real64) :: typical_speed2 = 0.0_real64   !! largest mean square speed at the start and after changes [(length/time)**2]
   contains
     procedure :: time
@@ -112,7 +113,7 @@ contains
     n = size(self%disk, kind=int32)
   end function n_disks
 
-  !> Allocates the disks of all species in the order of the input. Individual masses are set later.
+  !> Allocates the disks of all species in the order of the input. The caller sets individual masses later.
   pure subroutine list_disks(self)
     class(simulation_t), intent(inout) :: self    !! in: with all values given by the input
     integer(int32) :: i
@@ -138,7 +139,7 @@ contains
   pure subroutine make_room(self, n, like)
     class(simulation_t), intent(inout) :: self    !! in: with all values given by the input
     integer(int32), intent(in) :: n
-    class(simulation_t), intent(in), optional :: like   !! whole simulation, if this one is a domain of it
+    class(simulation_t), intent(in), optional :: like   !! the whole simulation, if `self` is one of its domains
     logical :: own_masses
 
     own_masses = self%features%own_sizes
@@ -261,7 +262,8 @@ contains
     self%extra(i)%spin = self%extra(i)%spin + change/self%inertia_of(i)
   end subroutine change_angular_momentum
 
-  !> Rotates disk i to its orientation at the time t. Called before `disks: advance_disk` changes its clock.
+  !> Rotates disk i to its orientation at the time t. This procedure has to be called before `disks: advance_disk` changes the clock
+  !> of the disk.
   pure subroutine rotate_to(self, i, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -270,12 +272,13 @@ contains
     if (self%features%rotation) self%extra(i)%angle = self%extra(i)%angle + self%extra(i)%spin*(t - self%disk(i)%clock)
   end subroutine rotate_to
 
-  !> Registers a contact of disk i at the time t. `elastic` becomes .true. if its previous contact is not over yet (TC model).
+  !> Registers a contact of disk i at the time t. `elastic` becomes .true. if the previous contact of the disk has not ended yet (TC
+  !> model).
   pure subroutine register_contact(self, i, t, elastic)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: t
-    logical, intent(inout) :: elastic             !! in: already elastic for another reason
+    logical, intent(inout) :: elastic             !! in: .true. if the collision is elastic for another reason
 
     associate (last => self%extra(i)%last_contact)
       elastic = elastic .or. (self%tag(i)%collisions > 0 .and. t - last < self%law%contact_time)
@@ -283,8 +286,9 @@ contains
     end associate
   end subroutine register_contact
 
-  !> Registers that disk i had another velocity until the time t. The time integral of a flux is its present value times the time,
-  !> minus the sum of its changes times the times at which they occurred. This is exact at every moment.
+  !> Updates the sums of the flux changes: disk i had the velocity `before` until the time t, and has another velocity now. The time
+  !> integral of a flux is its present value times the time, minus the sum of its changes times the times at which they occurred.
+  !> This integral is exact at any time.
   pure subroutine record_velocity_change(self, i, before, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -363,9 +367,9 @@ contains
     end do
   end function mean_square_speed
 
-  !> Chooses the units of the sums from the most common terms: those of disks with the mean square speed, or those that walls and
-  !> kicks usually produce. If masses differ widely, terms of the lightest disks are still summed with 40 binary digits, and
-  !> rare terms of the heaviest disks exceed the bound of `exact_sum_t`, which then takes slightly longer.
+  !> Chooses the units of the sums from the most common terms: the terms of disks with the mean square speed, or the terms that
+  !> walls and kicks usually produce. If masses differ widely, terms of the lightest disks are still summed with 40 binary digits,
+  !> and rare terms of the heaviest disks exceed the bound of `exact_sum_t`, which then takes slightly longer.
   pure subroutine choose_units(self)
     class(simulation_t), intent(inout) :: self
     real(real64) :: mass(size(self%disk)), kicked(size(self%species))    ! [mass, (length/time)**2]

@@ -12,10 +12,11 @@ module tally
 
   type :: sum_t
     character(len=16) :: name
-    integer :: kind                                !! kind of its terms: `energies`, ...
+    integer :: kind                                !! kind of the terms of the sum, such as `energies`
   end type sum_t
 
-  !> Indices of the sums over collisions. Units, checkpoints and domains are all driven by the list `sums`.
+  !> Indices of the sums over collisions. The list `sums` determines the units of the sums and their order in checkpoints and in the
+  !> exchange between domains.
   integer, parameter, public :: virial = 1, dissipated = 2, heat = 3, work = 4, drive_energy = 5, stress = 6
   integer, parameter, public :: heat_virial = 10, flux_changes = 12  ! after the four of the stress, after the two of the heat
   type(sum_t), parameter :: sums(*) = [ &
@@ -32,13 +33,15 @@ module tally
     sum_t("flux_xx", momentum_transfers), sum_t("flux_xy", momentum_transfers), sum_t("flux_yy", momentum_transfers), &
     sum_t("flux_x", energy_transfers), sum_t("flux_y", energy_transfers)]
 
-  !> Sums for each surface of the box: the impulse on the surface [mass length/time], and the energy gained by disks.
+  !> Sums for each surface of the box: the impulse on the surface [mass length/time], and the energy that disks have gained in
+  !> collisions with the surface [energy].
   integer, parameter, public :: impulse = 1, gain = 3
 
   type :: tally_t
     integer(int64) :: events = 0                   !! number of events
     integer(int64) :: collisions = 0               !! number of collisions of disks
-    integer(int64) :: simultaneous = 0             !! simultaneous lossy collisions, see `encounters: count_simultaneous_collision`
+    integer(int64) :: simultaneous = 0             !! number of simultaneous inelastic collisions, see `encounters:
+                                                   !! count_simultaneous_collision`
     real(real64) :: collapse = never               !! time of the first collapse, since the start of the run [time]
     type(exact_sum_t) :: sum(size(sums))
     integer(int64), allocatable :: surface_collisions(:)  !! (surfaces) number of collisions with each surface
@@ -53,7 +56,7 @@ module tally
 
 contains
 
-  !> Allocates the sums for n surfaces, unless they are allocated.
+  !> Allocates the sums for n surfaces, unless the sums are already allocated.
   pure subroutine make_room(self, n)
     class(tally_t), intent(inout) :: self
     integer, intent(in) :: n
@@ -63,7 +66,7 @@ contains
     allocate (self%surface_sums(gain, n))
   end subroutine make_room
 
-  !> Chooses units that are fine enough for terms up to these bounds.
+  !> Chooses units that are fine enough for terms up to the given bounds.
   pure subroutine choose_units(self, bound)
     class(tally_t), intent(inout) :: self
     real(real64), intent(in) :: bound(:)           !! bound for each kind of terms
@@ -106,7 +109,7 @@ contains
     call self%surface_sums%include(other%surface_sums)
   end subroutine include
 
-  !> Sets all counters and sums to zero; the units are kept.
+  !> Sets all counters and sums to zero. The units do not change.
   pure subroutine clear(self)
     class(tally_t), intent(inout) :: self
 
