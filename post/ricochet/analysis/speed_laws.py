@@ -1,11 +1,11 @@
-"""Tests of the speeds of disks against the law that applies to them.
+"""Tests of the speeds of disks against the expected distribution.
 
-Each frame is scaled by its own energy, so that neither an energy that is fixed nor one that
-fluctuates slowly matters.  Scaled speeds are closer to their law than values that are drawn freely
-(Lilliefors, J. Am. Stat. Assoc. 62, 399 (1967)).  The p-values are therefore those of drawn frames
-of the same numbers of disks, scaled in the same way: velocities are uniform on the sphere of one
-energy, less the motion of the centre of mass where that is `comoving`.  Samples of frames that are
-correlated are counted by their statistical inefficiency.
+The speeds of each frame are scaled by the energy of the frame, so that conserved and slowly
+fluctuating energies do not influence the test.  Scaled speeds are closer to their distribution than
+independent values (Lilliefors, J. Am. Stat. Assoc. 62, 399 (1967)).  The p-values therefore follow
+from random frames with the same numbers of disks that are scaled in the same way: velocities are
+uniform on the sphere of constant energy, relative to the centre of mass along the `comoving` axes.
+Correlated frames are weighted according to their statistical inefficiency.
 """
 
 from collections.abc import Sequence
@@ -29,13 +29,13 @@ MANY = 2000  # disks, among whom the motion of the centre of mass does not matte
 #: Excess of an inefficiency times the root of the frames: one standard deviation of the noise of
 #: cumulative counts, of which two are independent, and two of the counts in all bins.
 LEAST_DISTANCE, LEAST_CHI2 = 1.4, 4 / np.sqrt(BINS - 1)
-TAIL = 0.05  # share of the drawn samples whose exponential tail continues their distribution
+TAIL = 0.05  # fraction of the samples that an exponential tail replaces
 
 
 class SpeedTest(NamedTuple):
-    """Comparison of speeds with the law that applies."""
+    """Result of comparing speeds with the expected distribution."""
 
-    law: str  # "fixed_energy" of N disks that share one, or "Maxwell"
+    law: str  # "fixed_energy" (N disks share a fixed energy), or "Maxwell"
     independent: float  # number of independent speeds
     ks: float  # Kolmogorov-Smirnov distance
     ks_p: float  # probability of a larger distance by chance
@@ -44,9 +44,9 @@ class SpeedTest(NamedTuple):
 
 
 def shares(run: Run, frames: Index, name: str) -> np.ndarray:
-    """Return energies (F, n) of a species over the mean of the frame.
+    """Return the energies (F, n) of a species divided by the mean energy of the frame.
 
-    The mean is over all disks in equilibrium, over those of the species otherwise.
+    In equilibrium the mean is over all disks, otherwise over the disks of the species.
     """
     energy, own = thermal_energy(run, frames), run.of_species(name)
     unit = energy if run.nature.in_equilibrium else energy[:, own]
@@ -59,17 +59,17 @@ class Sample(NamedTuple):
     sharing: int  # disks that share the energy
     own: int  # disks of the species
     frames: int
-    axes: tuple[bool, ...] = (False, False)  # along which the centre of mass is at rest
+    axes: tuple[bool, ...] = (False, False)  # axes along which the centre of mass is at rest
     mass: tuple[
         float, ...
-    ] = ()  # of all disks, those of the species first; () if it does not matter
+    ] = ()  # masses of all disks, those of the species first; () if masses do not matter
 
     def law(self) -> Law:
-        """Return the distribution function of u, to which distances are measured."""
+        """Return the distribution function of u with which samples are compared."""
         return finite_n_cdf(self.sharing, all(self.axes) and self.own == self.sharing)
 
     def smaller(self) -> "Sample":
-        """Return a sample of no more than `MOST` speeds, whose scaled statistics are the same."""
+        """Return a sample of at most `MOST` speeds with the same scaled statistics."""
         most = self
         if self.sharing > MANY or not any(self.axes):
             own = min(self.own, MANY)
@@ -77,7 +77,7 @@ class Sample(NamedTuple):
         return most._replace(frames=min(self.frames, -(-MOST // most.own)))
 
     def draw(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Return `shares` (count, frames * own) of drawn samples."""
+        """Return the `shares` (count, frames * own) of random samples."""
         size = count * self.frames
         if self.mass:
             mass = np.array(self.mass)
@@ -94,7 +94,7 @@ class Sample(NamedTuple):
 
 
 def sample_of(run: Run, name: str, frames: int) -> Sample:
-    """Return of what kind the `shares` of a species are."""
+    """Return the properties of the sample of `shares` of a species."""
     own, axes = run.of_species(name), tuple(map(bool, comoving(run) | bool(run.shear_rate)))
     count = int(own.sum())
     mass = (*run.mass[own], *run.mass[~own]) if any(axes) and run.n_disks <= MANY else ()
@@ -114,7 +114,7 @@ def statistics_of(values: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def by_chance(sample: Sample) -> np.ndarray:
-    """Return n D^2 and chi^2 (2, DRAWN) of drawn samples, in increasing order."""
+    """Return n D^2 and chi^2 (2, DRAWN) of random samples in increasing order."""
     rng, law, parts = np.random.default_rng(1), sample.law(), []
     for _ in range(10):
         parts.append(statistics_of(law(np.sqrt(sample.draw(rng, DRAWN // 10)))))
@@ -122,7 +122,10 @@ def by_chance(sample: Sample) -> np.ndarray:
 
 
 def chance(found: float, drawn: np.ndarray) -> float:
-    """Return the share of drawn statistics (S,) beyond that found, with an exponential tail."""
+    """Return the fraction of random statistics (S,) above the measured one.
+
+    Beyond the largest random statistics an exponential tail is used.
+    """
     first = int(len(drawn) * (1 - TAIL))
     if found <= drawn[first]:
         return 1 - float(np.searchsorted(drawn, found)) / len(drawn)
@@ -133,15 +136,16 @@ def chance(found: float, drawn: np.ndarray) -> float:
 def per_frame(counts: np.ndarray, least: float) -> float:
     """Return the statistical inefficiency of counts in bins (F, B) of a run.
 
-    It is 1 unless it exceeds 1 by more than `least` / sqrt(F), which chance explains: chi^2 of many
-    bins is so sharp that the noise of an estimate would spoil its p-value.
+    The result is 1 unless the estimate exceeds 1 by more than `least` / sqrt(F), the size of random
+    deviations.  Without this threshold the noise of the estimate would distort the p-value of chi^2
+    with many bins.
     """
     found = statistical_inefficiency(counts) if len(counts) > 2 else 1.0
     return found if found > 1 + least / np.sqrt(len(counts)) else 1.0
 
 
 def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> SpeedTest:
-    """Compare the speeds of a species with the law that applies to them.
+    """Compare the speeds of a species with the expected distribution.
 
     Parameters
     ----------
@@ -155,9 +159,9 @@ def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> Speed
     Returns
     -------
     SpeedTest
-        both statistics with their probabilities; the law is "none" and they are NaN where no law
-        is known: of disks that keep their angular momentum in a round container, and of fewer than
-        three disks that are not in equilibrium with others
+        both statistics with their probabilities.  If no distribution is known, the law is "none"
+        and these numbers are NaN: for disks that conserve their angular momentum in a round
+        container, and for fewer than three disks that are not in equilibrium with others
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Speeds of the disks of a gas in units of their thermal speed, and their distribution."""
+"""Speeds of disks in units of the thermal speed, and moments of their distribution."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ __all__ = [
 def kt_of_frames(
     run: Run, frames: Index, species: str | None = None, component: int | None = None
 ) -> np.ndarray:
-    """Return the kT of some frames, from the momenta that are free.
+    """Return kT of the given frames from the degrees of freedom that are not conserved.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def kt_of_frames(
     species : str, optional
         the species [all disks together]
     component : int, optional
-        0 or 1 for kT_x or kT_y, the part of the velocities along x or y [the mean of both]
+        0 for kT_x, 1 for kT_y, the temperatures of the velocity components [mean of both]
 
     Returns
     -------
@@ -49,7 +49,7 @@ def kt_of_frames(
     """
     own = slice(None) if species is None else run.of_species(species)
     energy = thermal_energy(run, frames, component)[:, own].mean(axis=1)
-    bound = comoving(run) | bool(run.shear_rate)  # axes of which the mean motion is subtracted
+    bound = comoving(run) | bool(run.shear_rate)  # axes along which the mean velocity is subtracted
     if component is None:
         return energy * run.n_disks / (run.n_disks - bound.sum() / 2)
     return 2 * energy * run.n_disks / (run.n_disks - bound[component])
@@ -67,7 +67,7 @@ def reduced_speeds(
     frames : Index
         the frames
     each : bool
-        whether each frame has a kT of its own, instead of one for all of these frames
+        whether each frame is scaled with its own kT instead of the mean kT of all frames
     species : str, optional
         the species [all]
 
@@ -92,20 +92,21 @@ def reduced_speeds(
         own = energy[:, kind.disks]
         kt = np.mean(own, axis=1 if each else None, keepdims=True)
         if not kt.all():
-            raise Refused(f"{run.path}: '{kind.name}' is at rest (kT = 0), it has no thermal speed")
+            raise Refused(f"{run.path}: '{kind.name}' is at rest (kT = 0), so that its thermal "
+                "speed is 0")
         energy[:, kind.disks] /= kt
     return np.sqrt(energy[:, slice(None) if species is None else run.of_species(species)]).ravel()
 
 
 def moment(u: np.ndarray, power: int, independent: float) -> Estimate:
-    """Return the mean of a power of speeds that are scaled to a mean square of 1."""
+    """Return the mean of a power of speeds after scaling them to a mean square of 1."""
     mean = np.mean(u**power)
     rest = u**power - power / 2 * mean * u**2
     return Estimate(mean, np.std(rest) / np.sqrt(independent))
 
 
 def all_move(run: Run, frame: int) -> bool:
-    """Whether in a frame at least one disk of each species moves."""
+    """Return whether at least one disk of each species moves in a frame."""
     energy = run.kinetic_energy(frame)
     return all(energy[kind.disks].any() for kind in run.by_species)
 
@@ -113,14 +114,14 @@ def all_move(run: Run, frame: int) -> bool:
 def relaxation(
     run: Run, until: float = 16, frames: int | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the second Sonine coefficient a2 of early frames against collisions.
+    """Return the second Sonine coefficient a2 of early frames against collisions per disk.
 
     Parameters
     ----------
     run : Run
         a run
     until : float
-        collisions per disk up to which frames count
+        collisions per disk up to which frames are used
     frames : int, optional
         number of frames from the first one on, instead of `until`
 
@@ -158,7 +159,8 @@ def means(runs: Sequence[Run], frames: Sequence[Index], name: str) -> tuple[Esti
     Returns
     -------
     tuple of Estimate
-        speed and energy; the errors are over the runs, or over the frames of a single run
+        speed and energy; errors follow from the scatter of the runs, or of the frames of a single
+        run
 
     Examples
     --------

@@ -39,14 +39,14 @@ __all__ = [
 ]
 
 MOST_WINDOWS = 10**6
-FEWEST_RUNS = 4  # smallest number of runs whose errors serve as weights
+FEWEST_RUNS = 4  # smallest number of runs whose scatter is used as a weight
 
 
 class Estimate(NamedTuple):
-    """A mean with its error, half the 68 % interval."""
+    """A mean with its error, which is half the 68 % interval."""
 
     mean: Any  # a number, or an array of any shape
-    error: Any  # likewise
+    error: Any  # same shape as the mean
 
 
 class Curve(NamedTuple):
@@ -54,7 +54,7 @@ class Curve(NamedTuple):
 
     x: np.ndarray
     y: np.ndarray
-    error: np.ndarray  # NaN where there is none
+    error: np.ndarray  # NaN without an error
 
 
 class LawTest(NamedTuple):
@@ -68,7 +68,7 @@ class LawTest(NamedTuple):
 
 
 class PowerLaw(NamedTuple):
-    """Power law y = factor x^exponent; its error is that of a weighted fit."""
+    """Power law y = factor x^exponent; the error is that of a weighted fit."""
 
     factor: float
     exponent: float
@@ -77,7 +77,10 @@ class PowerLaw(NamedTuple):
     free: int = 0  # degrees of freedom
 
     def misses(self, runs: int) -> bool:
-        """Whether the points deviate more than errors over so many runs explain (Welch 1951)."""
+        """Return whether the points deviate more than errors from this number of runs explain.
+
+        The test is that of Welch (1951).
+        """
         if self.free < 1 or runs < FEWEST_RUNS:
             return False
         own, few = student(runs) ** 2 * self.chi2, (self.free + 2) * (runs - 1) / 3
@@ -102,8 +105,8 @@ def goodness_of_fit(
     bins : int
         number of bins of equal probability for the chi-square test
     independent : int, optional
-        number of independent values in the sample [all of them]; correlated values scatter
-        as if there were fewer
+        number of independent values in the sample [all values]; it is smaller than the number of
+        values if these are correlated
 
     Returns
     -------
@@ -129,17 +132,17 @@ def goodness_of_fit(
     )
 
 
-MANY = 1e12  # degrees of freedom: as good as known
+MANY = 1e12  # degrees of freedom of a known error
 ONE_SIGMA = float(scipy.special.ndtr(1))  # importing scipy.stats takes a second
 
 
 def student(samples: ArrayLike) -> Any:
-    """Return half the 68 % interval of a mean over its standard error, by Student's t.
+    """Return the ratio of half the 68 % interval of a mean to its standard error (Student's t).
 
     Parameters
     ----------
     samples : array_like
-        (...) numbers of independent samples, of which both were estimated
+        (...) numbers of independent samples from which mean and standard error were estimated
 
     Returns
     -------
@@ -155,12 +158,12 @@ def student(samples: ArrayLike) -> Any:
 
 
 def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
-    """Estimate a mean and its error from independent values, such as runs of several seeds.
+    """Estimate a mean and its error from independent values, such as those of several runs.
 
     Parameters
     ----------
     values : array_like
-        (..., R, ...) the values, of R runs along `axis`
+        (..., R, ...) the values; `axis` runs over R runs
     axis : int
         axis of the runs
 
@@ -188,15 +191,16 @@ def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estim
     Parameters
     ----------
     of : callable
-        takes a curve (P,) and returns the number, such as the time at which it crosses a level
+        function that returns a number for a curve (P,), such as the time at which the curve crosses
+        a level
     curve : Estimate
         (P,) the curve with its error
 
     Returns
     -------
     Estimate
-        middle and half the distance of the numbers of the two curves that lie an error below
-        and above; NaN if one of the numbers is, or if the curve has no error
+        mean and half the difference of two numbers: those of the curve minus its error and of the
+        curve plus its error; NaN if one of these is NaN, or if the curve has no error
 
     Examples
     --------
@@ -212,45 +216,47 @@ def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estim
 
 # --- series in time ---
 
-FINE, COARSE = 64, 16  # parts of a series; their means resolve slow modes
+FINE, COARSE = 64, 16  # number of parts of a series whose means resolve slow modes
 FEWEST = 8  # smallest number of independent samples for an error
-LEAST_WAVES, MOST_WAVES = 2, 8  # of the slow waves in a series that its error is from
-PER_WAVE = 6  # largest number of these waves times the statistical inefficiency, over the length
+LEAST_WAVES, MOST_WAVES = 2, 8  # number of slow waves from which the error of a series is estimated
+PER_WAVE = 6  # largest number of waves times inefficiency over length
 
 
 class SeriesMean(NamedTuple):
-    """The mean of a correlated series, with its error and what qualifies it."""
+    """The mean of a correlated series, with its error and diagnostics."""
 
     mean: float
-    error: float  # half the 68 % interval; NaN if worth fewer than `FEWEST` samples
+    error: float  # half the 68 % interval; NaN for fewer than `FEWEST` independent samples
     samples: float  # number of independent samples
-    drift: float  # slope over its error, as a Gaussian number of variance 1 if there is none
+    drift: float  # slope over its error; a standard Gaussian variable without a drift
     freedom: float = np.inf  # degrees of freedom of the error
 
     def scaled(self, factor: float, offset: float = 0.0) -> "SeriesMean":
-        """Return the mean of offset + factor x."""
+        """Return the mean of the series offset + factor x."""
         return self._replace(mean=offset + factor * self.mean, error=abs(factor) * self.error)
 
 
 def cells(series: np.ndarray, count: int) -> np.ndarray:
-    """Return means over `count` equal parts of a series (T,), without the rest at its start."""
+    """Return the means over `count` equal parts of a series (T,), without the rest at its start."""
     width = max(1, len(series) // count)
     return series[len(series) % width :].reshape(-1, width).mean(axis=1)
 
 
 def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
-    """Estimate 1 + 2 tau of a series, tau its integrated autocorrelation time in samples.
+    """Estimate the statistical inefficiency 1 + 2 tau of a series.
 
-    So many samples are worth one independent sample.  The window of the sum and the correction
-    for the unknown mean are those of U. Wolff, Comput. Phys. Commun. 156, 143 (2004), S = 1.5.
-    Sums that end at the first negative term underestimate the error of short series.
+    tau is the integrated autocorrelation time in samples.  The variance of the mean is that of
+    independent samples times this inefficiency.  The window of the sum and the correction for the
+    unknown mean are those of U. Wolff, Comput. Phys. Commun. 156, 143 (2004), S = 1.5.  Sums that
+    end at the first negative term would underestimate the error of short series.
 
     Parameters
     ----------
     series : numpy.ndarray
-        (T,) samples at equal intervals; or (T, K) of K quantities, whose autocorrelations are added
+        (T,) samples at equal intervals, or (T, K) samples of K quantities, whose autocorrelations
+        are added
     least : float
-        lower bound of the result; values below 1 occur where samples are anticorrelated
+        lower bound of the result; anticorrelated samples have values below 1
 
     Returns
     -------
@@ -278,22 +284,22 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
 
 
 def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
-    """Estimate the mean of a correlated series, or the ratio of the sums of two series.
+    """Estimate the mean of a correlated series, or the ratio of the sums of two correlated series.
 
-    The error is that of the mean of amount - ratio * per, from the slowest waves in that series.
+    The error is that of the mean of the series amount - ratio * per, from its slowest waves.
 
     Parameters
     ----------
     amount : array_like
         (T,) samples of a series in equilibrium, such as numbers of collisions
     per : array_like
-        (T,) or a number: the series to divide by, such as durations
+        (T,) series by which the amounts are divided, such as durations; or a number
 
     Returns
     -------
     SeriesMean
-        the ratio of the sums, its error, the number of independent samples that the series is
-        worth, and its drift; the error is NaN if a few parts have most of the weight of `per`
+        the ratio of the sums, its error, the effective number of independent samples of the series,
+        and its drift; the error is NaN if a few parts contain most of the sum of `per`
 
     Examples
     --------
@@ -318,12 +324,12 @@ def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> Series
 
 
 def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
-    """Return the standard error of the mean of a series (T,), its freedom, and the drift.
+    """Return standard error of the mean, degrees of freedom and drift of a series (T,).
 
     The square of the error is the mean square of the first coefficients of the cosine transform
     over the length: E. Lazarus, D. J. Lewis, J. H. Stock and M. W. Watson, J. Bus. Econ. Stat. 36,
-    541 (2018).  There are so few of them that their waves are slow for the series.  The drift is
-    the first coefficient over the next ones.
+    541 (2018).  Only so few coefficients are used that their waves are slower than the correlations
+    of the series.  The drift is the ratio of the first coefficient to the following ones.
     """
     parts = cells(series, FINE)
     per_sample = max(1e-9, statistical_inefficiency(parts))
@@ -338,10 +344,10 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
 
 
 def equilibration(series: np.ndarray) -> int:
-    """Return the number of samples at the start of a series that are not yet stationary.
+    """Return the number of samples at the start of a series before it is stationary.
 
-    It is twice the point that White's rule finds (MSER; K. P. White, Simulation 69, 323 (1997)),
-    which makes the standard error of the rest smallest.
+    The number is twice that of White's rule (MSER; K. P. White, Simulation 69, 323 (1997)), which
+    minimises the standard error of the remaining samples.
 
     Parameters
     ----------
@@ -367,10 +373,10 @@ def equilibration(series: np.ndarray) -> int:
 
 
 def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
-    """Combine the means of independent runs to one mean.
+    """Combine the means of independent runs into one mean.
 
-    The error follows from the errors of the runs, or from their scatter if that is larger than the
-    errors explain, or if a run has no error.
+    The error follows from the errors of the runs.  It follows from the scatter of the runs if this
+    scatter is larger than the errors explain, or if a run has no error.
 
     Parameters
     ----------
@@ -380,8 +386,8 @@ def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
     Returns
     -------
     SeriesMean
-        the mean of the means; its `samples` are the sum of those of the runs, or the number of
-        runs where the scatter counts
+        the mean of the means; its `samples` are the sum over the runs or, if the error follows from
+        the scatter, the number of runs
 
     Examples
     --------
@@ -393,7 +399,7 @@ def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
     runs = len(means)
     mean, _, samples, drift, own_freedom = np.array(means).T
     size, square = samples.sum(), squares(means)
-    scatter = np.sum(square**2 / own_freedom)  # of the square of the error (Welch, Satterthwaite)
+    scatter = np.sum(square**2 / own_freedom)  # degrees of freedom (Welch, Satterthwaite)
     freedom = np.sum(square) ** 2 / scatter if scatter > 0 else np.inf
     own = student(freedom + 1) * np.sqrt(np.sum(square)) / runs
     if scatter_p(means) < UNLIKELY or np.isnan(own):
@@ -403,16 +409,16 @@ def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
 
 
 def squares(means: Sequence[SeriesMean]) -> np.ndarray:
-    """Return the squares (R,) of the standard errors of means, which are without Student's t."""
+    """Return the squares (R,) of the standard errors of means, without Student's factor t."""
     return np.array([(one.error / student(one.freedom + 1)) ** 2 for one in means])
 
 
-UNLIKELY = 0.005  # probability below which a deviation counts as significant
+UNLIKELY = 0.005  # probability below which a deviation is regarded as significant
 FEW = 10  # independent samples
 
 
 def scatter_p(means: Sequence[SeriesMean]) -> float:
-    """Return the probability that runs scatter more than this if their errors are right."""
+    """Return the probability of at least this scatter of runs if their errors are correct."""
     mean, error, _, _, freedom = np.array(means).T
     if len(means) < 2 or not np.all(error > 0):
         return 1.0
@@ -421,7 +427,7 @@ def scatter_p(means: Sequence[SeriesMean]) -> float:
 
 
 def has_drift(mean: SeriesMean) -> bool:
-    """Tell whether the halves of a series differ by more than chance explains.
+    """Determine whether the halves of a series differ by more than chance explains.
 
     Parameters
     ----------
@@ -442,9 +448,10 @@ def has_drift(mean: SeriesMean) -> bool:
 
 
 def has_trend(series: np.ndarray) -> bool:
-    """Tell whether a straight line explains most of the variance of a series.
+    """Determine whether a straight line explains most of the variance of a series.
 
-    To `correlated_mean` such a trend looks like a long autocorrelation, which hides the drift.
+    `correlated_mean` interprets such a trend as a long autocorrelation and then finds no
+    significant drift.
 
     Parameters
     ----------
@@ -454,7 +461,7 @@ def has_trend(series: np.ndarray) -> bool:
     Returns
     -------
     bool
-        whether the square of the correlation with time is above 0.75
+        whether the squared correlation coefficient with time exceeds 0.75
 
     Examples
     --------
@@ -467,19 +474,19 @@ def has_trend(series: np.ndarray) -> bool:
 
 
 def diagnostics(name: str, means: Sequence[SeriesMean]) -> list[str]:
-    """Report why a mean over runs should not be trusted.
+    """Return the reasons why a mean over runs may be unreliable.
 
     Parameters
     ----------
     name : str
-        name of the quantity, for the sentences
+        name of the quantity in the sentences
     means : sequence of SeriesMean
         (R,) the means of the runs
 
     Returns
     -------
     list of str
-        one sentence for each reason; empty if there is none
+        a sentence for each reason; empty without reasons
 
     Examples
     --------
@@ -519,13 +526,13 @@ def windows(time: np.ndarray, value: np.ndarray, width: float) -> tuple[np.ndarr
     Returns
     -------
     middle, mean : numpy.ndarray
-        (W,) middles of the windows that have samples, and the means there; an incomplete last
-        window is left out
+        (W,) centres of the windows that contain samples, and means over these windows; an
+        incomplete last window is left out
 
     Raises
     ------
     ValueError
-        if there would be more than a million windows
+        if the number of windows would exceed a million
 
     Examples
     --------
@@ -558,7 +565,7 @@ def binned(values: np.ndarray, bins: np.ndarray, independent: int | None = None)
     Returns
     -------
     Estimate
-        (B,) density, which integrates to the share of the values inside the bins, and error
+        (B,) density with error; its integral is the fraction of the values inside the bins
 
     Examples
     --------
@@ -600,12 +607,12 @@ def rounded_to_error(mean: float, error: float) -> tuple[str, ...]:
     Parameters
     ----------
     mean, error : float
-        the two numbers
+        the mean and its error
 
     Returns
     -------
     tuple of str
-        mean and error, both to two digits of the error; the mean alone if the error is NaN
+        mean and error, rounded to two digits of the error; the mean only if the error is NaN
 
     Examples
     --------
@@ -621,10 +628,11 @@ def rounded_to_error(mean: float, error: float) -> tuple[str, ...]:
 
 
 def kurtosis_noise(count: int) -> float:
-    """Return the standard deviation of `excess_kurtosis` of Maxwellian speeds.
+    """Return the standard deviation of `excess_kurtosis` for Maxwellian speeds.
 
-    To first order a2 is the mean of x^2 / 2 - 2 x, less its mean, where x = v^2 is exponential
-    with the mean 1: variance 20 / 4 + 4 * 1 - 2 * 4 = 1.
+    To first order a2 is the deviation of the sample mean of x^2 / 2 - 2 x from its expected value,
+    where x = v^2 has an exponential distribution with mean 1.  The variance of x^2 / 2 - 2 x is 20
+    / 4 + 4 * 1 - 2 * 4 = 1.
 
     Parameters
     ----------
@@ -647,21 +655,21 @@ def kurtosis_noise(count: int) -> float:
 def fit_power_law(
     x: np.ndarray, y: np.ndarray, y_error: np.ndarray | None = None
 ) -> PowerLaw | None:
-    """Fit a power law by a weighted straight line through ln y against ln x.
+    """Fit a power law as a weighted straight line of ln y against ln x.
 
-    If the points scatter by more than their errors, the error of the fit is enlarged to match.
+    If the points scatter by more than their errors, the error of the fit is increased accordingly.
 
     Parameters
     ----------
     x, y : numpy.ndarray
         (P,) the points; those that are not positive are left out
     y_error : numpy.ndarray, optional
-        (P,) errors of y [all points weigh alike, and their scatter makes the error]
+        (P,) errors of y [equal weights; the error follows from the scatter of the points]
 
     Returns
     -------
     PowerLaw or None
-        factor and exponent with its error; None with fewer than three different x
+        factor and exponent with error; None for fewer than three different x
 
     Examples
     --------

@@ -1,8 +1,8 @@
 """The stream function of a measured flow on a grid of cells.
 
 In a steady state the flux of disks j = n u has no divergence, so that j_x = d psi / dy and j_y = -d
-psi / dx.  Its lines of equal value are the paths of the mean flow, and the difference between two
-of them is the number of disks that pass between them per time.
+psi / dx.  The contour lines of psi are the streamlines of the mean flow.  The difference of psi
+between two streamlines is the number of disks that pass between them per time.
 """
 
 import numpy as np
@@ -16,21 +16,21 @@ __all__ = ["stream_function"]
 def stream_function(run: Run, flux: np.ndarray) -> np.ndarray:
     """Fit a stream function to the flux of disks in cells.
 
-    The flux of its derivatives has the smallest sum of squared deviations from the measured one.
-    The noise of the measured flux that has a divergence is lost in this way.
+    The derivatives of the stream function are a flux with the smallest sum of squared deviations
+    from the measured flux.  The fit removes the part of the noise that has a divergence.
 
     Parameters
     ----------
     run : Run
-        a run, for the box; no flux passes its walls
+        a run with the same box; no flux passes its walls
     flux : numpy.ndarray
-        (2, NY, NX) density times flow along x and y [1/(length time)]; NaN where nothing was
-        measured, as inside obstacles, counts as 0
+        (2, NY, NX) density times flow along x and y [1/(length time)]; NaN in cells without data,
+        as inside obstacles, is treated as 0
 
     Returns
     -------
     numpy.ndarray
-        (NY + 1, NX + 1) values at the corners of the cells [1/time], 0 at the lower left one
+        (NY + 1, NX + 1) values at the corners of the cells [1/time]; 0 at the lower left corner
 
     Examples
     --------
@@ -41,7 +41,8 @@ def stream_function(run: Run, flux: np.ndarray) -> np.ndarray:
     _, rows, columns = flux.shape
     edges = run.edges / (columns, rows)
     unknowns, corners = corner_unknowns(rows, columns, run.periodic)
-    # Each corner is a sum of unknowns: a row of `corners`.  Differences of corners make the flux.
+    # A row of `corners` expresses the value at a corner by unknowns; differences of corners are
+    # fluxes.
     number = np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, columns + 1)
     lower, upper, left, right = number[:-1], number[1:], number[:, :-1], number[:, 1:]
     ends = slice(None, -1), slice(1, None)
@@ -62,7 +63,7 @@ def stream_function(run: Run, flux: np.ndarray) -> np.ndarray:
 
 
 def differences(terms: list[tuple[np.ndarray, float]], count: int) -> scipy.sparse.csr_array:
-    """Return the sparse matrix whose row for each cell adds corners with these factors."""
+    """Return the sparse matrix whose rows add the corners of a cell with these factors."""
     cells = terms[0][0].size
     rows = np.tile(np.arange(cells), len(terms))
     columns = np.concatenate([corner.ravel() for corner, _ in terms])
@@ -73,11 +74,12 @@ def differences(terms: list[tuple[np.ndarray, float]], count: int) -> scipy.spar
 def corner_unknowns(
     rows: int, columns: int, periodic: np.ndarray
 ) -> tuple[int, scipy.sparse.csr_array]:
-    """Return the number of unknowns, and how the values at the corners are made of them.
+    """Return the number of unknowns, and the matrix from unknowns to values at the corners.
 
-    The first unknowns are values at corners that no wall fixes, those on two sides of a period
-    being one.  Walls have one value each, 0 at the lower or left one.  Along a periodic axis a
-    last unknown is the flux through the whole box, which makes psi grow across it.
+    The first unknowns are the values at corners that are not on walls; periodic images of a corner
+    share an unknown.  Each wall has one value, which is 0 at the lower or left wall.  For a
+    periodic axis a further unknown is the flux through the whole box, by which psi differs between
+    opposite sides.
     """
     y, x = np.meshgrid(np.arange(rows + 1), np.arange(columns + 1), indexing="ij")
     fixed = np.zeros(x.shape, dtype=bool)

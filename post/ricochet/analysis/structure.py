@@ -1,6 +1,6 @@
-"""Structure of a run: pair correlation, structure factor, clusters, bond order.
+"""Structure of a run: pair correlation, structure factor, clusters and bond order.
 
-The functions need little code with SciPy; libraries for them support periodic boxes, but no walls.
+The functions are short with SciPy; available libraries support periodic boxes but not walls.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -35,7 +35,7 @@ def periods(run: Run) -> np.ndarray:
 
 
 def refuse(run: Run, *traits: str) -> None:
-    """Refuse runs whose images slide, and runs with walls where wave vectors are needed."""
+    """Raise an error for sheared runs, and for walls if wave vectors are needed."""
     law = "structure is found in boxes at rest" + ", S(k) in periodic ones" * ("walls" in traits)
     allow(run, law, *TRAITS.keys() - set(traits))
 
@@ -43,10 +43,10 @@ def refuse(run: Run, *traits: str) -> None:
 def pair_correlation(
     run: Run, frames: Index, edges: np.ndarray, pair: tuple[str, str] | None = None
 ) -> np.ndarray:
-    """Return the pair correlation function g(r) of some frames.
+    """Return the pair correlation function g(r) averaged over frames.
 
-    It is the density of disks at a distance r from a disk, over the mean density of the box.
-    Between walls, which may move, only disks far from them serve as centres.
+    g(r) is the density of disks at the distance r from a disk, divided by the mean density of the
+    box.  Between walls, which may move, only disks far from the walls are used as centres.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def pair_correlation(
     edges : numpy.ndarray
         (B + 1,) edges of the bins of r, in mean diameters
     pair : tuple of str, optional
-        two species: disks of the second about disks of the first [all disks]
+        two species: the density of the second around disks of the first [all disks]
 
     Returns
     -------
@@ -81,7 +81,7 @@ def pair_correlation(
     one, *others = masks(run, pair)
     other = others[0] if others else one
     sums = np.zeros(len(edges) - 1)
-    expected = 0.0  # pairs per area, of disks at random
+    expected = 0.0  # pairs per area for randomly placed disks
     for k in chosen(run.n_frames, frames):
         x, (lower, upper) = run.position[k], run.corners_at(run.time[k])
         margin = np.where(run.periodic, -np.inf, r[-1])
@@ -96,17 +96,17 @@ def pair_correlation(
 
 
 def masks(run: Run, pair: tuple[str, str] | None) -> list[np.ndarray]:
-    """Return the masks (N,) of the species of a pair, one if they are equal, or of all disks."""
+    """Return the masks (N,) of two species (one mask if both are equal) or of all disks."""
     return [run.of_species(name) for name in dict.fromkeys(pair)] if pair else [run.species > 0]
 
 
 def structure_factor(
     run: Run, frames: Index, edges: np.ndarray, pair: tuple[str, str] | None = None
 ) -> np.ndarray:
-    """Return the structure factor S(k) = <|sum of exp(i k x)|^2> / N of some frames.
+    """Return the structure factor S(k) = <|sum of exp(i k x)|^2> / N averaged over frames.
 
-    Each pair of wave vectors k and -k counts once.  Of many disks only a part of the wave vectors
-    along x and y is evaluated.
+    Of each pair of wave vectors k and -k only one is used.  For many disks only a part of the wave
+    vectors is evaluated.
 
     Parameters
     ----------
@@ -117,7 +117,8 @@ def structure_factor(
     edges : numpy.ndarray
         (B + 1,) edges of the bins of k, in 1 / mean diameter
     pair : tuple of str, optional
-        two species: the product of their two sums, over the root of their numbers [all disks]
+        two species: the product of their two sums, divided by the square root of the product of
+        their numbers [all disks]
 
     Returns
     -------
@@ -153,7 +154,7 @@ def structure_factor(
         ]
         sums += (waves[0] * waves[-1].conj()).real
     sums /= np.sqrt(both[0].sum() * both[-1].sum()) * len(numbers)
-    sums[(along_x[:, None] == 0) & (along_y <= 0)] = np.nan  # k and -k are one
+    sums[(along_x[:, None] == 0) & (along_y <= 0)] = np.nan  # one of k and -k
     known = np.isfinite(sums)
     total, _ = np.histogram(k[known], edges, weights=sums[known])
     number, _ = np.histogram(k[known], edges)
@@ -161,14 +162,14 @@ def structure_factor(
 
 
 def evenly(run: Run, frames: Index = slice(None), most: int = 50) -> list[int]:
-    """Choose frames that are nearest to equal steps of time.
+    """Select frames that are nearly equally spaced in time.
 
     Parameters
     ----------
     run : Run
         a run
     frames : Index
-        frames to choose from [all]
+        frames from which to select [all]
     most : int
         largest number of frames to return
 
@@ -195,12 +196,12 @@ def averaged(
     edges: np.ndarray,
     *more: object,
 ) -> Curve:
-    """Average a function of frames over runs, or over the frames of a single run.
+    """Average a function over runs, or over the frames of a single run.
 
     Parameters
     ----------
     of : callable
-        such as `pair_correlation`: takes run, frames, edges and `more`, and returns (B,) values
+        function such as `pair_correlation` of run, frames, edges and `more`, with values (B,)
     runs : sequence of Run
         (R,) runs that differ by their seed
     frames : sequence of Index
@@ -213,8 +214,8 @@ def averaged(
     Returns
     -------
     Curve
-        middles of the bins that have values, means and errors: over the runs, or for a single
-        run from the autocorrelation over its frames
+        centres of the bins with values, means and errors; the errors follow from the scatter of the
+        runs or, for a single run, from the autocorrelation over its frames
 
     Examples
     --------
@@ -228,7 +229,7 @@ def averaged(
     if alone:
         parts = [(runs[0], [k]) for k in chosen(runs[0].n_frames, frames[0])]
     values = np.array([of(run, part, edges, *more) for run, part in parts])
-    seen = np.isfinite(values).any(axis=1)  # between walls that are near there may be no pairs
+    seen = np.isfinite(values).any(axis=1)  # between close walls there may be no pairs
     known = np.isfinite(values[seen]).all(axis=0) & seen.any()
     columns = values[np.ix_(seen, known)]
     if not alone:
@@ -258,7 +259,7 @@ def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray:
     Returns
     -------
     int or numpy.ndarray
-        the number; (F,) of several frames
+        the number of disks; (F,) for several frames
 
     Examples
     --------
@@ -283,7 +284,7 @@ def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray:
 
 
 def bond_order(run: Run, frame: Index) -> np.ndarray:
-    """Return the bond-orientational order psi6 of each disk, over its Delaunay neighbours.
+    """Return the bond-orientational order psi6 of each disk from its Delaunay neighbours.
 
     Parameters
     ----------
@@ -295,7 +296,8 @@ def bond_order(run: Run, frame: Index) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        (N,) complex; (F, N) of several frames; its modulus is 1 for six neighbours at equal angles
+        (N,) complex, or (F, N) for several frames; the modulus is 1 for six neighbours at equal
+        angles
 
     Examples
     --------
@@ -307,7 +309,7 @@ def bond_order(run: Run, frame: Index) -> np.ndarray:
         each = chosen(run.n_frames, frame)
         return np.array([bond_order(run, k) for k in each]).reshape(-1, run.n_disks)
     near = 4 * np.sqrt(np.prod(run.edges) / run.n_disks)
-    points = run.position[frame]  # then their periodic copies near the box
+    points = run.position[frame]  # followed by periodic images near the box
     for axis in np.flatnonzero(run.periodic):
         shift = np.where(np.arange(2) == axis, run.edges, 0.0)
         low = points[:, axis] < run.lower[axis] + near
@@ -327,9 +329,9 @@ def bond_order(run: Run, frame: Index) -> np.ndarray:
 def bond_correlation(
     run: Run, frames: Index, psi: Sequence[np.ndarray] | np.ndarray, edges: np.ndarray
 ) -> np.ndarray:
-    """Return the correlation function g6(r) = Re <psi6*(0) psi6(r)> of the bond order.
+    """Return the correlation function g6(r) = Re <psi6*(0) psi6(r)> of bond order.
 
-    Of many disks only some serve as centres.
+    For many disks only a part of them is used as centres.
 
     Parameters
     ----------

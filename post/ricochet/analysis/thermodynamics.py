@@ -1,9 +1,9 @@
-"""Pressure, collision rates and temperature of a run in equilibrium, with errors.
+"""Pressure, collision rates and temperature of runs in equilibrium, with errors.
 
 The pressure can be measured in three independent ways: by the virial of the pair collisions, by the
 collision rate (equal disks), and by the force on the sides.  Z = P / (n kT).  kT is exact where the
-kinetic energy is conserved, otherwise a mean over time.  `skip` is the equilibration, in collisions
-per disk, that is left out at the start; None lets it be found.
+kinetic energy is conserved, otherwise a mean over time.  `skip` is the equilibration in collisions
+per disk, which is left out at the start; with None it is determined from the data.
 """
 
 from collections.abc import Sequence
@@ -39,43 +39,44 @@ __all__ = [
     "z_ways",
 ]
 
-TIMED = ("every_time", "at", "per_decade")  # samples at times, not after collisions
-SPEEDS_FORGET = 15.0  # collisions per disk after which no distribution of speeds remembers another
+TIMED = ("every_time", "at", "per_decade")  # samples are taken at times, not after collisions
+SPEEDS_FORGET = 15.0  # collisions per disk: speed distributions are independent of the start
 ALONG_WALLS = {
     "thermal_walls",
     "rough",
     "rotating",
     "inelastic",
-}  # walls may change what is along them
-MANY = 1e8  # disks, to whom it makes no difference that their energy is fixed
-#: Beside equal smooth disks that keep their energy, what is a fluid in an empty box.
+}  # walls may change the momentum along them
+MANY = 1e8  # disks above which the effect of a fixed energy is negligible
+#: Traits of fluids in an empty box, besides equal smooth disks with conserved energy.
 FLUID = ("walls", "thermal_walls", "thermostatted", "rough", "rotating", "mixture")
 
 
 class Steps(NamedTuple):
     """Changes from one sample of the observables to the next, in equilibrium."""
 
-    time: np.ndarray  # (T,) how long it was
-    kt: np.ndarray  # (T,) mean over that time
-    collisions: np.ndarray  # (T,) of pairs
+    time: np.ndarray  # (T,) duration
+    kt: np.ndarray  # (T,) mean over the duration
+    collisions: np.ndarray  # (T,) number of pair collisions
     virial: np.ndarray  # (T,)
     hits: np.ndarray  # (T,) of all sides
     impulse: np.ndarray  # (T, 4) by side
 
 
 def refuse_others(runs: Sequence[Run]) -> None:
-    """Refuse runs that are not of the same disks."""
+    """Raise an error for runs of different disks."""
     for run in runs:
         if run.names != runs[0].names or not np.array_equal(run.species, runs[0].species):
             raise RunError(f"{run.path}: its disks are not those of {runs[0].path}")
 
 
 def all_settle(runs: Sequence[Run]) -> bool:
-    """Whether all runs have an equilibrium; mixed runs are refused."""
+    """Return whether all runs have an equilibrium, or raise an error if only some have one."""
     settled = [run.nature.in_equilibrium for run in runs]
     if any(settled) and not all(settled):
         one, other = runs[settled.index(False)], runs[settled.index(True)]
-        raise RunError(f"{one.path}: has no equilibrium, {other.path} has: draw them apart")
+        raise RunError(f"{one.path}: has no equilibrium, but {other.path} has one: draw them "
+            "separately")
     return all(settled)
 
 
@@ -97,11 +98,12 @@ def after_start(run: Run, skip: float | None = None) -> float:
 
 
 def start_of_steady_state(run: Run, skip: float | None = None) -> float:
-    """Return the time from which a run is steady.
+    """Return the time after which a run is in a steady state.
 
-    Examined are the collision rate and the energies of each species, where they can change, at the
-    observables or, if these are few, at the frames.  Speed distributions get at least
-    `SPEEDS_FORGET` collisions per disk.  A run too short for that counts from its middle.
+    The collision rate and the energies of each species, as far as they can change, are tested for
+    drifts at the times of observables or, if these are few, of frames.  The result is at least
+    `SPEEDS_FORGET` collisions per disk after the start, so that speed distributions are steady; for
+    a shorter run it is at most half of the time.
 
     Parameters
     ----------
@@ -125,8 +127,8 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
 
 
 def explained_start(run: Run, skip: float | None = None) -> tuple[float, str]:
-    """Return the time from which a run is steady, and why the samples before it are left out."""
-    forgets = f"{SPEEDS_FORGET:g} collisions per disk, by which speeds forget the start"
+    """Return the time after which a run is steady, and why earlier samples are left out."""
+    forgets = f"{SPEEDS_FORGET:g} collisions per disk, the relaxation time of speeds"
     if skip is not None:
         return after_start(run, skip), f"--equilibration {skip:g}"
     if run.nature.cooling:
@@ -140,19 +142,19 @@ def explained_start(run: Run, skip: float | None = None) -> tuple[float, str]:
     drifts, early = float(time[last[slowest]]), after_start(run)
     if drifts <= early:
         return early, forgets
-    return drifts, f"the {slowest} drifts until then, or fluctuates so slowly that it may"
+    return drifts, f"the {slowest} drifts until then, or fluctuates too slowly to exclude a drift"
 
 
 def examined(run: Run) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return times (T,), and by name the series (T - 1,) that show whether a run is steady.
+    """Return times (T,) and, by name, the series (T - 1,) that are tested for drifts.
 
-    There are none if samples are few.
+    There are no series if samples are few.
     """
     few = has_few_observables(run)
     time = run.time if few else run.collisions_per_disk.time
     if len(time) < 2 * FEWEST:
         return time, {}
-    apart = np.maximum(np.diff(time), 1e-9 * np.mean(np.diff(time)))  # two samples at one time
+    apart = np.maximum(np.diff(time), 1e-9 * np.mean(np.diff(time)))  # two samples at the same time
     series = {"collision rate": np.diff(run.collisions_per_disk_at(time)) / apart}
     if len(run.names) == 1 and run.nature.keeps_kinetic_energy:
         return time, series
@@ -171,7 +173,7 @@ def examined(run: Run) -> tuple[np.ndarray, dict[str, np.ndarray]]:
 
 
 def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
-    """Return the time from which a run is in equilibrium.
+    """Return the time after which a run is in equilibrium.
 
     Parameters
     ----------
@@ -196,14 +198,14 @@ def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
     >>> bool(run.collisions_per_disk_at(start) >= 9.9)
     True
     """
-    allow(run, "it has no equilibrium", *SETTLED)
+    allow(run, "it does not reach equilibrium", *SETTLED)
     return start_of_steady_state(run, skip)
 
 
 def frames_from(
     run: Run, start: float, apart: float = 0.0, frames: list[int] | None = None
 ) -> list[int]:
-    """Choose frames from a time on that are some collisions apart.
+    """Select frames after a given time that are some collisions apart.
 
     Parameters
     ----------
@@ -237,9 +239,9 @@ def frames_from(
 
 
 def later(run: Run, skip: float | None = None) -> slice:
-    """Return the frames in the steady state, or of a gas that cools after the start.
+    """Return the frames in the steady state or, for a cooling gas, those after the start.
 
-    The last frame is left out, because it may not be in step with the others.
+    The last frame is left out, because its distance from the previous frame may differ.
     """
     first = int(np.searchsorted(run.time, start_of_steady_state(run, skip)))
     if run.n_frames - 1 - first < 2:
@@ -251,17 +253,18 @@ def later(run: Run, skip: float | None = None) -> slice:
 
 
 def motion_notes(runs: Sequence[Run]) -> list[str]:
-    """Return the note that all motion is relative to the centre of mass, if noise moves that."""
+    """Return a note that motion is relative to the centre of mass, if noise moves the latter."""
     walks = any("random_walk" in run.nature for run in runs)
     note = "noise moves the centre of mass (drive.keep_momentum): motion is measured relative to it"
     return [note] * walks
 
 
 def unforced(source: Run | Simulation) -> np.ndarray:
-    """Return along which axes (2,) nothing but noise changes the total momentum.
+    """Return the axes (2,) along which only noise changes the total momentum.
 
-    Walls along the axis are not considered; they conserve it unless the run has `ALONG_WALLS`.
-    Refused is a run whose centre of mass noise moves and such walls may stop.
+    Walls parallel to the axis are not considered; they conserve the momentum along them unless the
+    run has a trait of `ALONG_WALLS`.  An error is raised if noise moves the centre of mass and such
+    walls may stop it.
     """
     box, nature = source.parameters.get("box", {}), source.nature
     if nature & (KICKED - {"noise_driven"}) or nature & {"obstacles", "changed"}:
@@ -275,9 +278,9 @@ def unforced(source: Run | Simulation) -> np.ndarray:
 
 
 def comoving(run: Run) -> np.ndarray:
-    """Return along which axes (2,) all motion is measured relative to the centre of mass.
+    """Return the axes (2,) along which motion is measured relative to the centre of mass.
 
-    Along these the total momentum is conserved, or changes by noise alone.
+    Along these axes the total momentum is conserved, or changed by noise only.
     """
     kept = unforced(run)
     if run.nature & ALONG_WALLS and "random_walk" not in run.nature:
@@ -287,9 +290,9 @@ def comoving(run: Run) -> np.ndarray:
 
 
 def thermal_energy(run: Run, frames: Index, component: int | None = None) -> np.ndarray:
-    """Return m v^2 / 2 (F, N) with v relative to the flow and, where `comoving`, to the mean.
+    """Return m v^2 / 2 (F, N), with v relative to the flow and the mean along `comoving` axes.
 
-    `component` is 0 or 1 for the part of v along x or y alone.
+    `component` is 0 to use the x component of v only, 1 for the y component.
     """
     frames = chosen(run.n_frames, frames)
     velocity = run.velocity[frames]
@@ -302,7 +305,7 @@ def thermal_energy(run: Run, frames: Index, component: int | None = None) -> np.
 
 
 def free_disks(run: Run) -> float:
-    """Return N, less a half for each axis along which motion is relative to the centre of mass.
+    """Return N minus a half for each axis along which motion is relative to the centre of mass.
 
     Parameters
     ----------
@@ -312,7 +315,7 @@ def free_disks(run: Run) -> float:
     Returns
     -------
     float
-        the number that divides the kinetic energy to give kT
+        the ratio of the kinetic energy to kT
 
     Examples
     --------
@@ -323,21 +326,21 @@ def free_disks(run: Run) -> float:
 
 
 def drift(run: Run) -> np.ndarray:
-    """Return the conserved velocity (2,) of the centre of mass; 0 along other axes."""
+    """Return the conserved velocity (2,) of the centre of mass; 0 if it is not conserved."""
     centre = np.average(run.velocity[0], axis=0, weights=run.mass)
     return np.where(comoving(run), centre, 0.0)
 
 
 def kt_of(run: Run, energy: np.ndarray) -> np.ndarray:
-    """Return kT from the kinetic energy of all disks together, an array of any shape.
+    """Return kT from the total kinetic energy, an array of any shape.
 
-    docs/theory.md explains where to divide by N and where by N - 1.
+    docs/theory.md explains when to divide by N and when by N - 1.
     """
     return (energy - 0.5 * run.mass.sum() * np.sum(drift(run) ** 2)) / free_disks(run)
 
 
 def kt_at_start(run: Run) -> float:
-    """Return the kT of the first frame.
+    """Return kT in the first frame.
 
     Parameters
     ----------
@@ -358,12 +361,12 @@ def kt_at_start(run: Run) -> float:
 
 
 def has_few_observables(run: Run) -> bool:
-    """Whether the frames resolve a run better in time than its few observables."""
+    """Return whether frames resolve a run better in time than the observables."""
     return len(run.collisions_per_disk.time) < min(run.n_frames, 2 * FEWEST)
 
 
 def kt_in_time(run: Run) -> tuple[str, np.ndarray, np.ndarray]:
-    """Return times and kT of the observables, or of the frames if these resolve it better."""
+    """Return times and kT from the observables, or from the frames if these resolve kT better."""
     if not has_few_observables(run):
         time, energy = run.observable("all/kinetic_energy")
         return "observables", time, kt_of(run, run.n_disks * energy)
@@ -372,10 +375,10 @@ def kt_in_time(run: Run) -> tuple[str, np.ndarray, np.ndarray]:
 
 
 def temperature(run: Run, skip: float | None = None) -> SeriesMean:
-    """Estimate the kT of equilibrium.
+    """Estimate kT in equilibrium.
 
-    Samples after a number of collisions occur more often while a gas is hot, because its collisions
-    are as frequent as sqrt(kT): each counts 1 over that.
+    Samples at equal numbers of collisions are more frequent while a gas is hot, because the
+    collision rate is proportional to sqrt(kT).  Each sample therefore has the weight 1 / sqrt(kT).
 
     Parameters
     ----------
@@ -410,12 +413,14 @@ def temperature(run: Run, skip: float | None = None) -> SeriesMean:
 
 
 def between(time: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return durations between samples, and the integral of the value over each."""
+    """Return the durations between samples, and the integral of the value over each duration."""
     return np.diff(time), np.diff(time) * (value[1:] + value[:-1]) / 2
 
 
 def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
-    """Estimate the mean kinetic energy of a disk of some mass in equilibrium, without gravity.
+    """Estimate the mean kinetic energy of a disk of a given mass in equilibrium.
+
+    The run must be without gravity.
 
     Parameters
     ----------
@@ -429,7 +434,7 @@ def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
     Returns
     -------
     SeriesMean
-        <K>, which is below kT where the total momentum is conserved
+        <K>, which is smaller than kT if the total momentum is conserved
 
     Examples
     --------
@@ -446,7 +451,7 @@ def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
 
 
 def packing(run: Run) -> float:
-    """Return the area of the disks over the area of the box.
+    """Return the packing fraction: the area of the disks divided by the area of the box.
 
     Parameters
     ----------
@@ -467,10 +472,10 @@ def packing(run: Run) -> float:
 
 
 def kinds_of_disks(run: Run) -> tuple[Species, ...]:
-    """Return the species; refuse one whose disks differ in mass or radius."""
+    """Return the species; disks of a species must not differ in mass or radius."""
     for kind in run.by_species:
         if not kind.alike:
-            raise Refused(f"{run.path}: the disks of '{kind.name}' are not of one mass and radius")
+            raise Refused(f"{run.path}: the disks of '{kind.name}' differ in mass or radius")
     return run.by_species
 
 
@@ -483,14 +488,14 @@ def lightest_and_heaviest(run: Run) -> tuple[int, int]:
 
 
 def mean_free_time(run: Run, start: float = 0.0) -> float:
-    """Return the mean time between the collisions of a disk with others.
+    """Return the mean time between collisions of a disk with other disks.
 
     Parameters
     ----------
     run : Run
         a run
     start : float
-        time from which collisions count
+        time after which collisions are counted
 
     Returns
     -------
@@ -517,7 +522,7 @@ def mean_free_time(run: Run, start: float = 0.0) -> float:
 
 
 def steps(run: Run, skip: float | None = None) -> Steps:
-    """Return the changes of cumulative observables between samples, from equilibrium on."""
+    """Return the changes of cumulative observables between samples in equilibrium."""
     time = run.collisions_per_disk.time
     first = int(np.searchsorted(time, start_of_equilibrium(run, skip)))
     if len(time) - first <= FEWEST:
@@ -543,16 +548,17 @@ def steps(run: Run, skip: float | None = None) -> Steps:
 
 
 def over_kt(amount: np.ndarray, s: Steps, power: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return two series whose ratio of means is that of an amount per time over kT^power.
+    """Return two series whose ratio of means is an amount per time divided by kT^power.
 
-    It is exact to first order, so that the error includes how the amount follows a varying kT.
+    The ratio is exact to first order, so that the error includes the correlation of the amount with
+    a varying kT.
     """
     kt = float(np.average(s.kt, weights=s.time))
     return amount * kt**-power, s.time * (1 + power * (s.kt / kt - 1))
 
 
 def virial_over_kt(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return two series whose ratio of means is Z - 1, by the virial."""
+    """Return two series whose ratio of means is Z - 1 from the virial."""
     s = steps(run, skip)
     return over_kt(s.virial / (2 * run.n_disks), s, 1)
 
@@ -588,7 +594,7 @@ def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:
 
 
 def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
-    """Estimate Z = P / (n kT) by the virial of the pair collisions.
+    """Estimate Z = P / (n kT) from the virial of the pair collisions.
 
     Parameters
     ----------
@@ -617,7 +623,7 @@ def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
 
 
 def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
-    """Estimate Z = P / (n kT) by the collision rate, for equal masses.
+    """Estimate Z = P / (n kT) from the collision rate of disks of equal mass.
 
     Parameters
     ----------
@@ -650,7 +656,7 @@ def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
 
 
 def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
-    """Estimate Z = P / (n kT) by the force on the four sides, for equal disks between walls.
+    """Estimate Z = P / (n kT) from the force of equal disks on four walls.
 
     Parameters
     ----------
@@ -662,7 +668,7 @@ def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
     Returns
     -------
     SeriesMean
-        Z; the area is that open to the centres of the disks
+        Z, which refers to the area accessible to the centres of the disks
 
     Raises
     ------
@@ -682,7 +688,7 @@ def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
 
 
 def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
-    """Estimate Z = P / (n kT) in each way that applies to a run.
+    """Estimate Z = P / (n kT) with each method that applies to a run.
 
     Parameters
     ----------
@@ -694,7 +700,7 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     Returns
     -------
     dict of str to SeriesMean
-        "virial"; "rate" but of mixtures; "walls" between four walls
+        "virial"; "rate" except for mixtures; "walls" for boxes with four walls
 
     Raises
     ------
@@ -714,7 +720,7 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
 
 def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
-    """Estimate the pressure by the virial, and by the force on each side that is a wall.
+    """Estimate the pressure from the virial, and from the force on each wall of the box.
 
     Parameters
     ----------
@@ -749,7 +755,7 @@ def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
 
 def has_log(run: Run) -> bool:
-    """Whether the file contains an event log."""
+    """Return whether the file contains an event log."""
     return bool(run.parameter("output", "event_log", False))
 
 
@@ -766,7 +772,7 @@ def pair_rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     Returns
     -------
     dict of str to SeriesMean
-        "w_A_B": collisions of a disk of A with disks of B, per time
+        "w_A_B": rate of the collisions of a disk of A with disks of B
 
     Raises
     ------

@@ -1,23 +1,25 @@
-"""How disks carry momentum, energy and themselves: viscosities, conductivity, diffusion.
+"""Transport coefficients: viscosities, thermal conductivity and diffusion coefficients.
 
-Diffusion: lags are numbers of frames, which must be equally far apart; `frames` are those in
-equilibrium.  The integral of <v(0) v(t)> needs no sum over frames: that of v is the way x(t) -
-x(0), which the run knows exactly, however far apart its frames are (`correlations`).
+Diffusion: lags are numbers of frames, which must be equally spaced; `frames` are the frames in
+equilibrium.  The integral of <v(0) v(t)> requires no sum over frames, because the integral of v is
+the displacement x(t) - x(0), which is exact for any interval between frames (`correlations`).
 
-Viscosities and conductivity by Einstein and Helfand: a Helfand moment is what momentum or energy
-has been carried, times the way: disks carry m v_a v_b and (m v^2 / 2) v while they fly, and a
-collision hands dP_a and dE on over r = x_i - x_j.  Its mean square grows in time as the mean square
-displacement does, and half of the slope is the transport coefficient: times 1 / (A kT) for
-viscosities, 1 / (A kT^2) for the conductivity, A the area.  See Helfand, Phys. Rev. 119, 1 (1960);
-Alder, Gass and Wainwright, J. Chem. Phys. 53, 3813 (1970).  The run sums them up exactly, as
-observables, where `output.helfand` is set.
+Viscosities and conductivity follow from Einstein-Helfand relations.  A Helfand moment is the time
+integral of the total flux of momentum or energy: free flights contribute m v_a v_b and (m v^2 / 2)
+v, and a collision transfers dP_a and dE over the distance r = x_i - x_j.  The mean square of a
+Helfand moment grows linearly in time, as the mean square displacement does.  Half of the slope,
+times 1 / (A kT) for viscosities or 1 / (A kT^2) for the conductivity, is the transport coefficient,
+where A is the area.  See Helfand, Phys. Rev. 119, 1 (1960); Alder, Gass and Wainwright, J. Chem.
+Phys. 53, 3813 (1970).  With `output.helfand` the program accumulates the moments exactly and writes
+them as observables.
 
-In a mixture the stress is that of all disks, and so are its viscosities.  Its conductivity is not
-the growth of the energy: species that diffuse take some along, each its own enthalpy.  Where
-energy is lost, or noise replaces it, fluctuations do not say how a gas flows: in the theory of the
-gas that cools the moments meet others, which take the unknown law of its states (Baskaran, Dufty
-and Brey, Phys. Rev. E 77, 031311 (2008)), and noise obeys no law of fluctuation and dissipation.
-Rough disks are refused: the sums of the run leave out the energy of rotation that they carry.
+In a mixture the stress, and therefore the viscosities, refer to all disks.  The conductivity of a
+mixture does not follow from the energy moment alone, because diffusing species transport their
+enthalpy.  If energy is dissipated or supplied by noise, the fluctuations do not determine transport
+coefficients: in the theory of a cooling gas the moments are correlated with other quantities that
+depend on the unknown distribution of its states (Baskaran, Dufty and Brey, Phys. Rev. E 77, 031311
+(2008)), and noise violates the fluctuation-dissipation theorem.  Rough disks are refused, because
+the moments do not include the rotational energy that they transport.
 """
 
 from typing import NamedTuple
@@ -38,23 +40,22 @@ __all__ = [
     "enskog_of",
 ]
 
-PER_FREE_TIME = 4  # sufficient samples of the moments
+PER_FREE_TIME = 4  # sufficient number of samples of the moments
 SUMS = ("helfand_stress", "virial_tensor", "helfand_heat", "heat_virial")
 #: In mean free times: the decay time of the heat flux, longest in a dilute gas of equal disks; and
 #: the lag of the slope, which from half of it on lacks less than 0.2 % of the conductivity.
 HEAT, MEMORY = 2.06, 20.0
-CLOSE = 1e-6  # relative difference of steps that are equal
+CLOSE = 1e-6  # relative difference of steps that are regarded as equal
 UNLIKE = 0.05  # largest relative difference of Enskog's viscosity between runs of one group
 TAKES = (
-    "transport takes elastic smooth disks in a periodic box, whose fluctuations determine how they "
-    "flow, and whose heat is all in their translation; "
-    "of others driven.py --show viscosity (box.shear_rate) and correlations.py, D(t)"
+    "transport coefficients require elastic smooth disks in a periodic box; for other disks see "
+    "driven.py --show viscosity (box.shear_rate) and D(t) of correlations.py"
 )
-MOMENTS = ("viscosity", "bulk_viscosity", "conductivity")  # from Helfand moments
+MOMENTS = ("viscosity", "bulk_viscosity", "conductivity")  # coefficients from Helfand moments
 
 
 def in_step(times: np.ndarray) -> bool:
-    """Whether these times, two or more, are equally spaced."""
+    """Return whether times (at least two) are equally spaced."""
     steps = np.diff(times)
     return bool(np.ptp(steps) <= CLOSE * steps[0])
 
@@ -63,7 +64,7 @@ def in_step(times: np.ndarray) -> bool:
 
 
 def lags(frames: int, per_decade: int = 12) -> np.ndarray:
-    """Return whole numbers of frames in logarithmic steps, up to half the run."""
+    """Return lags as numbers of frames in logarithmic steps, up to half of the run."""
     last = max(1, frames // 2)
     count = 1 + int(per_decade * np.log10(last))
     return np.unique(np.geomspace(1, last, count).round().astype(int))
@@ -72,7 +73,7 @@ def lags(frames: int, per_decade: int = 12) -> np.ndarray:
 def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
     """Return positions (T, N, 2), continuous in time, and velocities.
 
-    They are relative to the centre of mass where its velocity is conserved.
+    Both are relative to the centre of mass along axes where its velocity is conserved.
     """
     kept = td.comoving(run)
     place, velocity = (
@@ -83,9 +84,9 @@ def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
 
 
 def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
-    """Return the lag, in frames, after which sound has crossed the box and disks feel its size.
+    """Return the lag, in frames, in which sound crosses the box, so that its size matters.
 
-    It is at most an eighth of the shortest run.
+    The lag is at most an eighth of the shortest run.
     """
     run, shortest = runs[0], min(f.stop - f.start for f in frames)
     kt = td.temperature(run).mean
@@ -95,19 +96,19 @@ def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
 
 
 def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean]:
-    """Estimate D between the lags `lag` / 2 and `lag`, from displacements and from velocities.
+    """Estimate D between the lags `lag` / 2 and `lag` from displacements and from velocities.
 
-    These are the means over the lags of d<r^2>/dt / 4, and of half the integral of <v(0) v(t)>.
-    Each origin in time contributes one value, so that the error includes all correlations.  Between
-    frames the integral is a cubic curve with the known slopes <v(0) v(t)>: its error is at most 0.2
-    % of D for an exponential correlation, and far less once D(t) is constant.
+    The two estimates are means over these lags of d<r^2>/dt / 4 and of half the integral of <v(0)
+    v(t)>. Each origin in time contributes one value, so that the error includes all correlations.
+    Between frames the integral is a cubic curve with the known slopes <v(0) v(t)>: its error is at
+    most 0.2 % of D for an exponential correlation, and far less once D(t) is constant.
     """
     step, half = float(run.time[1] - run.time[0]), lag // 2
     x, v = motion(run, frames)
     origins = len(x) - lag
     near, far = (np.sum((x[k : k + origins] - x[:origins]) ** 2, axis=2) for k in (half, lag))
     spread = (far - near).mean(axis=1) / (4 * step * (lag - half))
-    area = np.cumsum(x, axis=0) - x / 2 - step / 12 * v  # the integral of x over time, in steps
+    area = np.cumsum(x, axis=0) - x / 2 - step / 12 * v  # integral of x over time in steps
     mean = (area[lag : lag + origins] - area[half : half + origins]) / (lag - half)
     memory = np.sum(v[:origins] * (mean - x[:origins]), axis=2).mean(axis=1) / 2
     return correlated_mean(spread), correlated_mean(memory)
@@ -117,26 +118,28 @@ def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean
 
 
 def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
-    """Return the sampling interval and the Helfand moments of the observables from a time on.
+    """Return the sampling interval and the Helfand moments after a given time.
 
-    By coefficient these are the moments (T, C) without their mean growth: of the momentum xy and
-    (xx - yy) / 2, of (xx + yy) / 2, and of the energy x and y; all relative to the centre of mass.
-    Raises RunError if the run has none, or none at equal intervals.
+    For each coefficient the result contains the moments (T, C) without their mean growth: for the
+    viscosity the momentum moments xy and (xx - yy) / 2, for the bulk viscosity (xx + yy) / 2, for
+    the conductivity the energy moments x and y; all are relative to the centre of mass.  Raises
+    RunError if the run contains no moments at equal intervals.
     """
     allow(run, TAKES, "mixture")
     if "helfand_heat" not in run.observables:
         raise RunError(f"{run.path}: has no Helfand moments, set output.helfand = .true.")
     parts = [run.observable(name) for name in SUMS]
     first = int(np.searchsorted(parts[0].time, start))
-    time = parts[0].time[first:-1]  # the last may come sooner
+    time = parts[0].time[first:-1]  # the last interval may be shorter
     if len(time) < 3 or not in_step(time):
         raise RunError(
-            f"{run.path}: moments take observables equally far apart in time; set "
+            f"{run.path}: moments require observables at equal intervals of time; set "
             f"output.observables_every_time = {td.mean_free_time(run, start) / PER_FREE_TIME:.2g}"
         )
     flown, handed, heat, heat_handed = (part.value[first:-1] for part in parts)
     momentum = (flown + handed).reshape(-1, 2, 2)
-    # In the frame of the centre of mass; what else that takes away grows evenly.
+    # Moments in the frame of the centre of mass; all other terms of the change of frame grow
+    # linearly.
     heat = heat + heat_handed - np.einsum("a,tab->tb", td.drift(run), momentum)
     xx, xy, yy = momentum[:, 0, 0], momentum[:, 0, 1], momentum[:, 1, 1]
     groups = (xy, (xx - yy) / 2), ((xx + yy) / 2,), heat.T
@@ -151,15 +154,15 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
 def squares(moment: np.ndarray, lag: int) -> np.ndarray:
     """Return squares (T - lag,) of the increments of a moment (T, C) over `lag` samples.
 
-    They are averaged over components and corrected for the mean growth, which is that of the series
-    itself and removes the share lag / (T - 1).
+    The squares are averaged over components and corrected for the mean growth, which was estimated
+    from the same series and reduces them by the fraction lag / (T - 1).
     """
     gain = moment[lag:] - moment[: len(moment) - lag]
     return np.mean(gain**2, axis=1) / (1 - lag / (len(moment) - 1))
 
 
 def running(moment: np.ndarray, step: float, at: np.ndarray) -> np.ndarray:
-    """Return half the slope of the mean square between each lag (in samples) and the one before."""
+    """Return half the slope of the mean square between successive lags (in samples)."""
     mean = np.array([squares(moment, lag).mean() for lag in at])
     return np.diff(mean, prepend=0) / np.diff(at, prepend=0) / (2 * step)
 
@@ -178,9 +181,9 @@ def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
 
 
 class Found(NamedTuple):
-    """A transport coefficient at one packing fraction, over that of Enskog's theory."""
+    """A transport coefficient at one packing fraction, divided by that of Enskog's theory."""
 
-    members: list[SeriesMean]  # of the runs
+    members: list[SeriesMean]  # values of the runs
     curve: Curve  # against the lag, in mean free times
     lag: float  # at which they were taken [mean free times]
     memory: float  # at which they should be; 0 of a coefficient that has its own time
@@ -190,7 +193,7 @@ class Found(NamedTuple):
 def enskog_of(run: Run, reduced: bool = False) -> dict[str, float]:
     """Return the transport coefficients of Enskog's theory for the disks of a run.
 
-    Disks that are equal to a hundredth count as one species.
+    Disks that differ by less than a hundredth are treated as one species.
 
     Parameters
     ----------
@@ -202,7 +205,7 @@ def enskog_of(run: Run, reduced: bool = False) -> dict[str, float]:
     Returns
     -------
     dict of str to float
-        by name, as of `hard_disks.enskog` or, for a mixture, of `hard_disks.enskog_mixture`
+        by name, as returned by `hard_disks.enskog` or, for a mixture, `hard_disks.enskog_mixture`
 
     Examples
     --------
@@ -224,7 +227,7 @@ def enskog_of(run: Run, reduced: bool = False) -> dict[str, float]:
 
 
 def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
-    """Return the viscosities and, of equal disks, the conductivity."""
+    """Return the viscosities and, for identical disks, also the thermal conductivity."""
     each = [moments(run, start) for run, start in zip(runs, starts, strict=True)]
     theories = [enskog_of(run, reduced=True) for run in runs]
     units = [enskog_of(run) for run in runs]
@@ -233,8 +236,8 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
         if own.keys() != theories[0].keys() or abs(off) > UNLIKE:
             raise RunError(f"{run.path}: its disks are not those of {runs[0].path}")
     steps = [step / td.mean_free_time(run) for run, (step, _) in zip(runs, each, strict=True)]
-    if np.std(steps) > 0.1 * np.mean(steps):  # hotter disks fly less long
-        raise RunError(f"{runs[0].path}: samples of the others are not as far apart")
+    if np.std(steps) > 0.1 * np.mean(steps):  # hotter disks have shorter free times
+        raise RunError(f"{runs[0].path}: the other runs have a different sampling interval")
     per_free_time = 1 / float(np.mean(steps))
     shortest = min(len(one["viscosity"]) for _, one in each)
     lives = units[0].get("memory", 0) / td.mean_free_time(runs[0])
@@ -245,7 +248,7 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
             f"{runs[0].path}: needs more than eight collisions per disk in equilibrium, and "
             "observables more often than each tenth"
         )
-    at = lags(4 * lag)  # up to twice the lag
+    at = lags(4 * lag)  # lags up to twice the lag of the result
     middle = (at + np.append(0, at[:-1])) / 2 / per_free_time
     found = {}
     for name in each[0][1]:
@@ -267,14 +270,14 @@ def frames_in_step(run: Run, start: float) -> slice:
     frames = slice(int(np.searchsorted(run.time, start)), run.n_frames - 1)
     if len(run.time[frames]) < 17 or not in_step(run.time[frames]):
         raise RunError(
-            f"{run.path}: D takes 17 frames and more in equilibrium, equally far apart; set "
-            "output.frames_every_time alone"
+            f"{run.path}: D requires at least 17 equally spaced frames in equilibrium; set "
+            "output.frames_every_time only"
         )
     return frames
 
 
 def of_displacements(runs: list[Run], starts: list[float]) -> Found:
-    """Return the diffusion coefficient."""
+    """Return the diffusion coefficient from displacements."""
     frames = [frames_in_step(run, start) for run, start in zip(runs, starts, strict=True)]
     lag = diffusion_lag(runs, frames)
     at, pairs = lags(4 * lag), list(zip(runs, frames, strict=True))
@@ -291,7 +294,7 @@ def of_displacements(runs: list[Run], starts: list[float]) -> Found:
 
 
 def coefficients(runs: list[Run], skip: float | None = None) -> dict[str, Found]:
-    """Measure the transport coefficients of runs at one packing fraction, over those of Enskog.
+    """Measure the transport coefficients of runs at one packing fraction relative to Enskog's.
 
     Parameters
     ----------
@@ -303,8 +306,8 @@ def coefficients(runs: list[Run], skip: float | None = None) -> dict[str, Found]
     Returns
     -------
     dict of str to Found
-        "viscosity", "bulk_viscosity"; of equal disks also "conductivity", and "D" if the runs
-        have frames
+        "viscosity", "bulk_viscosity"; for equal disks also "conductivity", and "D" if the runs
+        contain frames
 
     Raises
     ------
