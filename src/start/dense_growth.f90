@@ -1,7 +1,7 @@
-!> Dense random packings by compression: disks start small, move as an elastic gas, and grow to their full size (after
-!> Lubachevsky and Stillinger, J. Stat. Phys. 60, 561 (1990)). The original algorithm grows the disks continuously. Here they grow
-!> in steps between short runs at constant size, each disk into the gap around it, so that the ordinary event-driven dynamics can
-!> be used. The disks can also start at given positions, with the largest size that these allow.
+!> Dense random packings by compression: disks start small, move as an elastic gas, and grow to their full size (after Lubachevsky
+!> and Stillinger, J. Stat. Phys. 60, 561 (1990)). In the original algorithm the disks grow continuously. Here the disks grow in
+!> steps between short runs at constant size, so that the ordinary event-driven dynamics can be used. In each step every disk grows
+!> into the gap around it. The disks can also start at given positions, with the largest size for which they do not overlap.
 module dense_growth
   use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t, obstacle_gap
@@ -22,14 +22,16 @@ module dense_growth
   public :: grow_disks, smallest_scale
 
   real(real64), parameter :: loose = 0.4_real64         !! packing fraction at which the disks are inserted
-  real(real64), parameter :: lead = 1.02_real64  !! largest factor by which a disk may be ahead of the smallest one, relative to
-                                                 !! their full sizes
-  real(real64), parameter :: caution = 0.9_real64       !! fraction of the gap by which a disk grows
+  real(real64), parameter :: lead = 1.02_real64  !! largest ratio of relative sizes of two disks during growth; the relative size is
+                                                 !! the size divided by the full size
+  real(real64), parameter :: caution = 0.9_real64       !! fraction of the gap by which a disk grows in a step
   real(real64), parameter :: smallest_scale = 1.0e-3_real64       !! smallest initial size, relative to the full size
-  integer, parameter :: approaches = 6                  !! growth steps at given positions; each leaves a tenth of the gap
+  integer, parameter :: approaches = 6                  !! number of growth steps at given positions; each step reduces the gap to a
+                                                        !! tenth
   integer, parameter :: run_length = 2                  !! collisions per disk between growth steps
   integer, parameter :: mixing_length = 10              !! collisions per disk at full size
-  integer, parameter :: jumps_per_check = 50            !! number of steps in which the missing size must decrease by a tenth
+  integer, parameter :: jumps_per_check = 50            !! number of growth steps in which the difference to the full size must
+                                                        !! decrease by a tenth
 
 contains
 
@@ -39,9 +41,9 @@ contains
     type(species_t), intent(in) :: species(:)
     real(real64), intent(in) :: full(:)                 !! (n) radii to be reached, in the order of species [length]
     type(random_stream_t), intent(inout) :: stream
-    class(status_line_t), intent(inout) :: line         !! shows the progress
-    real(real64), allocatable, intent(inout) :: x(:, :) !! (2,n) positions in the order of species; in: where to start, or (2,0) for
-                                                        !! random positions [length]
+    class(status_line_t), intent(inout) :: line         !! status line that shows the progress
+    real(real64), allocatable, intent(inout) :: x(:, :) !! (2,n) positions in the order of species; in: initial positions, or shape
+                                                        !! (2,0) for random ones; out: final positions [length]
     type(error_t), allocatable, intent(out) :: error
     type(simulation_t) :: sim                           ! elastic disks
     type(event_driven_t), allocatable :: evolution
@@ -127,7 +129,8 @@ contains
       wanted = 0
       do k = 1, size(species)
         associate (own => full(disks_before(species, k) + 1:disks_before(species, k + 1)))
-          wanted = wanted + own(1)**2*sum((own/own(1))**2)      ! exactly the number of disks if all radii are equal
+          wanted = wanted + own(1)**2*sum((own/own(1))**2)      ! written such that the result is exactly the number of disks if all
+                                                                ! radii are equal
         end associate
       end do
       wanted = pi*wanted/product(sim%box%edges())
@@ -177,25 +180,25 @@ contains
     subroutine move(length)
       integer, intent(in) :: length                     !! collisions per disk
       type(limits_t) :: limits
-      integer(int64) :: to_come                         ! collisions per disk, times the number of disks
+      integer(int64) :: to_come                         ! number of collisions still to be executed, summed over the disks
 
       call evolution%start(sim)
       to_come = int(length, int64)*sim%n_disks()
       limits%collisions = sim%tally%collisions + (to_come + 1)/2
-      limits%events = sim%tally%events + 4*to_come            ! in case a disk is trapped in a gap between obstacles
-      limits%time = sim%time() + maxval(sim%box%edges())      ! in case the disks never collide
+      limits%events = sim%tally%events + 4*to_come            ! limit for the case that a disk is trapped in a gap between obstacles
+      limits%time = sim%time() + maxval(sim%box%edges())      ! limit for the case that the disks never collide
       call advance(evolution, sim, limits, error)
       do i = 1, sim%n_disks()
         sim%disk(i)%x = sim%position(i)
         sim%disk(i)%clock = sim%now
-        sim%tag(i)%last_partner = 0                     ! the gap to the last partner may have closed by growth
+        sim%tag(i)%last_partner = 0                     ! the growth may have closed the gap to the last partner
       end do
     end subroutine move
 
-    !> Grows each disk into the gap around it, up to the relative size `cap`. Two neighbours share the gap between them in
-    !> proportion to their full sizes, unless one of them is already larger than that.
+    !> Grows each disk into the gap around it, up to the relative size `cap`. Two neighbours divide the gap between them in
+    !> proportion to their full sizes, unless one of the two is already larger than its share.
     subroutine grow(cap)
-      real(real64), intent(in) :: cap                   !! largest size relative to the full size
+      real(real64), intent(in) :: cap                   !! largest allowed size, relative to the full size
       type(packing_t) :: packing
       real(real64), allocatable :: scale(:)
       real(real64) :: room, distance, shared
@@ -236,7 +239,8 @@ contains
     end subroutine grow
   end subroutine grow_disks
 
-  !> Distance from a point to the nearest side or obstacle. Obstacles farther away than the largest radius may be ignored.
+  !> Distance from a point to the nearest side or obstacle. The function may ignore obstacles that are farther away than the largest
+  !> radius.
   pure function wall_distance(packing, x) result(distance)
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: x(2)                    !! [length]

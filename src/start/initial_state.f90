@@ -16,15 +16,16 @@ module initial_state
   private
   public :: check_speeds, create_simulation, describe_system
 
-  real(real64), parameter :: most = 1.0e130_real64          !! largest number that may be squared later; reals end at 1e308
+  real(real64), parameter :: most = 1.0e130_real64          !! largest number that may be squared later; the largest real is about
+                                                            !! 1e308
   real(real64), parameter :: widest = 1.0e30_real64*(1 + 1.0e-12_real64)   !! largest ratio of masses
 
 contains
 
-  !> Builds the simulation that the input describes. Tables of disks that were read from files are deallocated.
+  !> Builds the simulation that the input describes. The procedure deallocates the tables of disks that were read from files.
   subroutine create_simulation(input, line, sim, error)
     type(run_input_t), intent(inout) :: input
-    class(status_line_t), intent(inout) :: line             !! shows the progress of the placement
+    class(status_line_t), intent(inout) :: line             !! status line that shows the progress of the placement
     type(simulation_t), intent(out) :: sim
     type(error_t), allocatable, intent(out) :: error
     type(problem_list_t) :: problems

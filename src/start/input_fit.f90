@@ -33,7 +33,8 @@ contains
   subroutine complete_settings(settings, groups, problems, complete)
     type(settings_t), intent(inout) :: settings
     type(group_t), intent(inout) :: groups(:)
-    type(problem_list_t), intent(inout) :: problems           !! unreadable files and lack of memory are added
+    type(problem_list_t), intent(inout) :: problems           !! problems of the input; problems of unreadable files and a lack of
+                                                              !! memory are added
     logical, intent(out) :: complete                          !! .false. if there are too many disks, or if the box is invalid
     integer :: s(2), k, before
 
@@ -44,7 +45,7 @@ contains
       call read_missing_values(settings%species, k, settings%box, groups(s(1) + k - 1), problems)
     end do
     call settings%choose_features()
-    if (settings%n_disks() > most_disks) return               ! reported elsewhere
+    if (settings%n_disks() > most_disks) return               ! another procedure reports this problem
     before = problems%count
     call check_memory(settings, problems)
     if (problems%count > before) return
@@ -67,7 +68,7 @@ contains
     o = range_of(groups, obstacle_groups)
     s = range_of(groups, ["species"])
     associate (box => settings%box, species => settings%species)
-      beyond = box%side_excursion()                           ! range beyond the box that moving sides reach
+      beyond = box%side_excursion()                           ! distance beyond the box that moving sides reach
       do k = 1, box%n_obstacles()                             ! each shape checks its own position
         misfit = box%obstacle(k)%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
         if (misfit /= "") call report_obstacle_problem(box, k, groups(o(1) + box%obstacle(k)%surface - n_sides - 1), misfit, &
@@ -102,8 +103,8 @@ contains
     end if
   end subroutine report_obstacle_problem
 
-  !> Reports sides that would crush the disks: at the end of the motion of a side, the disks would have more area than the box. A
-  !> piston may make room for them; boxes with a piston are not checked.
+  !> Reports sides that would crush the disks: the area of the disks would exceed the area of the box at the end of the motion. A
+  !> box with a piston is not checked, because the disks may push the piston outwards.
   subroutine check_strokes(box, disks, groups, problems)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: disks                         !! total area of the disks [length**2]
@@ -132,9 +133,9 @@ contains
     end do
   end subroutine check_strokes
 
-  !> Takes from a starting file the number of disks of a species, their sizes, and whether they rotate, where the input leaves
-  !> these to the file. If neither number nor sizes are needed, an unreadable file is reported only when the disks are placed,
-  !> because a resumed run does not need the file.
+  !> Reads from a starting file the number of disks of a species, their sizes, and whether the disks rotate, unless the input
+  !> contains these values. If neither the number nor the sizes are needed from the file, an unreadable file is reported only when
+  !> the disks are placed, because a resumed run does not need the file.
   subroutine read_missing_values(species, k, box, group, problems)
     type(species_settings_t), intent(inout) :: species(:)
     integer, intent(in) :: k                                  !! index of the species
@@ -198,7 +199,7 @@ contains
     type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
     type(box_t), intent(in) :: box
-    logical, intent(in) :: alone                              !! the species has the only disk of the run
+    logical, intent(in) :: alone                              !! the run has only one disk, which belongs to this species
     type(problem_list_t), intent(inout) :: problems
     logical :: sound
     integer :: axis, k
@@ -229,7 +230,7 @@ contains
       endless = spans(s%region, box)
       lower = s%region(2*axis - 1)
       upper = s%region(2*axis)
-      room = min(upper, high(axis)) - max(lower, low(axis))   ! without the part that is covered by displaced sides
+      room = min(upper, high(axis)) - max(lower, low(axis))   ! excludes the part of the region that displaced sides cover
       farthest = max(abs(box%lower(axis)), abs(box%upper(axis)))
       least = merge(2*s%radius, 4*s%radius + rounding*farthest, alone)
       if (lower >= upper) then
@@ -248,7 +249,7 @@ contains
       end if
     end subroutine check_axis
 
-    !> Adds the axis to the report.
+    !> Reports the problem together with the name of the axis.
     subroutine complain(variable, what)
       character(len=*), intent(in) :: variable, what
 

@@ -62,7 +62,8 @@ contains
 
   contains
 
-    !> Reads some rows of the table for all disks. Values that are not in frames are read from constant datasets.
+    !> Reads a range of rows of the table for all disks. Quantities that frames do not contain are read from datasets of constant
+    !> values.
     subroutine read_rows(first, last)
       integer, intent(in) :: first, last
       type(series_t) :: series

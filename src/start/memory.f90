@@ -1,6 +1,6 @@
-!> Checks whether a run fits into the memory that is available on the machine or granted by a batch system. A run that does not
-!> fit is refused before it starts; one for which domains do not fit uses the serial engine. The check works on Linux; on other
-!> systems no limit is known.
+!> Checks whether a run fits into the memory that is available on the machine or granted by a batch system. A run that needs more
+!> memory is refused before it starts. If only the domains need more memory, the run uses the serial engine. The check works on
+!> Linux. On other systems the available memory is not known, and no run is refused.
 module memory
   use kinds, only: int64, never, pi, real64
   use input_problems, only: problem_list_t
@@ -13,17 +13,21 @@ module memory
   private
   public :: check_memory, free_memory, memory_needed, peak, room_for_domains
 
-  !> Bytes per disk, obstacle or process: the peak of the resident memory, as measured by `runs/memory.sh`, accurate to 5 %. For
-  !> time-stepped dynamics they are upper bounds, because the length of its lists depends on the step.
+  !> Memory in bytes per disk, per obstacle and per process: contributions to the peak of the resident memory, as measured by
+  !> `runs/memory.sh`, accurate to 5 %. For time-stepped dynamics the values are upper bounds, because the length of the Verlet
+  !> lists depends on the time step.
   integer(int64), parameter :: per_process = 10000000, per_obstacle = 580
-  real(real64), parameter :: record = 110, cell = 32         !! state and event of a disk; cell of the search
-  real(real64), parameter :: extra = 40, own_size = 8        !! images, contact times, rotation; individual mass
-  real(real64), parameter :: sampled = 8.8_real64            !! number in a frame
+  real(real64), parameter :: record = 110, cell = 32         !! state and event of a disk; a cell of the search
+  real(real64), parameter :: extra = 40, own_size = 8        !! image indices, contact time and rotation of a disk; individual mass
+  real(real64), parameter :: sampled = 8.8_real64            !! one number in a frame
   real(real64), parameter :: listed = 264                    !! neighbour list
-  real(real64), parameter :: kicked = 16, stepped = 100      !! driving; lists of time-stepped dynamics
-  real(real64), parameter :: divided(2) = [143, 205]         !! in addition with domains: between walls, in a periodic box
-  real(real64), parameter :: listed_twice = 80               !! in addition with domains and neighbour lists
-  ! Total during the placement of disks: at given positions, at random positions, from a file, by compression.
+  real(real64), parameter :: kicked = 16, stepped = 100      !! random numbers for the driving; Verlet lists of time-stepped
+                                                             !! dynamics
+  real(real64), parameter :: divided(2) = [143, 205]         !! additional memory with domains: in a box with walls, in a periodic
+                                                             !! box
+  real(real64), parameter :: listed_twice = 80               !! additional memory with domains and neighbour lists
+  ! Total memory during the placement of disks: at given positions, at random positions, at positions from a file, and by
+  ! compression.
   real(real64), parameter :: placed = 150, inserted = 166, read_in = 226, grown = 310
   real(real64), parameter :: cells_per_disk = 1.67_real64    !! upper bound: see `cell_layout`
 
@@ -44,8 +48,8 @@ contains
       //size_text(needed)//" of memory, and "//size_text(free)//" are free; use fewer disks")
   end subroutine check_memory
 
-  !> Whether the memory suffices for dividing the box into domains. A reserve is included, because a run does not notice the lack
-  !> of memory before it is killed.
+  !> Whether the memory is sufficient to divide the box into domains. The test includes a reserve, because the operating system
+  !> kills a run that exceeds the memory without a warning.
   function room_for_domains(settings) result(yes)
     type(settings_t), intent(in) :: settings
     logical :: yes
@@ -53,7 +57,7 @@ contains
     yes = 1.15_real64*real(peak(settings, domains=.true.), real64) <= real(free_memory(""), real64)
   end function room_for_domains
 
-  !> Memory that a run needs, with domains if the run will use them. [bytes]
+  !> Memory that a run needs, including the domains if the run will use domains. [bytes]
   function memory_needed(settings) result(bytes)
     type(settings_t), intent(in) :: settings
     integer(int64) :: bytes
@@ -64,12 +68,12 @@ contains
     bytes = peak(settings, domains)
   end function memory_needed
 
-  !> Peak memory of a run, with domains or without. [bytes]
+  !> Peak memory of a run, with or without domains. [bytes]
   pure function peak(settings, domains) result(bytes)
     type(settings_t), intent(in) :: settings
     logical, intent(in) :: domains                        !! the box is divided
     integer(int64) :: bytes
-    real(real64) :: running, starting, more               ! per disk
+    real(real64) :: running, starting, more               ! bytes per disk
     logical :: lists
 
     lists = are_listed(settings)
@@ -87,7 +91,7 @@ contains
     bytes = int(settings%n_disks()*max(running, starting), int64) + per_process + settings%box%n_obstacles()*per_obstacle
   end function peak
 
-  !> Bytes per disk during the placement, without optional data of disks.
+  !> Memory in bytes per disk during the placement, without optional data of disks.
   pure function starting_bytes(settings) result(bytes)
     type(settings_t), intent(in) :: settings
     real(real64) :: bytes
@@ -133,7 +137,7 @@ contains
     n = min(cells_per_disk, 0.25_real64*pi/max(crowding(settings), tiny(n)))
   end function cells
 
-  !> Whether neighbour lists are used, by the condition of `neighbour_lists`.
+  !> Whether the run will use neighbour lists, according to the condition in `neighbour_lists`.
   pure function are_listed(settings) result(yes)
     type(settings_t), intent(in) :: settings
     logical :: yes
@@ -148,7 +152,8 @@ contains
     yes = candidates > candidates_that_pay - 27*packing
   end function are_listed
 
-  !> The packing fraction if all disks had the largest radius for which cells are made, which excludes a few big disks.
+  !> The packing fraction that would result if all disks had the radius that determines the width of the cells. This radius is the
+  !> largest one, except that a few big disks may be excluded.
   pure function crowding(settings) result(fraction)
     type(settings_t), intent(in) :: settings
     real(real64) :: fraction, radius
@@ -162,12 +167,12 @@ contains
     fraction = settings%n_disks()*pi*radius**2/product(settings%box%edges())
   end function crowding
 
-  !> Memory available on the machine, or the limit of the control group if that is less, because a batch job that exceeds it is
-  !> killed without a message. Huge if neither is known. [bytes]
+  !> The smaller of the memory available on the machine and the limit of the control group, because a batch job that exceeds this
+  !> limit is killed without a message. The result is huge if neither is known. [bytes]
   function free_memory(root) result(bytes)
     character(len=*), intent(in) :: root                  !! root of the file system; empty except in tests
     integer(int64) :: bytes
-    character(len=:), allocatable :: groups, line         ! number:controllers:group; in version 2 without controllers
+    character(len=:), allocatable :: groups, line         ! a line `number:controllers:group`; version 2 omits the controllers
     character(len=:), allocatable :: folder, unread
     integer :: top, at, colon
 
@@ -184,14 +189,14 @@ contains
       top = len(folder)
       if (index(line(:colon), "memory") + index(line, "::") == 0) cycle
       folder = folder//line(colon + 1:)
-      do while (len(folder) >= top)                       ! the control group, and those that contain it
+      do while (len(folder) >= top)                       ! the control group, and then the groups that contain it
         bytes = min(bytes, number_after("", folder//"/memory.max"), number_after("", folder//"/memory.limit_in_bytes"))
         folder = folder(:index(folder, "/", back=.true.) - 1)
       end do
     end do
   end function free_memory
 
-  !> The number that follows a label at the beginning of a line of a file; huge if there is none.
+  !> The number that follows a label at the beginning of a line of a file; huge if no line begins with the label.
   function number_after(label, path) result(number)
     character(len=*), intent(in) :: label, path
     integer(int64) :: number

@@ -1,5 +1,5 @@
-!> A set of placed disks, with a test whether another disk fits. Each species has its own grid of cells. Because its disks
-!> have similar radii, the cost of a search does not depend on the sizes of other species.
+!> A set of placed disks, with a test whether another disk fits. Each species has its own grid of cells. The disks of a species have
+!> similar radii. The cost of a search therefore does not depend on the radii of other species.
 module packing
   use images, only: images_t
   use kinds, only: int32, real64
@@ -13,22 +13,23 @@ module packing
 
   !> The grid of cells of one species.
   type :: layer_t
-    real(real64) :: radius = 0.0_real64             !! largest radius of its disks [length]
+    real(real64) :: radius = 0.0_real64             !! largest radius of the disks of the species [length]
     integer(int32) :: count = 0                     !! number of disks to be placed
     real(real64) :: lower(2) = 0.0_real64           !! corners of a rectangle that contains all centres [length]
     real(real64) :: upper(2) = 0.0_real64
-    real(real64) :: density(2) = 0.0_real64         !! cells per length [1/length]
+    real(real64) :: density(2) = 0.0_real64         !! number of cells per length along each axis [1/length]
     integer :: n(2) = 0                             !! numbers of columns and rows
     real(real64) :: width = 0.0_real64              !! smaller edge of a cell [length]
-    integer(int32), allocatable :: head(:, :)       !! first disk in each cell; 0: none
+    integer(int32), allocatable :: head(:, :)       !! first disk in each cell; 0 if the cell is empty
   end type layer_t
 
-  !> A placed disk. Its data form one record, because disks that are close in space are far apart in memory.
+  !> A placed disk. All its data are in one record, because disks that are close in space are far apart in memory, and the access to
+  !> one disk should read only one cache line.
   type :: placed_t
     real(real64) :: x(2) = 0.0_real64               !! centre [length]
     real(real64) :: radius = 0.0_real64             !! [length]
-    integer(int32) :: species = 0                   !! 0: not placed yet
-    integer(int32) :: next = 0                      !! next disk in the same cell; 0: none
+    integer(int32) :: species = 0                   !! index of the species; 0 if the disk has not been placed yet
+    integer(int32) :: next = 0                      !! next disk in the same cell; 0 at the end of the list
   end type placed_t
 
   type :: packing_t
@@ -36,7 +37,8 @@ module packing
     type(images_t), private :: images               !! images of the box
     type(placed_t), allocatable :: disk(:)          !! (n)
     type(layer_t), allocatable :: layer(:)          !! (number of species)
-    type(obstacle_cells_t) :: near                  !! lists of obstacles, for the largest radius of an opened species
+    type(obstacle_cells_t) :: near                  !! lists of obstacles for each cell, valid up to the largest radius of the
+                                                    !! species for which `open_species` was called
   contains
     procedure :: open_species
     procedure :: add
@@ -69,9 +71,10 @@ contains
   subroutine open_species(self, s, radius, count, lower, upper)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: s
-    real(real64), intent(in) :: radius              !! largest radius of its disks [length]
+    real(real64), intent(in) :: radius              !! largest radius of the disks of the species [length]
     integer, intent(in) :: count                    !! number of disks to be placed
-    real(real64), intent(in) :: lower(2), upper(2)  !! corners of a rectangle that contains all their centres [length]
+    real(real64), intent(in) :: lower(2), upper(2)  !! corners of a rectangle that contains the centres of all disks of the species
+                                                    !! [length]
     real(real64) :: side, extent(2), few
     integer :: n(2)
 
@@ -110,13 +113,14 @@ contains
     self%layer(s)%head(c(1), c(2)) = k
   end subroutine add
 
-  !> Finds a disk or an obstacle that excludes disks of this radius from the whole rectangle `centre` +- `half`. `blocker` is
-  !> the index of the disk or the code of the obstacle (see `partners`), or 0 if there is none. With half = 0 this is the test
-  !> whether a disk fits.
+  !> Finds a disk or an obstacle that excludes disks of this radius from the whole rectangle `centre` +- `half`. `blocker` is the
+  !> index of the disk or the code of the obstacle (see `partners`), or 0 if there is none. With half = 0 the procedure tests
+  !> whether a disk fits at the point `centre`.
   pure subroutine find_blocker(self, centre, half, radius, blocker)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: centre(2), half(2)  !! [length]
-    real(real64), intent(in) :: radius              !! at most the largest radius of an opened species [length]
+    real(real64), intent(in) :: radius              !! radius, at most the largest radius of the species for which `open_species`
+                                                    !! was called [length]
     integer(int32), intent(out) :: blocker
     real(real64) :: rho
     integer(int32) :: e
@@ -157,7 +161,7 @@ contains
     end associate
   end subroutine load_cells
 
-  !> Prefetches the last disk of each of these cells.
+  !> Prefetches the disk that was last added to each of these cells.
   subroutine load_disks(self, s, p)
     class(packing_t), intent(in) :: self
     integer(int32), intent(in) :: s
@@ -174,8 +178,8 @@ contains
     end associate
   end subroutine load_disks
 
-  !> Finds a disk of species s that excludes disks of this radius from every point of the rectangle p +- half; 0: none. The
-  !> cell in the middle is searched first, because it contains the blocker most often.
+  !> Finds a disk of species s that excludes disks of the given radius from every point of the rectangle p +- half. The result is 0
+  !> if there is no such disk. The cell in the middle is searched first, because it is the most likely one to contain such a disk.
   pure subroutine search_layer(packing, s, p, half, radius, blocker)
     type(packing_t), intent(in) :: packing
     integer, intent(in) :: s
@@ -191,7 +195,7 @@ contains
       middle = cell(layer, p)
       blocker = blocker_in(packing, layer%head(middle(1), middle(2)), p, half, radius)
       if (blocker > 0) return
-      if (rho <= layer%width) then                  ! often; only the neighbouring cells contain such disks then
+      if (rho <= layer%width) then                  ! usually the case; only the neighbouring cells can then contain such disks
         low = max(middle - 1, 1)
         high = min(middle + 1, layer%n)
       else
@@ -207,7 +211,7 @@ contains
     end associate
   end subroutine search_layer
 
-  !> The same for the disks of one cell.
+  !> The same for the disks in one cell.
   pure function blocker_in(packing, head, p, half, radius) result(blocker)
     type(packing_t), intent(in) :: packing
     integer(int32), intent(in) :: head
@@ -223,7 +227,8 @@ contains
     end do
   end function blocker_in
 
-  !> Lists all disks whose boundary comes within `reach` of a point, and some others from the same cells.
+  !> Lists all disks whose boundary is within the distance `reach` of a point. The list may contain further disks from the same
+  !> cells.
   subroutine list_neighbours(self, p, reach, list, n)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: p(2), reach         !! [length]
@@ -244,7 +249,7 @@ contains
 
   contains
 
-    !> Appends the disks of species s that are in cells within the distance rho of a point.
+    !> Appends the disks of species s in the cells that are within the distance rho of a point.
     subroutine append_cells(p, rho)
       real(real64), intent(in) :: p(2), rho
       integer :: low(2), high(2), i, j
@@ -309,7 +314,7 @@ contains
     c = 1 + int(min(column_row, layer%n - 1.0_real64))
   end function cell
 
-  !> Range of periodic images of a point, in periods, that have disks of the box within the distance rho.
+  !> Range of the indices of periodic images of a point for which disks of the box can be within the distance rho of the image.
   pure subroutine range_images(box, p, rho, first, last)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: p(2), rho

@@ -1,8 +1,7 @@
 !> Placement of all disks.
-!>
-!> Species with fixed positions ('explicit', 'file', 'grid', 'lattice') come first, in the order of the input. Then follow 'random'
-!> species, the largest disks first, and finally 'dense' and 'grown' species. Species with the same region grow together, around the
-!> disks that have been placed before.
+!>  Species with fixed positions ('explicit', 'file', 'grid', 'lattice') are placed first, in the order of the input. 'random'
+!> species are placed next, the largest disks first, and 'dense' and 'grown' species last. 'dense' and 'grown' species with the same
+!> region grow together, and the disks that have been placed before are obstacles for them.
 module placement
   use images, only: images_t
   use kinds, only: int32, int64, pi, real64
@@ -32,21 +31,25 @@ module placement
   public :: place_disks
 
   integer, parameter :: stream_number = 1                   !! identifies the random streams of this module
-  integer(int32), parameter :: many_trials = 500000         !! number of disks placed in all attempts of 'random' together
-  integer(int32), parameter :: few = 5                      !! tolerance, in disks, that applies where there are few disks
-  real(real64), parameter :: nearly = 1.25_real64  !! factor by which the number of disks that fit may be larger in another attempt
-  real(real64), parameter :: denser = 1.5_real64  !! factor by which 'dense' packings are denser than 'random' ones, at least
+  integer(int32), parameter :: many_trials = 500000         !! limit of the number of disks that all attempts of 'random' place
+                                                            !! together
+  integer(int32), parameter :: few = 5                      !! additional tolerance, in numbers of disks, which matters for few
+                                                            !! disks
+  real(real64), parameter :: nearly = 1.25_real64  !! largest factor by which another attempt is assumed to place more disks
+  real(real64), parameter :: denser = 1.5_real64  !! smallest factor by which 'dense' packings are denser than 'random' packings
   integer, parameter :: most_reports = 5                    !! largest number of reports of one kind for one species
 
 contains
 
-  !> Sets the positions and radii of all disks, and their velocities where a file contains them.
+  !> Sets the positions and radii of all disks. Also sets the velocities of the disks if a file contains velocities.
   subroutine place_disks(species, groups, seed, line, sim, problems)
-    type(species_settings_t), intent(inout) :: species(:)   !! tables of disks that were read from files are deallocated
+    type(species_settings_t), intent(inout) :: species(:)   !! the species; the procedure deallocates their tables of disks that
+                                                            !! were read from files
     type(group_t), intent(in) :: groups(:)                  !! groups of the species
     integer(int64), intent(in) :: seed
     class(status_line_t), intent(inout) :: line             !! shows the progress
-    type(simulation_t), intent(inout) :: sim                !! in: with its box, and with the disks in the order of the input
+    type(simulation_t), intent(inout) :: sim                !! in: simulation with its box, and with the disks in the order of the
+                                                            !! input
     type(problem_list_t), intent(inout) :: problems
     type(packing_t) :: packing
     type(random_stream_t) :: stream
@@ -92,7 +95,7 @@ contains
 
   contains
 
-    !> Determines the positions of a species for which they are given directly, by a rule, or by a file. Masses, orientations and,
+    !> Determines the positions of a species whose positions are given directly, by a rule, or by a file. Masses, orientations and,
     !> if requested, velocities are copied from the file to the simulation.
     subroutine find_positions(s)
       integer, intent(in) :: s
@@ -129,7 +132,8 @@ contains
       end associate
     end subroutine find_positions
 
-    !> Adds a species with known positions. Reports disks that overlap others, and disks that are not completely in their region.
+    !> Adds a species with known positions. Reports disks that overlap other disks, and disks that are not completely inside their
+    !> region.
     subroutine add_species(packing, s, x, radius)
       type(packing_t), intent(inout) :: packing
       integer, intent(in) :: s
@@ -137,7 +141,7 @@ contains
       real(real64), intent(in) :: radius(:)                 !! (count) [length]
       real(real64) :: lower(2), upper(2), slack
       integer(int32) :: k, blocker
-      integer :: outside, overlapping                       ! numbers of disks with a problem
+      integer :: outside, overlapping                       ! numbers of disks with one of these problems
       character(len=:), allocatable :: taken
 
       outside = 0
@@ -202,12 +206,12 @@ contains
       associate (me => species(s))
         call stream%seed(seed, [s, stream_number])
         call centre_range(me%region, packing%box, me%radius, lower, upper)
-        ! The number of disks that fit varies between attempts. It varies more if there are few disks.
+        ! The number of disks that fit differs between attempts, and the relative differences are larger if there are few disks.
         do trial = 1, merge(1, max(1, many_trials/me%count), me%polydispersity > 0)
           call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
           call insert_at_random(packing, int(s, int32), 1 + disks_before(species, s), radius, stream, line, placed)
           if (placed == me%count) return
-          if (placed == 0 .or. me%count > nearly*placed + few) exit  ! if not a single disk fits, further attempts are useless
+          if (placed == 0 .or. me%count > nearly*placed + few) exit  ! further attempts are useless if not a single disk fits
         end do
         part = pi*radius(largest_first(radius))**2/product(me%region([2, 4]) - me%region([1, 3]))
         advice = "use fewer or smaller disks"
@@ -222,8 +226,9 @@ contains
     !> positions from a file.
     subroutine place_densely(members)
       integer, intent(in) :: members(:)                     !! indices of the species
-      type(packing_t) :: small                              ! copy of the packing with the small disks at the start of the growth
-      real(real64), allocatable :: places(:, :), full(:)    ! positions and radii of the disks of all these species [length]
+      type(packing_t) :: small                              ! copy of the packing to which the small disks at the start of the
+                                                            ! growth are added
+      real(real64), allocatable :: places(:, :), full(:)    ! positions and full radii of the disks of all given species [length]
       type(error_t), allocatable :: error
       logical :: grown
       integer :: k, last
@@ -258,8 +263,8 @@ contains
     end subroutine place_densely
   end subroutine place_disks
 
-  !> The region, without parts covered by displaced sides, as a box. Placed disks that reach into it are its obstacles,
-  !> periodic images included.
+  !> Represents the region, without the parts that displaced sides cover, as a box. The placed disks that reach into this box become
+  !> obstacles in it, including their periodic images.
   function growth_box(packing, region) result(box)
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: region(4)
@@ -288,7 +293,7 @@ contains
         end do
       end do
       if (pass == 1) call box%add_obstacles(["obstacles", "disks    "], &
-        [packing%box%n_obstacles(), n - packing%box%n_obstacles()])                  ! elastic obstacles
+        [packing%box%n_obstacles(), n - packing%box%n_obstacles()])                  ! the obstacles are elastic
     end do
     do k = 1, packing%box%n_obstacles()
       allocate (box%obstacle(k)%shape, source=packing%box%obstacle(k)%shape)

@@ -12,7 +12,8 @@ module position_file
   private
   public :: angle_row, column_names, mass_row, radius_row, read_positions, spin_row
 
-  !> Names of the columns, in the order of the rows of a table. Radius and mass are last, because they are checked together.
+  !> Names of the columns, in the order of the rows of a table. Radius and mass are the last rows, because the two are checked
+  !> together.
   character(len=*), parameter :: column_names(*) = [character(len=7) :: "x", "y", "vx", "vy", "omega", "angle", "radius", "mass"]
   integer, parameter :: spin_row = 5, angle_row = 6, radius_row = 7, mass_row = 8
   character(len=*), parameter :: known_names(*) = [character(len=7) :: column_names, "species"]
@@ -31,7 +32,8 @@ contains
     character(len=:), allocatable :: text, problem
     real(real64), allocatable :: table(:, :)                ! (column_names,n) values of the disks
     integer, allocatable :: lines(:)                        ! (n) line number of each disk
-    integer, allocatable :: column(:)  ! index in `known_names` of each column of the file; empty while they are unknown
+    integer, allocatable :: column(:)  ! index in `known_names` of each column of the file; empty before the first line has been
+                                       ! read
     integer :: first(longest_line), last(longest_line)      ! position of each word in the line
     integer(int64) :: begin, past                           ! beginning and end of a line in the text
     integer :: number, n, n_words
@@ -48,7 +50,7 @@ contains
     do while (past <= len(text, int64))
       begin = past
       past = begin + index(text(begin:), eol, kind=int64)
-      if (past == begin) past = len(text, int64) + 2        ! the last line may lack a line end
+      if (past == begin) past = len(text, int64) + 2        ! the last line may have no line end
       line = text(begin:past - 2)
       number = number + 1
       if (number == 1 .and. index(line, byte_order_mark) == 1) line = line(len(byte_order_mark) + 1:)
@@ -67,8 +69,8 @@ contains
 
   contains
 
-    !> Reads a line: the names of the columns or, if the first line contains numbers, their default meaning, or a disk, which is
-    !> added to the table if it belongs to the species.
+    !> Reads a line. The first line contains either the names of the columns or numbers; in the latter case the columns have their
+    !> default meaning. Any other line describes a disk, which is added to the table if it belongs to the species.
     subroutine read_line()
       real(real64) :: value(size(column_names))
       integer :: k, its_species

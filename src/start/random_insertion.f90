@@ -1,9 +1,9 @@
-!> Random sequential insertion: each disk is inserted at a point that is uniform among all points where it fits between the previous
-!> disks. Attempts are drawn only from voxels (small rectangles) of the region that no single disk covers completely, and voxels are
-!> halved when attempts fail too often. Attempts outside of these voxels would always be rejected, so that the distribution is that
-!> of simple insertion, up to saturation (Zhang and Torquato, Phys. Rev. E 88, 053312 (2013)). If radii differ, the largest disks
-!> come first. A voxel without space for one disk may have space for a smaller one: voxels are then not eliminated, and insertion
-!> ends when a disk does not fit in many attempts.
+!> Random sequential insertion: each disk is inserted at a point that is uniformly distributed among all points where the disk fits
+!> between the previous disks. Points are drawn only from voxels (small rectangles) of the region from which no single disk excludes
+!> the centre completely. Voxels are halved along both axes when attempts fail too often. An attempt outside of these voxels would
+!> always fail. The distribution is therefore that of simple insertion, up to saturation (Zhang and Torquato, Phys. Rev. E 88,
+!> 053312 (2013)). If radii differ, the largest disks are inserted first. A voxel without space for one disk may have space for a
+!> smaller disk. In this case voxels are not eliminated, and the insertion ends when many attempts to insert a disk have failed.
 module random_insertion
   use kinds, only: int32, real64
   use memory_hints, only: prefetch
@@ -19,17 +19,17 @@ module random_insertion
   integer(int32), parameter :: drawn_ahead = 8          !! number of attempts whose random numbers are drawn in advance
   integer(int32), parameter :: most_attempts = 300000   !! largest number of attempts for one disk, if radii differ
 
-  !> The voxels in which a centre may still be possible.
+  !> The voxels that may still contain possible positions of a centre.
   type :: voxels_t
     real(real64) :: origin(2) = 0.0_real64          !! [length]
     real(real64) :: side(2) = 0.0_real64            !! [length]
-    integer(int32) :: n = 0                         !! number of voxels left
+    integer(int32) :: n = 0                         !! number of remaining voxels
     integer(int32), allocatable :: column_row(:, :) !! (2,n) column and row of each voxel, counted from 0
   end type voxels_t
 
-  !> The random numbers of an attempt, and the stream after them.
+  !> The random numbers of an attempt, and the state of the random stream after these numbers.
   type :: attempt_t
-    real(real64) :: voxel = 0.0_real64              !! selects the voxel, as a fraction of their number
+    real(real64) :: voxel = 0.0_real64              !! selects the voxel: its index as a fraction of the number of voxels
     real(real64) :: place(2) = 0.0_real64           !! position in the voxel, as fractions of its edges
     type(random_stream_t) :: after
   end type attempt_t
@@ -48,8 +48,8 @@ contains
     type(voxels_t) :: voxels
     integer(int32) :: i, j, k, n(2), blocker, failures, count, order(size(size_of))
     integer(int32) :: attempts                      ! number of attempts made, modulo `drawn_ahead`
-    type(attempt_t) :: coming(0:drawn_ahead - 1)    ! drawn in advance, so that their data can be prefetched
-    type(random_stream_t) :: last                   ! state after the last attempt made
+    type(attempt_t) :: coming(0:drawn_ahead - 1)    ! the next attempts, drawn in advance so that their data can be prefetched
+    type(random_stream_t) :: last                   ! state of the random stream after the last attempt that was made
     real(real64) :: p(2), radius, lower(2), upper(2)
     logical :: equal
 
@@ -98,10 +98,11 @@ contains
       if (failures == most_attempts .and. .not. equal) exit
       if (.not. equal) cycle
       if (packing%covers(blocker, middle(voxels, k), 0.5_real64*voxels%side, radius)) then
-        voxels%column_row(:, k) = voxels%column_row(:, voxels%n)       ! the last voxel takes its place
+        voxels%column_row(:, k) = voxels%column_row(:, voxels%n)       ! the last voxel replaces the removed voxel
         voxels%n = voxels%n - 1
       end if
-      ! Halving a voxel costs four searches. It pays when the number of failed attempts is twice the number of voxels.
+      ! Dividing a voxel costs four searches. The division saves time when the number of failed attempts is twice the number of
+      ! voxels.
       if (failures > 2*voxels%n) then
         call halve(voxels, packing, radius)
         call line%show_share("placing disks", real(placed, real64)/count)
@@ -120,8 +121,9 @@ contains
       p = min(max(voxels%origin + (voxels%column_row(:, chosen(voxels, attempt)) + attempt%place)*voxels%side, lower), upper)
     end function place
 
-    !> Prefetches data for the next attempts: the voxel of the last one, and the cells and disks around the earlier ones. Many
-    !> disks do not fit into the cache, and consecutive attempts read different parts of memory.
+    !> Prefetches data for the next attempts: the voxel of the attempt that was drawn last, and the cells and disks around the
+    !> attempts that were drawn earlier. Many disks do not fit into the cache, and consecutive attempts read different parts of
+    !> memory.
     subroutine load_ahead()
       associate (far => coming(modulo(attempts - 1, drawn_ahead)), near => coming(modulo(attempts + 3, drawn_ahead)), &
           next => coming(modulo(attempts + 1, drawn_ahead)))
@@ -143,7 +145,7 @@ contains
     attempt%after = stream
   end subroutine draw_attempt
 
-  !> The number of the voxel that an attempt chooses, as `draw_index` does.
+  !> The number of the voxel that an attempt chooses, by the same rule as in `draw_index`.
   pure function chosen(voxels, attempt) result(k)
     type(voxels_t), intent(in) :: voxels
     type(attempt_t), intent(in) :: attempt
@@ -152,7 +154,8 @@ contains
     k = 1 + int(voxels%n*attempt%voxel, int32)
   end function chosen
 
-  !> Order of disks by decreasing radius, with a resolution of a thousandth of the range of radii. Equal disks keep their order.
+  !> Order of disks by decreasing radius, with a resolution of a thousandth of the range of radii. Disks that are equal within this
+  !> resolution keep their order.
   pure function largest_first(radius) result(order)
     real(real64), intent(in) :: radius(:)           !! [length]
     integer(int32), parameter :: classes = 1000
@@ -183,7 +186,7 @@ contains
 
     n = voxels%n
     if (maxval(voxels%column_row(:, :n)) >= ishft(huge(n), -1)) then
-      voxels%n = 0                                  ! too small for integers to distinguish them
+      voxels%n = 0                                  ! integers can no longer distinguish such small voxels
       return
     end if
     call move_alloc(voxels%column_row, parent)

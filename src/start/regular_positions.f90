@@ -23,8 +23,8 @@ contains
     yes = box%periodic .and. region([1, 3]) <= box%lower .and. region([2, 4]) >= box%upper
   end function spans
 
-  !> Corners of the rectangle of possible centres: disks there are completely inside the region, and clear of sides that
-  !> start away from their mean position.
+  !> Corners of the rectangle of possible centres. A disk with its centre in this rectangle is completely inside the region and does
+  !> not overlap a side, even if the initial position of the side differs from its mean position.
   pure subroutine centre_range(region, box, radius, lower, upper)
     real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box
@@ -35,7 +35,7 @@ contains
     call bounds(box, 0.0_real64, low, high)
     inset = merge(0.0_real64, radius, spans(region, box))
     lower = max(region([1, 3]), low) + inset
-    upper = max(min(region([2, 4]), high) - inset, lower)    ! tolerates rounding if a disk fills its region
+    upper = max(min(region([2, 4]), high) - inset, lower)    ! tolerates rounding errors if a disk fills its region
   end subroutine centre_range
 
   !> Positions at the centres of nx x ny equal cells of the region, row by row from the bottom.
@@ -58,9 +58,9 @@ contains
     end associate
   end subroutine grid_positions
 
-  !> Positions on a triangular lattice that fills the region and is stretched to its shape, row by row from the bottom. The
-  !> number of rows is the one with the largest distance between neighbours. If there are more positions than disks, the last
-  !> ones stay empty.
+  !> Positions on a triangular lattice that fills the region and is stretched to its shape, row by row from the bottom. The number
+  !> of rows is chosen such that the distance between neighbours is largest. If there are more positions than disks, the last
+  !> positions are not used.
   subroutine lattice_positions(species, group, box, x, problems)
     type(species_settings_t), intent(in) :: species
     type(group_t), intent(in) :: group
@@ -103,7 +103,7 @@ contains
 
       distance = -1
       do rows = 1, n
-        ! Alternate rows are shifted, so that a periodic lattice has an even number.
+        ! Alternate rows are shifted; a periodic lattice must therefore have an even number of rows.
         if (periodic(2) .and. modulo(rows, 2) == 1 .and. rows > 1) cycle
         call measure_lattice(1 + (n - 1)/rows, rows, its_step, its_distance)
         if (rows > 2 .and. 2*its_step(2) <= distance) exit                 ! more rows can only decrease the distance
@@ -114,7 +114,7 @@ contains
       end do
     end subroutine choose_lattice
 
-    !> Lattice spacings from column to column and from row to row, and the shortest distance between neighbours.
+    !> Lattice spacings between columns and between rows, and the shortest distance between neighbours.
     subroutine measure_lattice(columns, rows, step, distance)
       integer, intent(in) :: columns, rows
       real(real64), intent(out) :: step(2), distance        !! [length]

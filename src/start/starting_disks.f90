@@ -1,5 +1,5 @@
-!> The disks of a species from its starting file, whatever its format: each number is checked, and the table is completed with
-!> values from the input.
+!> Reads the disks of a species from its starting file, for all formats of the file. Each number is checked, and the table is
+!> completed with values from the input.
 module starting_disks
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds, only: int64, real64
@@ -16,18 +16,20 @@ module starting_disks
   public :: origin, read_disks, resolution
 
   real(real64), parameter :: resolution = 1.0e-10_real64      !! smallest radius relative to the coordinates, in double precision
-  !> Datasets of a file of a run that correspond to `position_file: column_names`. Those before the radius are in frames.
+  !> Datasets in the output file of a run that correspond to `position_file: column_names`. The datasets that precede the radius in
+  !> this list are in frames.
   character(len=48), parameter :: datasets(*) = [character(len=48) :: position//value_of, position//value_of, &
     velocity//value_of, velocity//value_of, angular_velocity//value_of, orientation//value_of, disk_radius, disk_mass]
 
   interface
-    !> Reads the disks of one species from the last frame of a run. The submodule `last_frame` implements this;
-    !> `last_frame_without_hdf5` refuses it. The linker selects one of them.
+    !> Reads the disks of one species from the last frame of a run. The submodule `last_frame` implements this procedure. The
+    !> submodule `last_frame_without_hdf5` only reports that such files cannot be read. The linker selects one of the two.
     module subroutine read_last_frame(path, name, disks, box)
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: name                    !! name of the species
       type(disks_in_file_t), intent(inout) :: disks
-      type(box_t), intent(in), optional :: box                !! the positions are scaled to this box, if it is present
+      type(box_t), intent(in), optional :: box                !! box to which the positions are scaled; without this argument they
+                                                              !! are not scaled
     end subroutine read_last_frame
   end interface
 
@@ -46,7 +48,7 @@ contains
     type(species_settings_t), intent(inout) :: species(:)
     integer, intent(in) :: s
     type(box_t), intent(in) :: box
-    type(box_t), allocatable :: new_box                       ! the positions are scaled to this box
+    type(box_t), allocatable :: new_box                       ! box to which the positions are scaled
     character(len=:), allocatable :: of_species
 
     associate (me => species(s))
@@ -79,8 +81,8 @@ contains
     if (.not. allocated(me%in_file%error)) call fail(me%in_file%error, exit_usage, why)
   end subroutine refuse
 
-  !> Fills in values from the input. Reports values that both or neither of file and input contain; for files of runs, the
-  !> input may override values.
+  !> Completes the table with values from the input. A quantity is reported if neither the file nor the input contains it, and also
+  !> if both contain it; in the output file of a run, however, the input may override values.
   subroutine join(me)
     type(species_settings_t), intent(inout) :: me
     logical :: wanted(radius_row:mass_row)
@@ -115,7 +117,7 @@ contains
     end subroutine refuse_both
   end subroutine join
 
-  !> Refuses numbers that would be invalid in the input as well.
+  !> Reports numbers that would also be invalid in the input.
   subroutine check_numbers(me, farthest)
     type(species_settings_t), intent(inout) :: me
     real(real64), intent(in) :: farthest                      !! largest coordinate in the box [length]
@@ -125,7 +127,7 @@ contains
     do k = 1, size(me%in_file%rows)
       do row = 1, mass_row
         associate (number => me%in_file%table(row, k))
-          wrong = .not. ieee_is_finite(number)                ! comparisons with NaN are trapped in debug builds
+          wrong = .not. ieee_is_finite(number)                ! tested first, because debug builds stop at comparisons with NaN
           if (.not. wrong) wrong = number > largest .or. number < merge(smallest, -largest, row >= radius_row)
           if (.not. wrong) cycle
         end associate
@@ -141,7 +143,7 @@ contains
 
   contains
 
-    !> Reports the number as invalid.
+    !> Reports that the number is invalid.
     subroutine object(what)
       character(len=*), intent(in) :: what
 
@@ -149,7 +151,7 @@ contains
     end subroutine object
   end subroutine check_numbers
 
-  !> The origin of the values of a disk, for messages: a line of a text file, or a row of a dataset.
+  !> The place of a disk in its file, for messages: a line of a text file, or a row of a dataset.
   pure function origin(me, k, column) result(text)
     type(species_settings_t), intent(in) :: me
     integer, intent(in) :: k                                  !! index of the disk in its species

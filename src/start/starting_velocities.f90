@@ -12,12 +12,13 @@ module starting_velocities
   private
   public :: draw_initial_velocities
 
-  integer, parameter :: stream_number = 2, stream_of_spins = 6  !! identify the random streams of this module
+  integer, parameter :: stream_number = 2, stream_of_spins = 6  !! numbers that identify the random streams of this module
 
 contains
 
-  !> Sets the velocities of all disks. Where no boundary or force can change the total momentum, it is made zero. In a sheared box
-  !> the rules and temperatures are relative to the velocity profile; given velocities are absolute.
+  !> Sets the velocities of all disks. If no boundary or force can change the total momentum, the total momentum is set to zero. In
+  !> a sheared box the rules and temperatures apply to velocities relative to the velocity profile, but velocities that are given
+  !> explicitly are absolute.
   subroutine draw_initial_velocities(settings, groups, sim, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)                  !! groups of the species
@@ -58,9 +59,9 @@ contains
       last = disks_before(settings%species, s + 1)
     end subroutine find_disks
 
-    !> Draws the velocities of one species. If the total momentum is to be zero, equal speeds are drawn in opposite pairs (with
-    !> one triple at 120 degrees if the number is odd), so that they stay equal; for the other rules `remove_drift` shifts the
-    !> velocities.
+    !> Draws the velocities of one species. If the total momentum has to be zero, velocities of equal speed are drawn in opposite
+    !> pairs (and one triple at 120 degrees if the number is odd), so that the speeds remain equal. For the other rules
+    !> `remove_drift` shifts the velocities.
     subroutine draw_velocities()
       associate (species => settings%species(s), disk => sim%disk)
         select case (species%velocities)
@@ -82,14 +83,17 @@ contains
           end do
         case ("explicit")
           do i = first, last
-            disk(i)%v = species%velocity(:, min(i - first + 1, size(species%velocity, 2)))  ! a single velocity applies to all disks
+            disk(i)%v = species%velocity(:, min(i - first + 1, size(species%velocity, 2)))  ! a single given velocity applies to all
+                                                                                            ! disks
           end do
-        case default                                        ! 'rest'; with 'file' they were set together with the positions
+        case default                                        ! 'rest', or 'file': in the latter case the velocities have been set
+                                                            ! together with the positions
         end select
       end associate
     end subroutine draw_velocities
 
-    !> Draws unit vectors. The partner in an opposite pair is half the list away, so that it is not a neighbour on a grid.
+    !> Draws unit vectors. Disks that receive opposite velocities are half a list apart, so that they are not neighbours on the
+    !> initial grid.
     subroutine draw_directions(in_pairs)
       logical, intent(in) :: in_pairs
       real(real64), parameter :: sine_of_120 = 0.5_real64*sqrt(3.0_real64)  ! sine of 120 degrees
@@ -112,8 +116,8 @@ contains
       end associate
     end subroutine draw_directions
 
-    !> Makes the total momentum of all generated velocities zero by shifting the velocities of 'uniform' and
-    !> 'maxwell'. Equal speeds are balanced among themselves, except that of a single disk.
+    !> Sets the total momentum of all generated velocities to zero by shifting the velocities of 'uniform' and 'maxwell'. The
+    !> momenta of a species with 'equal_speed' already add up to zero, unless the species has a single disk.
     subroutine remove_drift()
       logical, dimension(size(settings%species)) :: shifted, generated
       real(real64) :: momentum(2), total
@@ -134,7 +138,7 @@ contains
       end do
     end subroutine remove_drift
 
-    !> Sets the angular velocities. With 'file' they were set together with the positions.
+    !> Sets the angular velocities. With 'file' the angular velocities have been set together with the positions.
     subroutine draw_spins()
       real(real64) :: normals(2)
 
@@ -151,9 +155,10 @@ contains
       end do
     end subroutine draw_spins
 
-    !> Scales the velocities of one species relative to their mean to an exact temperature. The momentum does not change.
+    !> Scales the velocities of one species, relative to their mean, to an exact temperature. The momentum of the species does not
+    !> change.
     subroutine scale_to_temperature(wanted)
-      real(real64), intent(in) :: wanted                    !! kT of translation [energy]
+      real(real64), intent(in) :: wanted                    !! intended kT of the translational motion [energy]
       real(real64) :: mean(2), temperature
       integer :: axis
 
