@@ -389,7 +389,7 @@ def test_a_scan_gives_means_and_rates_whatever_the_time_it_takes(address, case):
     found = asyncio.run(visit())
     assert [one["index"] for one in found] == [0, 1]
     if not powers:
-        assert all("at one moment" in one["problems"][0]["text"] for one in found), found
+        assert all("at the same time" in one["problems"][0]["text"] for one in found), found
         return
     means = [one["mean"] / power for one, power in zip(found, powers, strict=True)]
     assert means[0] == pytest.approx(means[1], rel=1e-6) and means[0] > 0

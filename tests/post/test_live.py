@@ -82,7 +82,7 @@ def test_the_show_stops_when_asked_and_the_run_goes_on(live, sign):
         assert reply.status == 200
     show.send_signal(sign)
     out, err = show.communicate()
-    assert (show.returncode, err, out.strip()) == (0, "", "stopped; the run goes on")
+    assert (show.returncode, err, out.strip()) == (0, "", "stopped; the run continues")
     assert run.poll() is None
 
 

@@ -1,1 +1,1 @@
-"""Figures and films of disks and walls."""
+"""Figures and films of runs."""

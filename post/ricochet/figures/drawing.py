@@ -1,6 +1,6 @@
-"""Draw disks of true size, walls and obstacles with Matplotlib; save figures.
+"""Draw disks, walls and obstacles to scale with Matplotlib, and save figures.
 
-`plt.style.use(drawing.STYLE)` gives a notebook the style of the scripts.
+`plt.style.use(drawing.STYLE)` sets the style of the scripts in a notebook.
 """
 
 from collections.abc import Sequence
@@ -28,23 +28,23 @@ from ..reading.reader import SIDES, Run, groups_of_rows
 
 STYLE = Path(__file__).with_name("style.mplstyle")
 COLOURS = matplotlib.rc_params_from_file(STYLE)["axes.prop_cycle"].by_key()["color"]
-LEAST_SHARE = 0.12  # least drawn diameter over the mean distance of disks
-OUTLINE = 0.12  # width of an outline over the diameter
-LEAST_POINTS = 4.0  # drawn diameter up to which small disks are enlarged
+LEAST_SHARE = 0.12  # smallest drawn diameter divided by the mean distance of disks
+OUTLINE = 0.12  # width of an outline divided by the diameter
+LEAST_POINTS = 4.0  # largest drawn diameter of enlarged disks
 WALL: dict[str, Any] = {"color": "0.25", "linewidth": 1.2}
 
-#: Quantities by which disks can be coloured, apart from species: label and name of the quantity.
+#: Quantities other than species by which disks can be coloured: label and name.
 COLOURINGS = {
     "speed": ("speed", "speed"),
     "displacement": ("displacement", "length"),
-    "collisions": ("collisions so far", "number"),
+    "collisions": ("number of collisions", "number"),
     "spin": ("angular velocity", "rate"),
-    "psi6": ("direction of $\\psi_6$ against the mean one (degrees)", "number"),
+    "psi6": ("direction of $\\psi_6$ relative to the mean (degrees)", "number"),
 }
 
 
 def caption(runs: list[Run]) -> str:
-    """Return the number of disks, restitution, varying parameters and seeds, for a figure."""
+    """Return number of disks, restitution, varying parameters and seeds as text for a figure."""
     parts = [f"N = {listed({run.n_disks for run in runs})}"]
     restitutions = {run.restitution for run in runs}
     if all(map(np.isfinite, restitutions)):
@@ -66,13 +66,13 @@ def titled(runs: list[Run]) -> str:
 
 
 def listed(values: set[float]) -> str:
-    """Return a few numbers as text, or the first and the last of many."""
+    """Return all of a few numbers as text, or the first and the last of many numbers."""
     words = [f"{value:g}" for value in sorted(values)]
     return ", ".join(words) if len(words) < 5 else f"{words[0]} to {words[-1]}"
 
 
 def numbers_of(run: Run) -> dict[str, float]:
-    """Return the numbers of the input that identify a system, without those of captions."""
+    """Return the input parameters that identify a system, except those in every caption."""
     found = {**run.parameters.get("box", {}), **run.parameters.get("contact", {})}
     if found.get("wall_restitution") == run.restitution:
         del found["wall_restitution"]
@@ -93,21 +93,21 @@ def numbers_of(run: Run) -> dict[str, float]:
 
 
 def colours(count: int, first: int = 0) -> list[str]:
-    """Return so many colours: from `COLOURS`, starting at `first`, or from a colour map."""
+    """Return the given number of colours from `COLOURS`, starting at `first`, or a colour map."""
     if first + count <= len(COLOURS):
         return COLOURS[first : first + count]
     return [to_hex(colour) for colour in plt.get_cmap()(np.linspace(0, 0.9, count))]
 
 
 def panel_grid(count: int, aspect: float) -> tuple[int, int]:
-    """Return rows and columns for `count` panels of this height over width."""
+    """Return rows and columns for `count` panels with this ratio of height to width."""
     columns = int(np.clip(np.ceil(np.sqrt(count * aspect * 1.4)), 1, count))
     rows = int(np.ceil(count / columns))
     return rows, int(np.ceil(count / rows))
 
 
 def label_of(run: Run, colour: str) -> str:
-    """Return the label of a colour scale, with the unit."""
+    """Return the label of a colour scale with the unit."""
     return run.units.label(*COLOURINGS[colour])
 
 
@@ -124,9 +124,10 @@ def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
 
 
 def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
-    """Return the upper end of a colour scale for a film; the few largest values lie above it.
+    """Return the upper end of a colour scale for a film; the few largest values exceed it.
 
-    It is taken from some frames, or from the last one for displacements, which keep growing.
+    The end is computed from some of the frames or, for displacements, which grow, from the last
+    frame.
     """
     some = [] if colour == "displacement" else frames[:: max(1, len(frames) // 40)]
     values = values_of(run, sorted({*some, frames[-1]}), colour)
@@ -140,12 +141,12 @@ def limits_of(colour: str, top: float) -> tuple[float, float]:
 
 
 def colour_map(colour: str) -> str:
-    """Return the name of the colour map; directions have a cyclic one, spins one with a middle."""
+    """Return the name of the colour map, which is cyclic for angles and diverging for spins."""
     return {"psi6": "hsv", "spin": "coolwarm"}.get(colour, "viridis")
 
 
 def chosen_colour(run: Run, wish: str | None) -> str:
-    """Return the wished colouring, or the default of the run; refuse what it has no data for."""
+    """Return the requested colouring, or the default; raise an error if data are missing."""
     known = ("species", *COLOURINGS)
     if wish is not None and wish not in known:
         hint = did_you_mean(wish, known)
@@ -153,26 +154,27 @@ def chosen_colour(run: Run, wish: str | None) -> str:
     if wish == "collisions" and run.event_count is None:
         raise RunError(f"{run.path}: has no collisions per disk")
     if wish == "spin" and "angular_velocity" not in run.disk_data:
-        raise RunError(f"{run.path}: its disks cannot rotate, or the frames leave their spins out")
+        raise RunError(f"{run.path}: its disks cannot rotate, or the frames do not contain their "
+            "spins")
     return wish or ("species" if len(run.names) > 1 else "speed")
 
 
 def aspect_of(run: Run) -> float:
-    """Return height over width of the box with its moving sides."""
+    """Return the ratio of height to width of the box including its moving sides."""
     width, height = run.bounds[1] - run.bounds[0]
     return height / width
 
 
 def lone(x: np.ndarray) -> dict[str, Any]:
-    """Return the style of a curve: a single point needs a marker."""
+    """Return the style of a curve, with a marker if it has a single point."""
     return {"marker": "o", "ms": 3, "clip_on": False} if len(x) < 2 else {}
 
 
 def draw_box(axes: Axes, run: Run, time: float | None = None) -> None:
-    """Draw walls solid, periodic sides dashed, obstacles grey; equal scales, ticks at the corners.
+    """Draw walls solid, periodic sides dashed and obstacles grey, with equal scales of the axes.
 
-    Moving sides are drawn at their positions at this time [their mean positions]; the area beyond
-    them is grey.  Thermal and sliding walls are labelled.
+    Moving sides are drawn at their positions at the given time [their mean positions]; the area
+    beyond them is grey.  Thermal and sliding walls are labelled.
     """
     low, high = run.bounds
     (x0, y0), (x1, y1) = (run.lower, run.upper) if time is None else run.corners_at(time)
@@ -200,34 +202,34 @@ def draw_box(axes: Axes, run: Run, time: float | None = None) -> None:
 
 
 def draw_circles(axes: Axes, run: Run, grey: dict[str, Any]) -> None:
-    """Draw circular obstacles, with the periodic images that reach into the box."""
+    """Draw circular obstacles, including periodic images that overlap the box."""
     if any(obstacle.inside for obstacle in run.obstacles):
         axes.add_patch(Rectangle((run.lower[0], run.lower[1]), *run.edges, zorder=0, **grey))
-    width = min(1.0, 20 / np.sqrt(max(len(run.obstacles), 1)))  # line width: many circles are small
+    width = min(1.0, 20 / np.sqrt(max(len(run.obstacles), 1)))  # thin for many circles
     centres = np.array([obstacle.centre for obstacle in run.obstacles]).reshape(-1, 2)
     radii = np.array([obstacle.radius for obstacle in run.obstacles])
     encloses = np.array([obstacle.inside for obstacle in run.obstacles], dtype=bool)
-    for inside, fill, level in ((True, "white", 0.1), (False, "0.75", 0.5)):  # a map is at 0.2
+    for inside, fill, level in ((True, "white", 0.1), (False, "0.75", 0.5)):  # above maps (0.2)
         style: dict[str, Any]
         style = {"facecolors": fill, "edgecolors": "0.25", "linewidths": width, "zorder": level}
         for shift in periods(run):
             at, reach = centres + shift, radii[:, np.newaxis]
             seen = (at + reach >= run.lower) & (at - reach <= run.upper)
             shown = seen.all(axis=1) & (encloses == inside)
-            sizes = 2 * radii[shown]  # one collection draws 100 000 circles in a second
+            sizes = 2 * radii[shown]  # 100 000 circles in a second
             style |= {"offsets": at[shown], "offset_transform": axes.transData, "units": "xy"}
             axes.add_collection(EllipseCollection(sizes, sizes, np.zeros(1), **style))
 
 
 def name_walls(axes: Axes, run: Run) -> None:
-    """Label each side and wall with its temperature and surface velocity."""
+    """Label each thermal or sliding side and wall with its temperature and surface velocity."""
     (x0, y0), (x1, y1) = run.bounds
     ends_of = [((x0, y0), (x0, y1), 1), ((x1, y0), (x1, y1), -1)]
     ends_of += [((x0, y0), (x1, y0), -1), ((x0, y1), (x1, y1), 1)]
     shown: list[Any] = [*zip(run.sides, ends_of, strict=True)]
     walls = rows_of(run.parameters.get("wall", {}))
     groups = groups_of_rows(run.parameters, "wall")
-    firsts = np.unique(groups, return_index=True)[1]  # one wall of each polyline or file
+    firsts = np.unique(groups, return_index=True)[1]  # label one wall of each polyline or file
     shown += [(walls[groups[k]], (*run.walls[k], 1)) for k in firsts]
     for own, (start, end, side) in shown:
         speed = own.get("surface_velocity", 0.0)
@@ -237,7 +239,7 @@ def name_walls(axes: Axes, run: Run) -> None:
         along = way / np.linalg.norm(way)
         axes.annotate(
             ",  ".join(words),
-            start + 0.7 * way,  # beside the names of the axes
+            start + 0.7 * way,  # beside the labels of the axes
             xytext=9 * side * np.array([-along[1], along[0]]),
             textcoords="offset points",
             rotation=np.degrees(np.arctan2(along[1], along[0])),
@@ -249,7 +251,7 @@ def name_walls(axes: Axes, run: Run) -> None:
 
 
 def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return indices and positions of disks and of their images that reach into the box."""
+    """Return indices and positions of disks and of their images that overlap the box."""
     which, places = [np.arange(run.n_disks)], [position]
     for shift in periods(run):
         if shift.any():
@@ -263,7 +265,7 @@ def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def points_per_length(axes: Axes) -> float:
-    """Return how many points on paper a length of 1 takes, in axes of equal scales."""
+    """Return the length on paper, in points, of the unit of length in axes of equal scales."""
     (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
     pixels = min(axes.bbox.width / (x1 - x0), axes.bbox.height / (y1 - y0))
     figure = axes.get_figure(root=True)
@@ -271,9 +273,9 @@ def points_per_length(axes: Axes) -> float:
 
 
 def drawn_diameters(axes: Axes, run: Run) -> np.ndarray:
-    """Return the diameters (N,) that disks are drawn with.
+    """Return the diameters (N,) with which disks are drawn.
 
-    They are the true ones, unless disks of a few points are so far apart that they would be lost.
+    Disks are drawn to scale, unless they are so small and far apart that they would be invisible.
     """
     apart = np.sqrt(np.prod(run.edges) / run.n_disks)
     least = min(LEAST_SHARE * apart, LEAST_POINTS / points_per_length(axes))
@@ -281,16 +283,16 @@ def drawn_diameters(axes: Axes, run: Run) -> np.ndarray:
 
 
 def note_on_size(axes: Axes, run: Run) -> str:
-    """Return the words for a title where disks are drawn larger than they are, else ''."""
+    """Return a note for a title if disks are enlarged, otherwise ''."""
     larger = drawn_diameters(axes, run) > 2 * run.radius
-    return ",  small disks drawn larger" if larger.any() else ""
+    return ", small disks enlarged" if larger.any() else ""
 
 
 def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) -> EllipseCollection:
-    """Draw disks of their `drawn_diameters` at `position` (N, 2), and their periodic images.
+    """Draw disks with `drawn_diameters` at `position` (N, 2), and their periodic images.
 
-    `array` (N,) in `style` colours them by value, `facecolors` directly.  Where they are coloured
-    by value, the disks of all species but the first have a black outline.
+    In `style`, `array` (N,) colours disks by value, and `facecolors` sets colours directly.  If
+    disks are coloured by value, all species except the first have a black outline.
     """
     which, places = with_images(run, position)
     diameters = drawn_diameters(axes, run)
@@ -307,7 +309,7 @@ def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) ->
 
 
 def radius_marks(axes: Axes, run: Run, frame: int) -> LineCollection | None:
-    """Draw a radius of each disk at its orientation; return None if disks have none."""
+    """Draw a line from centre to rim at the orientation of each disk, or return None."""
     if "orientation" not in run.disk_data:
         return None
     which, places = with_images(run, run.position[frame])
@@ -334,7 +336,7 @@ def bars(axes: Axes, height: Estimate, bins: np.ndarray, **style: Any) -> None:
 
 
 def noise_band(axes: Axes, count: int, colour: str, label: str = "") -> None:
-    """Draw the band that contains a2 of Maxwellian speeds with a probability of 95 %."""
+    """Draw the band that contains a2 of Maxwellian speeds with 95 % probability."""
     reach = 2 * kurtosis_noise(count)
     axes.axhspan(-reach, reach, color=colour, alpha=0.15, lw=0, zorder=0, label=label)
 
@@ -353,7 +355,7 @@ def species_colours(run: Run) -> list[str]:
 def species_legend(figure: Figure, run: Run, by_outline: bool = False) -> None:
     """Add a legend of the species below all panels, if there are several.
 
-    They differ by their colours, or `by_outline` as in `disk_collection`.
+    Species are distinguished by colours or, with `by_outline`, by outlines as in `disk_collection`.
     """
     styles = [{"color": COLOURS[k % len(COLOURS)]} for k in range(len(run.names))]
     if by_outline:
@@ -364,14 +366,14 @@ def species_legend(figure: Figure, run: Run, by_outline: bool = False) -> None:
 
 
 def warn(figure: Figure, notes: Sequence[str]) -> None:
-    """Write the notes below a figure, at most three of them in full."""
+    """Write warnings below a figure, at most three of them in full."""
     if not notes:
         return
     rest = len(notes) - 3
     more = [f"and {rest} more warning{'s' * (rest > 1)}, as printed"] if rest > 0 else []
     lines = [wrap(f"Warning: {note}", 15 * int(figure.get_figwidth())) for note in notes[:3]]
     text = "\n".join([line for part in lines for line in part] + more)
-    if figure.legends:  # one lies where the label would
+    if figure.legends:  # an axis label would overlap the warnings
         figure.legends[0].set_title(text, FontProperties(size=9))
         figure.legends[0].get_title().set_color("firebrick")
     else:
@@ -379,12 +381,12 @@ def warn(figure: Figure, notes: Sequence[str]) -> None:
 
 
 def save(figure: Figure, path: Path, runs: list[Run], title: str) -> None:
-    """Write the figure with its sources in the metadata; make missing folders."""
+    """Write the figure, with its sources in the metadata, and make missing folders."""
     sources = ", ".join(run.path.name for run in runs[:20]) + (", ..." if len(runs) > 20 else "")
     commits = sorted({str(run.provenance.get("git_commit", "unknown")) for run in runs})
     origin = f"{sources} (ricochet {', '.join(commits)})"
     if path.suffix not in (".pdf", ".svg", ".png"):
-        raise RunError(f"{path}: a figure ends in .pdf, .svg, .png")
+        raise RunError(f"{path}: the name of a figure must end in .pdf, .svg, .png")
     key = "Subject" if path.suffix == ".pdf" else "Description"
     figure.savefig(destination(path), metadata={"Title": title, key: origin})
     plt.close(figure)

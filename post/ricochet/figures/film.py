@@ -1,4 +1,4 @@
-"""A film in a notebook: the page of `player.py`."""
+"""Films in notebooks, which display the page of `player.py`."""
 
 import html
 import sys
@@ -12,7 +12,7 @@ class Film:
     """A film of a run, which a notebook displays and `save` writes to a file."""
 
     def __init__(self, run: Run, colour: str | None = None, height: int = 700):
-        """Make the page; `colour` is that of the disks, `height` is in pixels."""
+        """Make the page; `colour` is the quantity that colours disks, `height` is in pixels."""
         if str(SCRIPTS) not in sys.path:
             sys.path.append(str(SCRIPTS))
         import player

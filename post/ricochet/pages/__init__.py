@@ -1,1 +1,1 @@
-"""Web pages of a running simulation and of the laboratory: their servers and workers."""
+"""Web pages of running simulations and of the laboratory: servers and worker processes."""

@@ -1,8 +1,8 @@
 """The laboratory: the server of its pages, and the worker processes that simulate for them.
 
-Each run and each scan has a socket and a worker process (`ricochet.worker`), which ends with the
-socket.  A spare worker is always ready, so that a page need not wait for Python to start.  If the
-laboratory is killed, the kernel ends its workers.
+Each run and each scan has a WebSocket and a worker process (`ricochet.worker`), which ends when the
+socket is closed.  A spare worker is always ready, so that a page need not wait until Python has
+started.  If the laboratory is killed, the kernel ends its workers.
 """
 
 import asyncio
@@ -21,13 +21,13 @@ from ..reading.files import RunError
 from ..running.program import find_program, value_text
 
 RUNS = 24  # largest number of runs of all pages at a time
-GRACE = 3.0  # time after which a worker that has been asked to end is killed [s]
-ENDED = b"No answer: the laboratory has ended."  # reason of a closed socket, at most 123 bytes
+GRACE = 3.0  # time after which a worker that does not end on request is killed [s]
+ENDED = b"No answer: the laboratory has ended."  # reason for closing a socket, at most 123 bytes
 DIED = b"It has ended: it needs more memory than it may have here (fewer disks do), or was killed."
 NAME = re.compile(r"[\w.-]{1,200}")  # name of a variable or a group
 
 
-# --- inputs, as the program parses them ---
+# --- inputs as parsed by the program ---
 
 
 def printed(*words: str | Path) -> object:
@@ -51,7 +51,7 @@ def form(path: Path) -> dict:
 
 
 def setting(value: object) -> str:
-    """Return a value as --set expects it."""
+    """Return a value in the format of --set."""
     if isinstance(value, list):
         return ",".join(map(setting, value))
     return value if isinstance(value, str) else value_text("", value).removesuffix(".0")
@@ -61,10 +61,10 @@ def setting(value: object) -> str:
 
 
 class Lab:
-    """The inputs, the program's table of variables, and all worker processes."""
+    """The inputs, the table of variables, and all worker processes of the laboratory."""
 
     def __init__(self, inputs: list[Path], folders: list[Path], command: list[str]) -> None:
-        """Take input files, the folders that inputs may name files of, and the worker's command."""
+        """Store input files, folders from which inputs may read, and the command of a worker."""
         self.inputs = {path.stem: path for path in inputs}
         self.folders = [folder.resolve() for folder in folders]
         self.command = command
@@ -97,12 +97,12 @@ class Lab:
         self.prepare()
         task, self.spare = self.spare, None
         if task is None:
-            raise RunError("the laboratory ends")
+            raise RunError("the laboratory is ending")
         worker = await task
         self.prepare()
         if is_alive(worker):
             return worker
-        self.workers.discard(worker)  # it was killed from outside
+        self.workers.discard(worker)  # another process has killed it
         return await self.worker()
 
     async def end(self, worker: Process) -> None:
@@ -129,7 +129,7 @@ class Lab:
     async def socket(self, request: web.Request) -> web.StreamResponse:
         """Handle the socket of a run; the run lasts as long as the socket is open."""
         if self.runs >= RUNS:
-            raise RunError(f"{RUNS} runs are open, which is all that can be: close a page")
+            raise RunError(f"{RUNS} runs are open, which is the largest number: close a page")
         self.runs += 1
         worker, socket = None, web.WebSocketResponse(heartbeat=30.0, max_msg_size=1_000_000)
         try:
@@ -161,7 +161,7 @@ class Lab:
             answers.cancel()
 
     async def pass_answers(self, worker: Process, socket: web.WebSocketResponse) -> None:
-        """Pass answers of a worker to its page; close the socket with a reason when it ends."""
+        """Pass answers of a worker to its page, and close the socket when the worker ends."""
         with suppress(asyncio.IncompleteReadError, ConnectionError):
             while True:
                 kind, length = struct.unpack(">cI", await worker.stdout.readexactly(5))
@@ -170,9 +170,9 @@ class Lab:
         await socket.close(message=ENDED if self.closed else DIED)
 
     def allowed(self, query: dict) -> dict:
-        """Return a request of a page with the text of its input, after checking it.
+        """Check a request of a page and return it with the text of its input.
 
-        Raises LookupError, TypeError or ValueError if it is malformed.
+        Raises LookupError, TypeError or ValueError if the request is malformed.
         """
         if query["do"] not in ("start", "scan"):
             return query
@@ -191,20 +191,21 @@ class Lab:
         return query | {"text": text}
 
     def allow(self, file: str) -> None:
-        """Refuse a starting file outside the folders of the inputs."""
+        """Raise an error for a starting file outside the folders of the inputs."""
         path = Path(re.fullmatch(r"""(['"]?)([^'"]*)\1""", file.strip())[2]).resolve()
         if not any(path.is_relative_to(folder) for folder in self.folders):
-            raise RunError(f"{file}: lies elsewhere; start the laboratory with --files FOLDER")
+            raise RunError(f"{file}: is outside the allowed folders; start the laboratory with "
+                "--files FOLDER")
 
 
 async def send(socket: web.WebSocketResponse, message: dict) -> None:
-    """Send a message to a page, if it is still there."""
+    """Send a message to a page if its socket is still open."""
     with suppress(ConnectionError):
         await socket.send_json(message)
 
 
 def terminate(worker: Process) -> None:
-    """End a worker; while it writes a file, wait until it has removed it."""
+    """End a worker; a worker that is writing a file first removes the file."""
     with suppress(ProcessLookupError):
         worker.terminate()
 
@@ -212,7 +213,7 @@ def terminate(worker: Process) -> None:
 def is_alive(worker: Process) -> bool:
     """Return whether a worker has not ended.
 
-    Its return code is set some time after the operating system has released its process.
+    The return code is not sufficient, because it is set some time after the process has ended.
     """
     with suppress(ProcessLookupError):
         os.kill(worker.pid, 0)

@@ -1,4 +1,4 @@
-"""A web server for the browsers of this computer, and the page of an unfinished run.
+"""A web server for browsers on this computer, and the page of an unfinished run.
 
 Requests from pages of other addresses are refused, so that pages of other hosts cannot read
 anything through a name that points to this computer (DNS rebinding).
@@ -20,11 +20,11 @@ from ..reading.files import RunError
 from ..reading.reader import Run, read_run
 
 ADDRESS = "127.0.0.1"
-CHECK_INTERVAL = 0.5  # interval of checks whether the run has ended [s]
+CHECK_INTERVAL = 0.5  # interval at which the server checks if the run has ended [s]
 DIED = "was killed or has crashed"
 PATIENCE = 10.0  # time without requests after which the server of an ended run stops [s]
 LONGEST = 1_000_000  # largest request [bytes]
-SILENCE = 5.0  # time that a connection may take to its first request [s]
+SILENCE = 5.0  # longest time of a connection before its first request [s]
 HEADERS = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
@@ -38,7 +38,7 @@ SERVER = web.AppKey("server", dict)
 
 @web.middleware
 async def guarded(request: web.Request, handler: Callable) -> web.StreamResponse:
-    """Answer only pages of this server, and a user who types the address."""
+    """Answer requests only from pages of this server and from users who enter the address."""
     port = request.app[SERVER]["port"]
     hosts = {f"{name}:{port}" for name in (ADDRESS, "localhost")}
     if port == 80:
@@ -48,11 +48,11 @@ async def guarded(request: web.Request, handler: Callable) -> web.StreamResponse
     own = len(host) == 1 and host[0] in hosts
     own &= not origin or origin == [f"http://{host[0]}"]
     own &= request.headers.get("Sec-Fetch-Site", "none") in ("none", "same-origin")
-    if "Upgrade" in request.headers:  # browsers always send the origin of a socket
+    if "Upgrade" in request.headers:  # browsers always send the origin when they open a socket
         own &= bool(origin)
     request.app[SERVER]["heard"].add(request.protocol)
     if not own:
-        return web.Response(status=403, text="only for pages of this server\n")
+        return web.Response(status=403, text="only pages of this server are allowed\n")
     try:
         return await handler(request)
     except (RunError, OSError) as problem:
@@ -60,9 +60,9 @@ async def guarded(request: web.Request, handler: Callable) -> web.StreamResponse
 
 
 def application(paths: Mapping[str, Callable], frames: str = "'none'") -> web.Application:
-    """Return a server with a function for each path.
+    """Return a web application with a function for each path.
 
-    `frames` names the origins whose pages may show pages of this server in a frame.
+    `frames` lists the origins of pages that may embed pages of this server in a frame.
     """
     app = web.Application(middlewares=[guarded], client_max_size=LONGEST)
     app[SERVER] = {"heard": set()}  # connections that have sent a request
@@ -92,12 +92,12 @@ async def close_silent(app: web.Application, server: web.Server) -> None:
 
 @asynccontextmanager
 async def serving(app: web.Application, port: int = 0):
-    """Answer requests; yield the address, and an event that Ctrl-C, TERM and HUP set.
+    """Answer requests; yield the address and an event that is set by Ctrl-C, TERM and HUP.
 
     Raises RunError if the port is taken.
     """
     for name in ("aiohttp", "asyncio"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # no messages about requests
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # requests are not logged
     loop, stop = asyncio.get_running_loop(), asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         loop.add_signal_handler(number, stop.set)
@@ -120,7 +120,7 @@ async def serving(app: web.Application, port: int = 0):
 
 
 def page_of(text: str) -> Callable:
-    """Return a function that answers with a page."""
+    """Return a function that answers requests with a page."""
 
     async def answer(_: web.Request) -> web.Response:
         return web.Response(text=text, content_type="text/html")
@@ -134,15 +134,15 @@ def page_of(text: str) -> Callable:
 class Live:
     """The newest film of a run that may be unfinished.
 
-    The file is opened again for each request, without locks, and only committed data are read, so
-    that the run is not disturbed.
+    The file is opened for each request without locks, and only committed data are read, so that the
+    running simulation is not disturbed.
     """
 
     def __init__(self, run: Run, make_film: Callable[[Run], dict]) -> None:
-        """Take the run and the function that makes a film of it."""
+        """Store the run and the function that makes a film of the run."""
         self.final = run.path.with_suffix("") if run.path.suffix == ".part" else run.path
         self.part, self.make_film = Path(f"{self.final}.part"), make_film
-        self.lock_file = Path(f"{self.final}.lock")  # locked while the program writes
+        self.lock_file = Path(f"{self.final}.lock")  # held by the program while it writes
         self.lock = threading.Lock()
         self.stamp, self.body = "", b""
         self.last_request = -PATIENCE  # time of the last request of a page
@@ -150,7 +150,7 @@ class Live:
 
     @property
     def end(self) -> str:
-        """Why the run has ended; empty while it goes on."""
+        """Reason why the run has ended; empty while it continues."""
         if not self.part.exists():
             return "has ended" if self.final.exists() else ""
         if abandoned(self.lock_file):
@@ -158,10 +158,10 @@ class Live:
         return "" if self.lock_file.exists() else "has stopped"
 
     def answer(self, known: str) -> tuple[bytes, bool]:
-        """Return the film if a page does not have it yet, and whether the run has ended."""
+        """Return the film if it is newer than that of the page, and whether the run has ended."""
         with self.lock:
             end = self.end
-            # The file may just be renamed; then the next request will succeed.
+            # The program may be renaming the file; then the next request will succeed.
             with suppress(RunError, FileNotFoundError):
                 run = read_run(self.part if self.part.exists() else self.final)
                 stamp = f"{run.n_frames} {end}"
@@ -179,16 +179,17 @@ class Live:
         response = web.Response(body=body, content_type="application/json")
         await response.prepare(request)
         await response.write_eof()
-        self.delivered = self.delivered or ends  # after it is sent, because the server stops then
+        self.delivered = self.delivered or ends  # set after sending, as it stops the server
         return response
 
 
 def abandoned(lock: Path) -> bool:
-    """Whether a lock file exists that no process holds, because the program has died.
+    """Return whether a lock file exists that no process holds, because the program was killed.
 
-    A free lock is taken for a moment only.  Where file locks do not work, the answer is no.
+    A free lock is acquired for a moment only.  If the file system has no locks, the result is
+    False.
     """
-    import fcntl  # not on Windows, where files can be read nevertheless
+    import fcntl  # imported here because it does not exist on Windows, where files can be read
 
     try:
         descriptor = os.open(lock, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW)
@@ -196,7 +197,7 @@ def abandoned(lock: Path) -> bool:
         return False
     try:
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        return os.path.samestat(os.fstat(descriptor), lock.stat())  # not one just removed
+        return os.path.samestat(os.fstat(descriptor), lock.stat())  # not just removed
     except OSError:
         return False
     finally:
@@ -209,10 +210,10 @@ def serve(
     make_film: Callable[[Run], dict],
     open_page: Callable[[str], object] | None = None,
 ) -> str:
-    """Show the run until it has ended, or until Ctrl-C or TERM; return how it ended.
+    """Show the run until it has ended, or until Ctrl-C or TERM; return the reason of the end.
 
-    `open_page` is called with the address of the page.  Raises RunError if there is nothing to
-    show, or if the run has died.
+    `open_page` is called with the address of the page.  Raises RunError if the file cannot be
+    shown, or if the program was killed.
     """
     if run.path.suffix != ".part":
         raise RunError(f"{run.path}: has finished; leave out --live")
@@ -223,7 +224,7 @@ def serve(
     end, left = live.end, live.part if live.part.exists() else live.final
     if end == DIED:
         raise RunError(f"{left}: the run {end}")
-    return f"the run {end}: {left}" if end else "stopped; the run goes on"
+    return f"the run {end}: {left}" if end else "stopped; the run continues"
 
 
 async def serve_until_end(live: Live, page: str, open_page: Callable[[str], object] | None) -> None:

@@ -1,16 +1,17 @@
-"""The worker process behind a page of the laboratory: it simulates and sends frames.
+"""Worker process of the laboratory, which simulates and sends frames to a page.
 
-Requests are lines of JSON on standard input.  Answers on standard output consist of a letter, the
-length in four bytes, and a text in JSON (t) or a frame (b).  The key `is` names the kind of a text:
-scene (the constant part of a picture), numbers, events (the next ones), state, problems, file,
-scan.  At most two frames are sent that the page has not confirmed as drawn (`got`).
+Requests are lines of JSON on standard input.  An answer on standard output consists of a letter,
+the length in four bytes, and a text in JSON (letter t) or a frame (letter b).  The key `is`
+contains the kind of a text: scene (constant part of a picture), numbers, events (next events),
+state, problems, file, scan.  The worker waits when the page has not yet confirmed two frames as
+drawn (`got`).
 
 A frame contains, in this order and in the byte order of the machine: time, collisions per disk and
 the positions of the left, right, bottom and top side as 8-byte floats; then as 4-byte floats x and
 y of all disks, their velocities, and their angles if they rotate.
 
-A change is applied at a time at which all events are complete, so that `script` repeats the run
-bit for bit.
+A change is applied at a time at which all events are complete, so that the run of `script` is
+bit-identical.
 """
 
 import base64
@@ -41,11 +42,11 @@ from ..running.program import ProgramError
 from ..running.simulation import NEVER, Simulation
 
 DISKS = 20000  # largest number of disks
-MEMORY = 2 << 30  # bytes of a process
-INTERVAL = 1 / 60  # s between two frames
-SLICE = 0.012  # s that the engine may advance before requests are read
-FRAMES_AHEAD = 2  # frames that the page need not have drawn yet
-NUMBERS_INTERVAL = 0.1  # s between two messages with numbers
+MEMORY = 2 << 30  # largest memory of a process [bytes]
+INTERVAL = 1 / 60  # interval of frames [s]
+SLICE = 0.012  # longest time of a call of the engine between requests [s]
+FRAMES_AHEAD = 2  # largest number of frames that the page has not yet drawn
+NUMBERS_INTERVAL = 0.1  # interval of messages with numbers [s]
 FEW_DISKS = 20  # largest number of disks whose next events are sent
 EVENTS_SENT = 6  # number of next events that are shown
 PISTON_MARGIN = 0.2  # region beyond a piston that is shown [largest edge of the box]
@@ -54,38 +55,38 @@ MOST_SAMPLES = 4000  # largest number of samples that are kept
 SCAN_SAMPLES = 160  # samples of a value in a scan
 SCAN_EVENTS = 1000  # smallest number of events in four intervals of samples
 SCAN_SECONDS = 4.0  # s that a value in a scan may take
-COUNTED = ("collisions", "dissipated_energy")  # observables that count from the start
+COUNTED = ("collisions", "dissipated_energy")  # observables that are counts since the start
 TURNS = "angular_velocity"
 ENDINGS = {"input": ".nml", "script": ".py", "output": ".h5.part"}
-UNREAD = bytearray()  # the start of an incomplete line
+UNREAD = bytearray()  # incomplete line at the end of the data received
 PR_SET_PDEATHSIG = 1  # option PR_SET_PDEATHSIG of prctl
 
 
 class Session:
-    """A simulation, and the pace at which it advances for a page."""
+    """A simulation and the pace at which it advances for a page."""
 
     def __init__(self, describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
-        """Take the function that describes the constant part of a picture: facts and arrays."""
+        """Store the function that returns the constant part of a picture: values and arrays."""
         self.describe_scene = describe_scene
         self.simulation: Simulation | None = None
         self.playing, self.ended, self.reason = False, False, ""
         self.pace = 0.0  # simulated time per second
         self.due = self.numbers_sent = time.perf_counter()
-        self.unconfirmed = 0  # frames that the page has not confirmed
+        self.unconfirmed = 0  # number of frames that the page has not confirmed
         self.actions: list[tuple] = []  # changes: time, kind, value as requested, exact value
         self.samples: deque[tuple[float, ...]] = deque(maxlen=MOST_SAMPLES)
         self.last_event: tuple | None = None
-        self.goal: tuple[float, int, int] | None = None  # the end of a step that is in progress
+        self.goal: tuple[float, int, int] | None = None  # end time of a step that is in progress
 
     # --- requests ---
 
     def start(self, request: dict) -> None:
-        """Start another simulation in place of the present one, if its input is accepted."""
+        """Start a new simulation instead of the present one if its input is accepted."""
         pace = max(0.0, float(request["pace"] or 0.0))
         try:
             other = Simulation._of(request["text"], setting_lines(request["settings"]))
             if other.n_disks > DISKS:
-                raise ProgramError(f"{other.n_disks} disks; here a run may have {DISKS}", 2)
+                raise ProgramError(f"{other.n_disks} disks; the laboratory allows {DISKS}", 2)
         except (ProgramError, ValueError) as problem:
             refuse(problem)
             return
@@ -98,7 +99,7 @@ class Session:
         self.send_scene(changed=False)
 
     def send_scene(self, changed: bool) -> None:
-        """Send the present scene, after a start or a change."""
+        """Send the present scene after a start or a change."""
         run = self.run = snapshot_run(self.simulation)
         self.settles = run.nature.in_equilibrium
         self.samples.clear()
@@ -128,7 +129,7 @@ class Session:
         self.apply("heat", factor, lambda: scale_velocities(self.simulation, factor))
 
     def apply(self, what: str, value: object, change: Callable[[], object]) -> None:
-        """Apply a change at a time that another run can reach exactly."""
+        """Apply a change at a time that a repeated run can reach exactly."""
         try:
             now = self.simulation._settle()
             change()
@@ -143,26 +144,26 @@ class Session:
         self.send_scene(changed=True)
 
     def play(self, _: dict) -> None:
-        """Continue."""
+        """Continue the simulation."""
         self.playing, self.goal, self.due = True, None, time.perf_counter()
         self.send_state()
 
     def pause(self, _: dict) -> None:
-        """Pause."""
+        """Pause the simulation."""
         self.playing, self.goal = False, None
         self.send_numbers()
         self.send_state()
 
     def set_pace(self, request: dict) -> None:
-        """Set how much simulated time passes in a second."""
+        """Set the simulated time per second."""
         self.pace = max(0.0, float(request["pace"]))
 
     def got(self, _: dict) -> None:
-        """Note that the page has drawn a frame."""
+        """Count a frame that the page has drawn."""
         self.unconfirmed = max(0, self.unconfirmed - 1)
 
     def step(self, request: dict) -> None:
-        """Advance by some time, then pause."""
+        """Advance by a given time, then pause."""
         if not (more := float(request["time"])) >= 0:
             raise ValueError("a step cannot go back in time")
         self.playing, self.goal = False, (self.simulation.time + more, NEVER, NEVER)
@@ -171,7 +172,7 @@ class Session:
         """Advance by one event, then pause."""
         coming = [] if self.run.time_step else self.simulation.next_events(1)
         if not coming and not self.run.time_step:
-            self.pause(request)  # nothing will happen
+            self.pause(request)  # no further event can occur
             return
         self.playing, self.goal = False, (np.inf, NEVER, self.simulation.events + 1)
         self.last_event = coming[0] if coming else None
@@ -196,8 +197,8 @@ class Session:
         send_json({"is": "file", "name": name + ENDINGS[part], "body": letters})
 
     def output_file(self, name: str) -> bytes:
-        """Return the output file; signals wait until its folder is removed."""
-        ends: list[int] = []  # not blocked: another thread of a library would take the signal
+        """Return the output file; signals are blocked until its folder is removed."""
+        ends: list[int] = []  # not blocked: a thread of a library would receive it
         before = signal.signal(signal.SIGTERM, lambda number, _: ends.append(number))
         try:
             with tempfile.TemporaryDirectory(prefix="ricochet-lab-") as folder:
@@ -210,12 +211,12 @@ class Session:
     # --- advancing and sending ---
 
     def is_advancing(self) -> bool:
-        """Whether the simulation should advance now."""
+        """Return whether the simulation should advance now."""
         ready = self.simulation and not self.ended and self.unconfirmed < FRAMES_AHEAD
         return bool(ready and (self.goal or (self.playing and self.pace > 0)))
 
     def advance(self) -> None:
-        """Advance to the time of the next frame, but for at most `SLICE` seconds."""
+        """Advance to the time of the next frame, but at most for `SLICE` seconds."""
         now = time.perf_counter()
         passed, self.due = min(now - self.due, 0.1), now
         stepping = self.goal
@@ -310,11 +311,11 @@ class SnapshotRun(Run):
         value = np.asarray(self.simulation.observable(name))
         return Series(np.array([self.simulation.time]), value[None])
 
-    piston_positions = property(Run.piston_positions.func)  # not cached: pistons move
+    piston_positions = property(Run.piston_positions.func)  # not cached, because pistons move
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """The corners of the box, with a margin beyond pistons."""
+        """The corners of the box with a margin beyond pistons."""
         way = np.zeros(4)
         way[[*self.piston_positions]] = PISTON_MARGIN * self.edges.max()
         lower, upper = Run.bounds.func(self)
@@ -357,15 +358,15 @@ def snapshot_run(simulation: Simulation) -> SnapshotRun:
 
 
 def observed(simulation: Simulation) -> dict[str, float]:
-    """Return the time and the present observables; of vectors the first component."""
+    """Return the time and the present observables; vectors are represented by one component."""
     seen = simulation._observed().items()
     return {name: part[0].item() for name, part in seen} | {"time": simulation.time}
 
 
 def sampled(count: int, value: dict) -> tuple[float, ...]:
-    """Return the quantities behind all means: time, kinetic energy, virial, accessible area.
+    """Return the quantities from which means are computed: time, energy, virial, area.
 
-    The observable `virial_pressure` follows from them.
+    The observable `virial_pressure` follows from these quantities.
     """
     time, kinetic, virial = (value[name] for name in ("time", "all/kinetic_energy", "virial"))
     whole = count * kinetic + (virial / (2 * time) if time else 0.0)
@@ -373,18 +374,18 @@ def sampled(count: int, value: dict) -> tuple[float, ...]:
 
 
 def pressure_between(samples: np.ndarray, count: int) -> SeriesMean:
-    """Estimate the mean pressure between the first and the last sample; sides may move."""
+    """Return the mean pressure between the first and the last sample; sides may move."""
     (kinetic, virial, area), apart = samples[1:4], np.diff(samples[0])
     gain = count * kinetic[1:] * apart + np.diff(virial) / 2
     return correlated_mean(gain / area[1:], apart)
 
 
 def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
-    """Return temperature, mean speed and pressure, each with its error and the value by theory.
+    """Return temperature, mean speed and pressure with errors and theoretical values.
 
-    In a run that relaxes to equilibrium they are means over the samples in equilibrium, with the
-    error of the series.  In other runs they are present values.  The pressure is that between the
-    first and the last sample.
+    For a run that relaxes to equilibrium the values are means over the samples in equilibrium, with
+    errors of the series.  For other runs they are present values, and the pressure is the mean
+    between the first and the last sample.
     """
     time, kt, speed = samples[[0, 4, 5]]
     found = {
@@ -425,15 +426,15 @@ def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
 
 
 def setting_lines(settings: dict[str, str]) -> list[str]:
-    """Return GROUP.VARIABLE=VALUE of each setting, as --set expects it."""
+    """Return GROUP.VARIABLE=VALUE of each setting in the format of --set."""
     lines = [f"{name}={value}" for name, value in settings.items()]
     if any("\n" in line or "\r" in line for line in lines):
-        raise ValueError("a value has no line ends")
+        raise ValueError("a value must not contain line ends")
     return lines
 
 
 def problems(reason: Exception) -> list[dict]:
-    """Return the program's messages, each with the variable that it concerns."""
+    """Return the messages of the program, each with the variable to which it refers."""
     found = []
     for line in str(reason).splitlines():
         place = line.removeprefix("--set ").partition("=")[0] if line.startswith("--set ") else ""
@@ -443,7 +444,7 @@ def problems(reason: Exception) -> list[dict]:
 
 
 def refuse(reason: Exception, change: bool = False) -> None:
-    """Answer with the problems of a request."""
+    """Send the problems of a request."""
     send_json({"is": "problems", "change": change, "problems": problems(reason)})
 
 
@@ -479,13 +480,13 @@ def send_json(message: dict) -> None:
     """Write one answer as JSON."""
     try:
         text = json.dumps(message, allow_nan=False)
-    except ValueError:  # NaN and infinity become null
+    except ValueError:  # NaN and infinity are sent as null
         text = json.dumps(json.loads(json.dumps(message), parse_constant=lambda _: None))
     send(b"t", text.encode())
 
 
 def requests(wait: float | None) -> list[dict]:
-    """Return the requests that have arrived; wait at most so many seconds, None without limit."""
+    """Return the requests that have arrived; `wait` is the longest wait in s, None for no limit."""
     if select.select([0], [], [], wait)[0]:
         data = os.read(0, 1 << 20)
         if not data:
@@ -495,11 +496,11 @@ def requests(wait: float | None) -> list[dict]:
     UNREAD[:] = rest
     found = list(map(json.loads, lines))
     starts = [request for request in found if request["do"] == "start"]
-    return [one for one in found if one not in starts[:-1]]  # of several starts the last counts
+    return [one for one in found if one not in starts[:-1]]  # only the last start is used
 
 
 def scan(request: dict) -> None:
-    """Simulate some values of one variable; send the result of each, or its problem."""
+    """Simulate several values of one variable; send the result or problem of each value."""
     for index, value in enumerate(request["values"]):
         try:
             lines = setting_lines(request["settings"] | {request["variable"]: value})
@@ -511,10 +512,10 @@ def scan(request: dict) -> None:
 
 
 def measure(text: str, lines: list[str], name: str) -> tuple[float, float | None]:
-    """Measure the mean over time of an observable, or the rate of one of `COUNTED`, and its error.
+    """Measure the time average of an observable, or the rate of one of `COUNTED`, with its error.
 
     The second half of `SCAN_SAMPLES` samples is used, which are half a collision per disk apart.
-    There is an error only if the run relaxes to equilibrium.
+    An error is returned only if the run relaxes to equilibrium.
     """
     samples, began = [], time.perf_counter()
     with Simulation._of(text, lines) as simulation:
@@ -529,8 +530,8 @@ def measure(text: str, lines: list[str], name: str) -> tuple[float, float | None
     late = np.array(samples[len(samples) // 2 :]).T
     apart = np.diff(late[0])
     if not apart.any():
-        raise ValueError("nothing to measure: no collisions, or all of them at one moment")
-    if name == "virial_pressure":  # the observable is a mean since the start
+        raise ValueError("cannot measure: no collisions, or all collisions at the same time")
+    if name == "virial_pressure":  # this observable is a mean since the start
         one = pressure_between(late, count)
     else:
         gain = np.diff(late[-1]) if name in COUNTED else late[-1][1:] * apart
@@ -539,8 +540,8 @@ def measure(text: str, lines: list[str], name: str) -> tuple[float, float | None
 
 
 def work(describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
-    """Answer requests until the laboratory ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the laboratory handles it and ends its workers
+    """Answer requests until the laboratory closes the connection."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # handled by the laboratory
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
@@ -557,6 +558,6 @@ def work(describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
                 if request["do"] in ("start", "scan") or session.simulation:
                     handlers[request["do"]](request)
             except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as problem:
-                send_json({"is": "state", "reason": f"not understood: {problem}"})
+                send_json({"is": "state", "reason": f"invalid request: {problem}"})
         if session.is_advancing() and time.perf_counter() >= session.due + INTERVAL:
             session.advance()

@@ -1,1 +1,1 @@
-"""Formulas of theory that measured values are compared with; none of them reads a run."""
+"""Theoretical formulas for comparison with measured values; none of them reads a run."""

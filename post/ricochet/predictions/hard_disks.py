@@ -33,16 +33,16 @@ __all__ = [
 ]
 
 CLOSE_PACKING = math.pi / math.sqrt(12)
-# Simulation: to 0.5 from the equation of state of Kolafa and Rottner, Mol. Phys. 104, 3435 (2006);
-# above, Erpenbeck and Luban, Phys. Rev. A 32, 2920 (1985).
+# Simulations: up to 0.5 the equation of state of Kolafa and Rottner, Mol. Phys. 104, 3435 (2006);
+# above 0.5 Erpenbeck and Luban, Phys. Rev. A 32, 2920 (1985).
 FLUID = np.array([
     (0.05, 1.10839), (0.10, 1.23614), (0.15, 1.38804), (0.20, 1.57037), (0.25, 1.79159),
     (0.30, 2.06326), (0.35, 2.40150), (0.40, 2.82933), (0.45, 3.38054), (0.50, 4.10636),
     (CLOSE_PACKING / 1.6, 5.4963), (CLOSE_PACKING / 1.5, 6.6074), (CLOSE_PACKING / 1.4, 8.306),
 ])  # fmt: skip
-# Up to freezing, where we know of no published values: by this program, two runs of 8000 disks and
-# 1000 collisions per disk at each packing fraction, with errors below 0.1 %; the last value is that
-# of 1024^2 disks in `MELTING`.
+# From there to freezing no published values are known. The values were computed with this program
+# from two runs of 8000 disks and 1000 collisions per disk at each packing fraction, with errors
+# below 0.1 %; the last value is that of 1024^2 disks in `MELTING`.
 FREEZING = np.array([
     (0.66, 8.875), (0.67, 9.350), (0.68, 9.839), (0.69, 10.234),
     (0.698, 9.16934 * math.pi / 4 / 0.698),
@@ -73,7 +73,7 @@ MELTING = {
 
 @cache
 def splines() -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
-    """Z (1 - eta)^2, which is close to 1 and smooth and so safe to interpolate, and c."""
+    """Return splines of Z (1 - eta)^2, which is smooth and close to 1, and of c."""
     eta, z = np.concatenate([FLUID, FREEZING]).T
     smooth = scipy.interpolate.CubicSpline(np.append(0, eta), np.append(1, z * (1 - eta) ** 2))
     return smooth, scipy.interpolate.CubicSpline(
@@ -82,7 +82,7 @@ def splines() -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
 
 
 def henderson(eta: Number) -> Number:
-    """Return the compressibility factor Z = P / (n kT) of the fluid, by Henderson.
+    """Return Henderson's compressibility factor Z = P / (n kT) of the fluid.
 
     D. Henderson, Mol. Phys. 30, 971 (1975).
 
@@ -107,7 +107,7 @@ def henderson(eta: Number) -> Number:
 def simulated(eta: ArrayLike) -> np.ndarray:
     """Return Z = P / (n kT) of the fluid, interpolated between simulations.
 
-    They are published ones, except between the packing fractions 0.648 and 0.698.
+    The simulations are published ones, except between the packing fractions 0.648 and 0.698.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def simulated(eta: ArrayLike) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        (...) Z; NaN beyond 0.698, where the disks freeze
+        (...) Z; NaN above 0.698, where the fluid freezes
 
     Examples
     --------
@@ -129,7 +129,7 @@ def simulated(eta: ArrayLike) -> np.ndarray:
 
 
 def simulated_finite(eta: ArrayLike, count: int) -> np.ndarray:
-    """Return Z = P / (n kT) of the fluid of a finite number of disks in a periodic box.
+    """Return Z = P / (n kT) of a fluid of finitely many disks in a periodic box.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def crystal(eta: Number, count: float = math.inf) -> Number:
     eta : float or numpy.ndarray
         packing fraction
     count : float
-        number of disks in a periodic box, whose centre of mass is free [infinite]
+        number of disks in a periodic box with conserved total momentum [infinite]
 
     Returns
     -------
@@ -181,17 +181,20 @@ def crystal(eta: Number, count: float = math.inf) -> Number:
 def adiabat(
     widths: np.ndarray, height: float, count: int, radius: float, walled: bool
 ) -> np.ndarray:
-    """T over that at the first of the widths (W,) between two walls, one of which moves slowly.
+    """Return T at the widths (W,) between two walls, one of which moves slowly.
 
-    `walled`: the other two sides are walls, too; else the momentum along them is conserved, and
-    the kinetic energy is (N - 1/2) kT instead of N kT.  Its change is -F dw, where the side feels
-    F = P h less the tension of two walls along its way.  A wall has the tension kT n r / (1 - eta)
-    and lacks n r (1 - eta) / (1 + eta) disks per length, by scaled particle theory: Helfand,
-    Frisch and Lebowitz, J. Chem. Phys. 34, 1037 (1961).  P as `simulated`.
+    T is divided by its value at the first width.
+
+    If `walled` is true, the other two sides are walls, too.  Otherwise the momentum along the
+    moving wall is conserved, and the kinetic energy is (N - 1/2) kT instead of N kT.  The change of
+    the kinetic energy is -F dw, where the force F on the side is P h minus the tension of the two
+    walls parallel to the motion.  According to scaled particle theory a wall has the tension kT n r
+    / (1 - eta) and a deficit of n r (1 - eta) / (1 + eta) disks per length: Helfand, Frisch and
+    Lebowitz, J. Chem. Phys. 34, 1037 (1961).  P is that of `simulated`.
     """
     area = count * math.pi * radius**2
     eta = np.geomspace(1e-12, FREEZING[-1, 0], 50001)  # far from the walls
-    layer = 2 * radius * (1 - eta) / (1 + eta)  # of the two walls together
+    layer = 2 * radius * (1 - eta) / (1 + eta)  # of both walls
     width = area / eta / (height - walled * layer) + layer
     force = eta / area * (simulated(eta) * height - walled * 2 * radius / (1 - eta))  # over N kT
     rise = -np.append(0, np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(width)))
@@ -201,7 +204,7 @@ def adiabat(
 
 
 def published(eta: float, count: int, periodic: bool) -> float:
-    """Return Z = P / (n kT) as simulations of others found it, in the fluid or in the crystal.
+    """Return Z = P / (n kT) of fluid or crystal from published simulations.
 
     Parameters
     ----------
@@ -230,10 +233,10 @@ def published(eta: float, count: int, periodic: bool) -> float:
 
 
 def of_sizes(z: np.ndarray, eta: np.ndarray, alike: float) -> np.ndarray:
-    """Z of a fluid of many radii from that of equal disks; `alike` = <r>^2 / <r^2>.
+    """Return Z of a fluid of many radii from Z of equal disks; `alike` is <r>^2 / <r^2>.
 
     Santos, Yuste and Lopez de Haro, Mol. Phys. 96, 1 (1999): the second virial coefficient is
-    exact, and scaled-particle theory gives itself.
+    exact, and if Z of equal disks is that of scaled particle theory, so is the result.
     """
     return (1 - alike) / (1 - eta) + alike * z
 
@@ -264,7 +267,7 @@ def contact_value(z: Number, eta: Number) -> Number:
 def collision_rate(
     z: float, diameter: float, free: float, kt: float = 1.0, mass: float = 1.0
 ) -> float:
-    """Return the number of collisions per disk and time that follows from the pressure.
+    """Return the number of collisions per disk and time, which follows from the pressure.
 
     Parameters
     ----------
@@ -273,7 +276,7 @@ def collision_rate(
     diameter : float
         diameter of the disks [length]
     free : float
-        disks that share the energy: N between walls, N - 1 in a periodic box
+        effective number of disks that share the energy: N between walls, N - 1 in a periodic box
     kt, mass : float
         temperature and mass of a disk
 
@@ -287,7 +290,7 @@ def collision_rate(
     >>> round(hard_disks.collision_rate(2.0, 1.0, 1e4), 3)
     2.257
     """
-    # Mean relative speed for fixed energy over that of the Maxwell law.
+    # Mean relative speed at fixed energy divided by that of Maxwell's distribution.
     c_n = math.exp(math.lgamma(free) - math.lgamma(free + 0.5)) * math.sqrt(free)
     return 4 * (z - 1) * c_n / (math.sqrt(math.pi) * diameter) * math.sqrt(kt / mass)
 
@@ -317,7 +320,7 @@ def haff_rate(xi: float) -> float:
 
 
 def haff_by_collisions(tau: np.ndarray, xi: float) -> np.ndarray:
-    """Return K / K0 of the homogeneous state after some collisions.
+    """Return K / K0 in the homogeneous state against collisions per disk.
 
     Parameters
     ----------
@@ -340,14 +343,14 @@ def haff_by_collisions(tau: np.ndarray, xi: float) -> np.ndarray:
 
 
 def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
-    """Return K / K0 of the homogeneous state after some time.
+    """Return K / K0 in the homogeneous state against time.
 
     P. K. Haff, J. Fluid Mech. 134, 401 (1983).
 
     Parameters
     ----------
     w0_t : array_like
-        (T,) time, in units of the inverse of the first collision rate
+        (T,) time in units of the inverse initial collision rate
     xi : float
         restitution
 
@@ -365,9 +368,10 @@ def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
 
 
 def haff_soft(law: Restitution, thermal: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """w0 t, collisions per disk, K / K0 of a gas of soft disks, for Maxwell's velocities.
+    """Return w0 t, collisions per disk and K / K0 of viscoelastic disks with Maxwell's velocities.
 
-    `thermal` = sqrt(kT/m) at the start.  Of g, u = m g^2 / 4 kT is exponential, weighted by g.
+    `thermal` is the initial sqrt(kT/m).  For relative normal speeds g of colliding disks, u = m g^2
+    / 4 kT has an exponential distribution.
     """
     k, u = np.geomspace(1, 1e-26, 1000), np.linspace(0, 40, 2001)
     g = 2 * thermal * np.sqrt(k[:, None] * u)
@@ -382,12 +386,12 @@ def noise_temperature(
 ) -> float:
     """Return the temperature at which dissipation balances white-noise driving.
 
-    Van Noije and Ernst, Granular Matter 1, 57 (1998), for Maxwell's velocities; chi by Henderson.
+    Van Noije and Ernst, Granular Matter 1, 57 (1998), for Maxwell's velocities and Henderson's chi.
 
     Parameters
     ----------
     strength : float
-        variance that each velocity component gains per time [velocity^2/time]
+        increase of the variance of each velocity component per time [velocity^2/time]
     xi : float
         restitution
     eta : float
@@ -441,8 +445,8 @@ def enskog(
 ) -> dict[str, float]:
     """Return the transport coefficients of Enskog's theory.
 
-    D. M. Gass, J. Chem. Phys. 54, 1898 (1971).  The bulk viscosity is all of it collisional; D is
-    the first Sonine approximation.
+    D. M. Gass, J. Chem. Phys. 54, 1898 (1971).  The bulk viscosity is purely collisional.  D is the
+    first Sonine approximation.
 
     Parameters
     ----------
@@ -475,9 +479,9 @@ def enskog(
 
 
 def contact_values(z: float, density: np.ndarray, diameter: np.ndarray) -> np.ndarray:
-    """chi_ij of a mixture (S,), from the Z of equal disks at its packing fraction; to a percent.
+    """Return chi_ij of a mixture (S,) from Z of equal disks, accurate to a percent.
 
-    Jenkins and Mancini, J. Appl. Mech. 54, 27 (1987), with the better chi of equal disks as
+    Jenkins and Mancini, J. Appl. Mech. 54, 27 (1987), with an improved chi of equal disks as in
     Santos, Yuste and Lopez de Haro, J. Chem. Phys. 117, 5785 (2002).
     """
     eta = math.pi / 4 * np.sum(density * diameter**2)
@@ -489,21 +493,22 @@ def contact_values(z: float, density: np.ndarray, diameter: np.ndarray) -> np.nd
 def enskog_mixture(
     z: float, density: np.ndarray, diameter: np.ndarray, mass: np.ndarray, kt: float = 1.0
 ) -> dict[str, float]:
-    """Viscosities of a mixture (S,), and "memory": the time in which they forget stress and heat.
+    """Return the viscosities of a mixture (S,), and the decay time of stress and heat ("memory").
 
     Enskog's theory in first Sonine approximation, as in Lopez de Haro, Cohen and Kincaid, J. Chem.
-    Phys. 78, 2746 (1983), here in two dimensions; what disks carry in flight has the factor 1.022
-    that higher ones add for equal disks.  While a gas expands its species differ in temperature.
+    Phys. 78, 2746 (1983), here in two dimensions.  The kinetic parts are multiplied by 1.022, the
+    correction by higher approximations for equal disks.  The bulk viscosity includes the difference
+    of the species' temperatures during an expansion.
     """
     total, pair = mass[:, None] + mass, (diameter[:, None] + diameter) / 2
     reduced = mass[:, None] * mass / total
     met = density * pair * contact_values(z, density, diameter)  # (i, j)
     rate = met * 2 * np.sqrt(2 * math.pi * kt * reduced) / total  # 2 of it: of temperatures
-    handed = 1 + math.pi / 2 * np.sum(met * pair * mass / total, axis=1)  # by collisions, too
+    handed = 1 + math.pi / 2 * np.sum(met * pair * mass / total, axis=1)  # with collisions
     stress = np.diag(np.sum(rate * (2 + mass / mass[:, None]), axis=1)) - rate
     lives = np.linalg.solve(stress, handed)
     sums, share = 2 * rate.sum(axis=1), density / density.sum()
-    heat = np.diag(sums) - 2 * rate + sums.max() * share  # the mean of all never changes
+    heat = np.diag(sums) - 2 * rate + sums.max() * share  # conserved mean
     cooler = np.linalg.solve(heat, 2 * handed - 2 * share @ handed)
     together = np.sum(density[:, None] * met * pair**2 * np.sqrt(math.pi / 2 * kt * reduced))
     slowest = min(np.linalg.eigvals(matrix).real.min() for matrix in (stress, heat))
@@ -517,7 +522,7 @@ def enskog_mixture(
 def long_time_tail(
     time: np.ndarray, density: float, diffusion: float, viscosity: float
 ) -> np.ndarray:
-    """Return the long-time tail of the velocity autocorrelation, by mode coupling.
+    """Return the long-time tail of the velocity autocorrelation from mode-coupling theory.
 
     J. R. Dorfman and E. G. D. Cohen, Phys. Rev. Lett. 25, 1257 (1970).
 

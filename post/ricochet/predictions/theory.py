@@ -1,6 +1,6 @@
-"""Theory that measurements are compared with: speeds, scattering, relaxation, chambers.
+"""Theoretical results: speed distributions, scattering, relaxation, rough disks, two chambers.
 
-Two dimensions throughout; u = v / sqrt(2 kT / m) is the reduced speed.
+All results are two-dimensional; u = v / sqrt(2 kT / m) is the reduced speed.
 """
 
 from collections.abc import Callable
@@ -20,15 +20,16 @@ __all__ = [
     "scattering_angle",
 ]
 
-#: A distribution function, or its density.
+#: A distribution function, or a probability density.
 Law = Callable[[np.ndarray], np.ndarray]
 
-# Dilute gas of hard disks, by Monte Carlo solution of the Boltzmann equation (10^6 disks).
-# (collisions per disk, excess kurtosis a2), from equal speeds.
+# Monte Carlo solutions of the Boltzmann equation for a dilute gas of hard disks (10^6 disks) that
+# start with equal speeds: (collisions per disk, excess kurtosis a2).
 RELAXATION = np.transpose(
     [(0, 1, 2, 3, 4, 5, 6, 8), (-0.5, -0.370, -0.264, -0.184, -0.125, -0.0855, -0.0565, -0.025)]
 )
-# (collisions per disk, temperature ratio heavy / light), half m and half 4 m, from equal speeds.
+# The same for a mixture of half m and half 4 m: (collisions per disk, temperature ratio heavy /
+# light).
 EQUIPARTITION = np.transpose(
     [(0, 1, 2, 3, 4, 5, 6, 8), (4, 2.02, 1.455, 1.228, 1.115, 1.062, 1.031, 1.005)]
 )
@@ -77,10 +78,10 @@ def maxwell_cdf(u: np.ndarray) -> np.ndarray:
 
 
 def finite_n_cdf(count: int, periodic: bool = False) -> Law:
-    """Return the exact distribution of the reduced speed of disks that share a fixed energy.
+    """Return the exact distribution function of the reduced speed of disks with fixed total energy.
 
-    Between walls K/E follows the Beta(1, N-1) distribution whatever the masses; in a periodic box
-    of equal disks at rest as a whole, K N / (E (N-1)) follows Beta(1, N-2).
+    Between walls K/E has the distribution Beta(1, N-1) for any masses.  In a periodic box of equal
+    disks with total momentum 0, K N / (E (N-1)) has the distribution Beta(1, N-2).
 
     Parameters
     ----------
@@ -105,14 +106,15 @@ def finite_n_cdf(count: int, periodic: bool = False) -> Law:
 
 
 def path_density(x: np.ndarray) -> np.ndarray:
-    """Return the density of free paths if collisions have no memory.
+    """Return the density of free paths under molecular chaos.
 
-    nu(v) / w follows from the mean relative speed of a disk of speed v in a Maxwellian gas.
+    nu(v) / w follows from the mean relative speed of a disk of speed v in a gas with Maxwell's
+    velocities.
 
     Parameters
     ----------
     x : numpy.ndarray
-        (n,) free paths, in units of the mean one, <v> / w
+        (n,) free paths in units of the mean free path <v> / w
 
     Returns
     -------
@@ -138,21 +140,21 @@ def path_density(x: np.ndarray) -> np.ndarray:
 def scattering_angle(
     b: ArrayLike, mass_ratio: float = np.inf, restitution: float = 1.0
 ) -> np.ndarray:
-    """Return the deflection of a disk that collides with a smooth disk at rest.
+    """Return the scattering angle of a disk that collides with a smooth disk at rest.
 
     Parameters
     ----------
     b : array_like
-        (...) impact parameter over r1 + r2
+        (...) impact parameter divided by r1 + r2
     mass_ratio : float
-        mass of the disk at rest over that of the moving disk
+        mass of the disk at rest divided by that of the moving disk
     restitution : float
         normal restitution
 
     Returns
     -------
     numpy.ndarray
-        (...) angle [rad]; 2 acos(b) for an infinite mass at rest and an elastic collision
+        (...) angle [rad]; 2 acos(b) for an elastic collision with an infinite mass
 
     Examples
     --------
@@ -165,8 +167,9 @@ def scattering_angle(
     return np.arctan2(2 * kappa * b * cosine, 1 - 2 * kappa * cosine**2)
 
 
-# Steady T_rot / T of cooling rough disks, moment of inertia m r^2 / 2, no friction limit, by direct
-# simulation of the Boltzmann equation (10^5 disks, errors 0.002): (xi, beta) -> ratio.
+# Steady T_rot / T of cooling rough disks with the moment of inertia m r^2 / 2 and without a Coulomb
+# limit, from direct simulations of the Boltzmann equation (10^5 disks, errors 0.002): (xi, beta) ->
+# ratio.
 ROUGH_RATIOS = {(0.9, 0.0): 0.4439, (0.9, 0.8): 1.0055, (0.85, 0.3): 0.708}
 
 
@@ -183,7 +186,7 @@ def rough_rates(xi: float, beta: float, inertia: float) -> tuple[float, float, f
 
 
 def rough_ratio(xi: float, beta: float, inertia: float) -> float:
-    """Return the ratio R / T of the two temperatures that cooling rough disks approach.
+    """Return the ratio R / T of the two temperatures that is approached by cooling rough disks.
 
     Luding, Huthmann, McNamara and Zippelius, Phys. Rev. E 57, 3416 (1998), for Maxwell's
     velocities.
@@ -212,7 +215,7 @@ def rough_ratio(xi: float, beta: float, inertia: float) -> float:
 def rough_temperatures(
     tau: np.ndarray, start: tuple[float, float], xi: float, beta: float, inertia: float
 ) -> np.ndarray:
-    """Return the temperatures of cooling rough disks after some collisions.
+    """Return the temperatures of cooling rough disks against collisions per disk.
 
     The theory is that of `rough_ratio`.
 
@@ -221,7 +224,7 @@ def rough_temperatures(
     tau : array_like
         (T,) collisions per disk
     start : tuple of float
-        temperatures of translation and of rotation at the start
+        initial translational and rotational temperature
     xi, beta : float
         normal and tangential restitution
     inertia : float
@@ -247,10 +250,11 @@ def rough_temperatures(
 def pushed_width(
     widths: np.ndarray, places: np.ndarray, squares: int, energy: np.ndarray
 ) -> tuple[float, float]:
-    """Mean and variance of the width that elastic disks and a constant force leave each other.
+    """Return mean and variance of the width of a box with a piston under a constant force.
 
-    Of the density Q(w) (H - F w)^(f/2 - 1) at widths (W,) equally far apart: `places` is ln Q, NaN
-    where it is not known, `squares` f, with that of the side, `energy` H - F w (docs/theory.md).
+    The density of the widths is Q(w) (H - F w)^(f/2 - 1), evaluated at equally spaced widths (W,).
+    `places` is ln Q (NaN if unknown), `squares` the number f of degrees of freedom including that
+    of the piston, and `energy` is H - F w (docs/theory.md).
     """
     log = np.where(np.isnan(places), -np.inf, places) + (squares / 2 - 1) * np.log(energy)
     density = np.exp(log - log.max())
@@ -259,13 +263,14 @@ def pushed_width(
 
 
 def demon_share(climb: float, layers: float, xi: float) -> float:
-    """Return the share of a dilute gas in the fuller of two chambers over a vibrating floor.
+    """Return the fraction of a dilute gas in the fuller of two chambers above a vibrating floor.
 
-    A sawtooth floor of velocity V gives n disks of a chamber the power n m g V.  In a column of
-    even temperature collisions dissipate n^2 m g s sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w, s the
-    diameter, w the width, and so T/m = (2 V w / (n s sqrt(pi) (1 - xi^2)))^2.  The flux through a
-    hole at the height h is as n^2 exp(-m g h / T) (J. Eggers, Phys. Rev. Lett. 83, 5322 (1999)),
-    the same in both directions in a steady state; equal shares are unstable where m g h > T.
+    A sawtooth floor of velocity V supplies the power n m g V to the n disks of a chamber.  In a
+    column of uniform temperature collisions dissipate n^2 m g s sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w,
+    where s is the diameter and w the width.  The balance is T/m = (2 V w / (n s sqrt(pi) (1 -
+    xi^2)))^2.  The flux through a hole at the height h is proportional to n^2 exp(-m g h / T) (J.
+    Eggers, Phys. Rev. Lett. 83, 5322 (1999)).  In a steady state the fluxes in both directions are
+    equal; equal fractions are unstable if m g h > T.
 
     Parameters
     ----------
@@ -279,7 +284,7 @@ def demon_share(climb: float, layers: float, xi: float) -> float:
     Returns
     -------
     float
-        share of the fuller chamber; 1/2 above the threshold
+        fraction in the fuller chamber; 1/2 above the threshold
 
     Examples
     --------
@@ -290,7 +295,7 @@ def demon_share(climb: float, layers: float, xi: float) -> float:
     """
     steep = climb * np.pi * (layers * (1 - xi**2) / 2) ** 2  # m g h / T of all disks in one chamber
 
-    def excess(odds: float) -> float:  # ln(share / (1 - share))
+    def excess(odds: float) -> float:  # logarithm of the ratio of both fractions
         return odds - steep / 2 * np.tanh(odds / 2)
 
     if steep <= 4:
