@@ -1,4 +1,5 @@
-!> Errors as values. An allocated `error_t` means failure; callers pass it up, and `main` reports it once.
+!> Errors as values. An allocated `error_t` indicates a failure. A procedure returns the error to its caller, and `main` finally
+!> reports it.
 module errors
   use texts, only: legible
   implicit none
@@ -9,19 +10,20 @@ module errors
   integer, parameter :: exit_finished = 0   !! the run reached its stop rule
   integer, parameter :: exit_usage = 2      !! wrong usage, invalid input, or a checkpoint that belongs to another run
   integer, parameter :: exit_files = 3      !! a file cannot be read or written, the disk is full, or the file is in use
-  integer, parameter :: exit_broken = 4     !! the simulation broke off: time stands still, disks overlap, or a number is NaN
+  integer, parameter :: exit_broken = 4     !! the simulation broke off: events no longer advance the time, disks overlap, or a
+                                            !! number is NaN
   integer, parameter :: exit_stopped = 75   !! stopped by a signal or by the wall-clock limit; a checkpoint was written
 
   !> A failure: its message and the exit status of the program.
   type :: error_t
-    character(len=:), allocatable :: message   !! problem, place, and remedy; one line per problem
+    character(len=:), allocatable :: message   !! text that states the problem, its place, and the remedy; one line per problem
     integer :: code = exit_usage               !! exit status of the program
   end type error_t
 
 contains
 
-  !> Allocates `error` with an exit status and a message. Control characters in the message, which may come from names in the
-  !> input, are replaced so that it stays one legible line.
+  !> Allocates `error` with an exit status and a message. The message may contain names from the input. Control characters in it are
+  !> therefore replaced, so that the message remains one legible line.
   pure subroutine fail(error, code, message)
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in) :: code                !! one of the `exit_` constants

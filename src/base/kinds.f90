@@ -1,4 +1,4 @@
-!> Kinds of numbers, and the time that stands for "no event". Every other module builds on this one.
+!> Kinds of numbers, and the time that represents "no event". Every other module uses this module.
 module kinds
   use, intrinsic :: iso_fortran_env, only: int16, int32, int64, real64
   implicit none
@@ -7,7 +7,8 @@ module kinds
 
   integer, parameter :: int128 = selected_int_kind(38)
 
-  !> The time of an event that never happens: later than any event. It is finite, so that sums and products with it stay finite.
+  !> The time of an event that never happens: later than any event. This time is finite, so that sums and products that contain it
+  !> are finite as well.
   real(real64), parameter :: never = 1.0e150_real64
   !> 2**53. Up to this number all integers are exact as reals, and real numbers resolve steps of 1.
   real(real64), parameter :: largest_exact = 2.0_real64**53

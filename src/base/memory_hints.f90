@@ -1,12 +1,12 @@
-!> Hints about memory that Fortran cannot express. They affect only the speed of a run, never its results. The C file with the
-!> same name holds the parts that depend on the compiler and the system; without it a prefetch does nothing.
+!> Hints about memory that Fortran cannot express. They affect only the speed of a run, never its results. The C file with the same
+!> name contains the parts that depend on the compiler and the system. Without this file a prefetch has no effect.
 module memory_hints
   use, intrinsic :: iso_c_binding, only: c_double, c_int32_t
   implicit none
   private
   public :: prefetch
 
-  !> Starts to load the cache line of a variable, as for a read, without waiting until it has arrived.
+  !> Starts to load the cache line of a variable for a later read, and returns without waiting for the data.
   interface prefetch
     subroutine prefetch_integer(item) bind(C)
       import :: c_int32_t

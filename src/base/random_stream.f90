@@ -1,6 +1,6 @@
 !> Reproducible random numbers: xoshiro256** (Blackman and Vigna, ACM Trans. Math. Softw. 47, 36 (2021)), seeded by SplitMix64
-!> (Steele, Lea and Flood, OOPSLA 2014), so that consecutive seeds give unrelated streams. A stream is a value: a copy continues
-!> with the same numbers as the original.
+!> (Steele, Lea and Flood, OOPSLA 2014), so that the streams of consecutive seeds are unrelated. A stream is a value: a copy
+!> continues with the same numbers as the original.
 !>
 !> Both generators work modulo 2**64. Fortran has no unsigned integers, and overflow of signed ones is not allowed, so sums and
 !> products are formed in a longer integer.
@@ -17,7 +17,7 @@ module random_stream
 
   !> The state of a generator.
   type :: random_stream_t
-    integer(int64) :: word(4) = 0_int64         !! not all zero once seeded
+    integer(int64) :: word(4) = 0_int64         !! not all zero after the stream has been seeded
   contains
     procedure :: seed
     procedure :: seed_draw
@@ -34,8 +34,8 @@ contains
   !> more numbers for one purpose never changes the numbers for another.
   pure subroutine seed(self, number, key)
     class(random_stream_t), intent(inout) :: self
-    integer(int64), intent(in) :: number        !! the user's seed; any value
-    integer, intent(in) :: key(:)               !! the purpose of the stream; may be empty
+    integer(int64), intent(in) :: number        !! seed from the input; any value is allowed
+    integer, intent(in) :: key(:)               !! key that identifies the purpose of the stream; may be empty
     integer(int64) :: state
     integer :: k
 
@@ -46,12 +46,12 @@ contains
     call fill(self, state)
   end subroutine seed
 
-  !> Starts the stream of a single draw during a run. The numbers depend only on the arguments, so that they are the same in
-  !> whatever order the draws are made, by whichever procedure or thread.
+  !> Starts the stream of a single draw during a run. The numbers depend only on the arguments. They do not depend on the order of
+  !> the draws, or on the procedure or thread that makes a draw.
   pure subroutine seed_draw(self, number, purpose, id, count)
     class(random_stream_t), intent(inout) :: self
-    integer(int64), intent(in) :: number        !! the user's seed
-    integer, intent(in) :: purpose              !! thermal_walls, ...
+    integer(int64), intent(in) :: number        !! seed from the input
+    integer, intent(in) :: purpose              !! purpose of the draw, one of the constants above such as `thermal_walls`
     integer(int32), intent(in) :: id            !! id of the disk
     integer(int64), intent(in) :: count         !! number of the draw, or of the event that requires it
 
@@ -138,7 +138,7 @@ contains
   end subroutine draw_direction
 
   !> Two independent Gaussian deviates of mean 0 and variance 1, by the polar method (Marsaglia and Bray, SIAM Rev. 6, 260 (1964)).
-  !> Their last bit may depend on the mathematical library, because a logarithm is taken.
+  !> The last bit of the deviates may depend on the mathematical library, because the method uses a logarithm.
   pure subroutine draw_normals(self, z)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: z(2)
@@ -176,8 +176,8 @@ contains
     word = ieor(word, ishft(word, -31))
   end subroutine draw_seed
 
-  !> The number modulo 2**64, as a signed word: the lower 64 bits, the highest of which becomes the sign. The product of two
-  !> words, at most 2**126 in size, is a valid argument.
+  !> The number modulo 2**64, as a signed word. The result consists of the lower 64 bits, of which the highest becomes the sign. The
+  !> argument may be the product of two words, whose absolute value is at most 2**126.
   pure function wrapped(number) result(word)
     integer(int128), intent(in) :: number
     integer(int64) :: word

@@ -1,7 +1,7 @@
 !> Signals that stop a run or request a checkpoint. The signal handler and the variables that it sets are in `system_calls.c`.
-!>
-!> While the files of a run are open, data could be lost: a stop signal is then only recorded, and the main loop answers it with a
-!> checkpoint. If the signal arrives after the main loop, the file is still completed, and the run counts as finished.
+!>  While the files of a run are open, a sudden end could lose data. During this time a stop signal is only recorded, and the main
+!> loop responds to it by writing a checkpoint. If the signal arrives after the main loop, the file is completed nevertheless, and
+!> the run is finished.
 module signals
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_int, c_null_char
   use system, only: talks_to_terminal
@@ -11,8 +11,8 @@ module signals
 
   interface
     !> Installs the signal handler. TERM, INT, HUP and XCPU request a stop with a checkpoint, USR1 requests a checkpoint. Signals
-    !> that the caller chose to ignore (as nohup does) stay ignored. A file that exceeds its size limit leads to a failed write
-    !> instead of a signal.
+    !> that were ignored when the program was started (for example by nohup) are still ignored. If a file exceeds its size limit,
+    !> the write fails and no signal is sent.
     subroutine watch_signals() bind(C, name="system_watch_signals")
     end subroutine watch_signals
 
@@ -28,7 +28,7 @@ module signals
       integer(c_int) :: requests
     end function checkpoint_requests
 
-    !> Selects that a stop signal is only recorded, to be queried with `stop_requested`.
+    !> From this call on, a stop signal is only recorded. `stop_requested` returns whether a signal has been recorded.
     subroutine record_signals() bind(C, name="system_record_signals")
     end subroutine record_signals
 
@@ -41,8 +41,8 @@ module signals
 
 contains
 
-  !> Selects that a stop signal ends the program at once, with this message and exit status; a signal that was recorded
-  !> before has the same effect. Used while no data can be lost.
+  !> From this call on, a stop signal ends the program immediately, with the given message and exit status. A signal that was
+  !> recorded before has the same effect. This mode is used while no data can be lost.
   subroutine end_at_signals(message, code)
     character(len=*), intent(in) :: message
     integer, intent(in) :: code                        !! exit status

@@ -1,5 +1,5 @@
-!> One line on standard error that shows the progress of the program. On a terminal it is updated in place; in a file or
-!> pipe a new line is written every half minute.
+!> One line on standard error that shows the progress of the program. On a terminal the line is updated in place. If the output is a
+!> file or pipe, a new line is written every half minute.
 module status_line
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: real64
@@ -8,15 +8,16 @@ module status_line
   private
   public :: status_line_t
 
-  real(real64), parameter :: terminal_pause = 0.2_real64, file_pause = 30.0_real64   !! time between updates [s]
+  real(real64), parameter :: terminal_pause = 0.2_real64, file_pause = 30.0_real64   !! time between two updates of the line [s]
   character(len=*), parameter :: erase_rest = achar(27)//"[K", &   !! erases the rest of the line on the terminal
-    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"          !! a narrow terminal cuts the line off instead of wrapping it
+    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"          !! turn off and on the wrapping of lines, so that a narrow
+                                                                   !! terminal truncates the line
 
   type :: status_line_t
     logical, private :: quiet = .true.
     logical, private :: terminal = .false.
     logical, private :: shown = .false.
-    real(real64), private :: pause = file_pause    !! time between updates [s]
+    real(real64), private :: pause = file_pause    !! time between two updates of the line [s]
     real(real64), private :: next_update = 0.0_real64    !! time of the next update, on the clock `seconds` [s]
   contains
     procedure :: open => open_line
@@ -28,7 +29,7 @@ module status_line
 
 contains
 
-  !> Prepares the line. A line that was never opened shows nothing.
+  !> Prepares the line. A line for which this procedure has not been called shows nothing.
   subroutine open_line(self, quiet)
     class(status_line_t), intent(inout) :: self
     logical, intent(in) :: quiet
@@ -63,7 +64,7 @@ contains
     flush (error_unit)
   end subroutine show
 
-  !> Shows how much of a task is done, if an update is due.
+  !> Shows the completed fraction of a task, if an update is due.
   subroutine show_share(self, task, share)
     class(status_line_t), intent(inout) :: self
     character(len=*), intent(in) :: task
@@ -75,7 +76,7 @@ contains
     call self%show(task//": "//trim(adjustl(percent)))
   end subroutine show_share
 
-  !> Erases the line on the terminal, so that the next message does not stand behind it.
+  !> Erases the line on the terminal, so that the next message does not follow the text on the same line.
   subroutine clear(self)
     class(status_line_t), intent(inout) :: self
 

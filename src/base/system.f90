@@ -1,5 +1,5 @@
-!> Services of the operating system that Fortran lacks: a monotonic clock, terminals, file locks, atomic renames, free disk space,
-!> and an exit that prints nothing. Parts that need a C header are in `system_calls.c`.
+!> Services of the operating system that Fortran does not provide: a monotonic clock, the detection of terminals, file locks, atomic
+!> renames, the free disk space, and an exit without a message. Parts that need a C header are in `system_calls.c`.
 module system
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_double, c_int, c_int64_t, c_null_char, c_size_t
   use, intrinsic :: iso_fortran_env, only: error_unit
@@ -20,7 +20,7 @@ module system
   !> Results of `c_lock` other than a descriptor.
   integer(c_int), parameter :: taken = -1, foreign = -3, failed = -4     ! -2: the file system has no locks
 
-  !> A lock on the output of a run. The kernel releases it when the process ends, for whatever reason.
+  !> A lock on the output of a run. The operating system releases the lock when the process ends, for whatever reason.
   type :: lock_t
     character(len=:), allocatable :: path
     integer(c_int), private :: descriptor = -1
@@ -30,21 +30,21 @@ module system
   end type lock_t
 
   abstract interface
-    !> A call that concerns a file, or a text to be written; it returns 0 for success.
+    !> Interface of calls that have a path or a text as argument and return 0 for success.
     function path_call(path) bind(C) result(status)
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int) :: status
     end function path_call
 
-    !> A call that returns a size of a file or folder in bytes.
+    !> Interface of calls that have the path of a file or folder as argument and return a size in bytes.
     function size_call(path) bind(C) result(bytes)
       import :: c_char, c_int64_t
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int64_t) :: bytes
     end function size_call
 
-    !> A call that renames a file; it returns 0 for success.
+    !> Interface of a call that renames a file and returns 0 for success.
     function naming_call(from, to) bind(C) result(status)
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: from(*), to(*)
@@ -59,8 +59,8 @@ module system
       real(c_double) :: t
     end function seconds
 
-    !> Opens /dev/null for each standard stream that the caller has closed. Otherwise the first files that are opened
-    !> would take over the numbers of these streams, and messages would be written into them.
+    !> Opens /dev/null for each standard stream that the caller has closed. Otherwise the system would assign the numbers of these
+    !> streams to the first files that are opened, and messages would be written into these files.
     subroutine fill_standard_streams() bind(C, name="system_fill_standard_streams")
     end subroutine fill_standard_streams
 
@@ -142,15 +142,16 @@ module system
   procedure(path_call), bind(C, name="system_lock") :: c_lock         !! returns a descriptor or one of the numbers above
   procedure(path_call), bind(C, name="system_print") :: c_print
   procedure(path_call), bind(C, name="unlink") :: c_unlink
-  procedure(size_call), bind(C, name="system_free_bytes") :: c_free_bytes     !! free space on the disk that holds a folder
+  procedure(size_call), bind(C, name="system_free_bytes") :: c_free_bytes     !! free space on the disk that contains a folder
   procedure(size_call), bind(C, name="system_file_size") :: c_file_size
   procedure(naming_call), bind(C, name="rename") :: c_rename
 
 contains
 
-  !> Writes a text to standard output. Fortran's own `write` does not notice when the disk behind it is full.
+  !> Writes a text to standard output. The `write` statement of Fortran is not used, because it reports no error if standard output
+  !> is a file on a full disk.
   subroutine print_text(text, error)
-    character(len=*), intent(in) :: text               !! lines; a line end is added to the last one
+    character(len=*), intent(in) :: text               !! one or more lines; a line end is added after the last line
     type(error_t), allocatable, intent(out) :: error
 
     if (c_print(text//new_line("a")//c_null_char) /= 0) &
@@ -174,8 +175,8 @@ contains
     name = buffer(:index(buffer, c_null_char) - 1)
   end function host_name
 
-  !> Renames a file. A file that already has the new name is replaced in the same instant. `moved` is true even if the
-  !> folder cannot be synchronized; then only a crash of the whole machine could still undo the renaming.
+  !> Renames a file. A file that already has the new name is replaced atomically. `moved` is .true. even if the folder cannot be
+  !> synchronised with the disk. In this case only a crash of the whole machine could undo the renaming.
   subroutine move_file(from, to, moved)
     character(len=*), intent(in) :: from, to
     logical, intent(out) :: moved
@@ -216,8 +217,8 @@ contains
     done = c_synchronize(path//c_null_char) == 0
   end subroutine synchronize
 
-  !> The reason why a file cannot be opened; empty if it can. A file with a second name, by a symbolic or hard link, is
-  !> refused for writing.
+  !> The reason why a file cannot be opened; empty if the file can be opened. A file with a second name (a symbolic or hard link)
+  !> must not be opened for writing.
   function opening_problem(path, writable) result(text)
     character(len=*), intent(in) :: path
     logical, intent(in) :: writable
@@ -236,8 +237,8 @@ contains
     kind = trim(kinds_of_files(c_what_is(path//c_null_char)))
   end function what_is
 
-  !> Inode, size and change time of a file, which identify it and show whether it has changed. Zeros if there is no such
-  !> file. A copy of a file has another identity.
+  !> Inode, size and modification time of a file, which identify the file and its contents. The result is zero if the file does not
+  !> exist. A copy of a file has another identity.
   function identity_of(path) result(identity)
     character(len=*), intent(in) :: path
     integer(int64) :: identity(3)
@@ -245,7 +246,7 @@ contains
     call c_identify(path//c_null_char, identity)
   end function identity_of
 
-  !> Size of a file; 0 for pipes and devices, -1 if there is none. [bytes]
+  !> Size of a file; 0 for pipes and devices, -1 if the file does not exist. [bytes]
   function file_size(path) result(bytes)
     character(len=*), intent(in) :: path
     integer(int64) :: bytes
@@ -253,7 +254,8 @@ contains
     bytes = c_file_size(path//c_null_char)
   end function file_size
 
-  !> Reads the first bytes of a regular file. Fortran's own `open` would cut trailing blanks off the name.
+  !> Reads the first bytes of a regular file. The `open` statement of Fortran is not used, because it removes trailing blanks from
+  !> the name.
   subroutine read_bytes(path, bytes, n)
     character(len=*), intent(in) :: path
     character(len=*), intent(out) :: bytes
@@ -262,12 +264,12 @@ contains
     n = c_read_bytes(path//c_null_char, bytes, len(bytes, int64))
   end subroutine read_bytes
 
-  !> Reads all bytes of a regular file. Fortran's own `read` can return `iostat` 0 without having read anything, and so
-  !> repeat for ever.
+  !> Reads all bytes of a regular file. The `read` statement of Fortran is not used, because it can return `iostat` 0 without
+  !> reading anything, which would lead to an infinite loop.
   subroutine read_file(path, text, problem)
     character(len=*), intent(in) :: path
     character(len=:), allocatable, intent(out) :: text
-    character(len=:), allocatable, intent(out) :: problem    !! reason why it cannot be read; empty if it can
+    character(len=:), allocatable, intent(out) :: problem    !! reason why the file cannot be read; empty after success
     character(len=:), allocatable :: failure
     integer(int64) :: n
 
@@ -284,7 +286,7 @@ contains
   !> Overwrites eight bytes of a file with a number, lowest byte first.
   subroutine write_word(path, position, word, done)
     character(len=*), intent(in) :: path
-    integer(int64), intent(in) :: position             !! position of the first byte, counted from 0
+    integer(int64), intent(in) :: position             !! position of the first byte; the first byte of the file has the position 0
     integer(int64), intent(in) :: word
     logical, intent(out) :: done
 
@@ -308,7 +310,7 @@ contains
     if (folder == "") folder = "."
   end function folder_of
 
-  !> Free space on the disk that holds or will hold a file; huge if unknown. [bytes]
+  !> Free space on the disk that contains, or will contain, a file; huge if it is unknown. [bytes]
   function free_bytes(path) result(bytes)
     character(len=*), intent(in) :: path
     integer(int64) :: bytes
@@ -316,7 +318,7 @@ contains
     bytes = c_free_bytes(folder_of(path)//c_null_char)
   end function free_bytes
 
-  !> Reason of the failure of the last system call, in the words of the system.
+  !> Reason for the failure of the last system call, as a message of the operating system.
   function last_problem() result(text)
     character(len=:), allocatable :: text
     character(len=256, kind=c_char) :: buffer
@@ -329,7 +331,7 @@ contains
   subroutine acquire(self, path, problem)
     class(lock_t), intent(inout) :: self
     character(len=*), intent(in) :: path
-    character(len=:), allocatable, intent(out) :: problem    !! reason why the lock cannot be acquired; empty if it can
+    character(len=:), allocatable, intent(out) :: problem    !! reason why the lock cannot be acquired; empty after success
 
     self%path = path
     self%descriptor = c_lock(path//c_null_char)

@@ -8,43 +8,43 @@ module team
   public :: make_team, many
   public :: barrier_t, close_barrier, is_last_at, join, open_barrier, release
 
-  !> Number of iterations from which sharing a loop among threads pays. A barrier at its end costs microseconds, or
-  !> milliseconds when other programs use the cores.
+  !> Smallest number of iterations for which a loop is divided among threads. The barrier at the end of the loop costs microseconds,
+  !> or milliseconds if other programs use the cores.
   integer, parameter :: many = 50000
 
-  !> A barrier for threads. It must not be copied while threads use it.
+  !> A barrier for threads. A barrier must not be copied while threads use it.
   type, bind(C) :: barrier_t
     integer(c_int64_t) :: storage(32)
   end type barrier_t
 
   interface
-    !> Initialises a barrier that no thread has joined yet.
+    !> Initialises a barrier with which no thread is registered yet.
     subroutine open_barrier(barrier) bind(C, name="barrier_open")
       import :: barrier_t
       type(barrier_t), intent(out) :: barrier
     end subroutine open_barrier
 
-    !> Registers the calling thread with the barrier. Each thread joins once, before any of them waits.
+    !> Registers the calling thread with the barrier. Each thread is registered once, before any thread waits at the barrier.
     subroutine join(barrier) bind(C, name="barrier_join")
       import :: barrier_t
       type(barrier_t), intent(inout) :: barrier
     end subroutine join
 
-    !> Waits at the barrier until all threads have arrived and the last one calls `release`. The last thread to arrive does
-    !> not wait: it gets .true. and performs the serial step before it releases the others.
+    !> Waits at the barrier until all threads have arrived and the last one calls `release`. The last thread to arrive does not
+    !> wait. For this thread the result is .true.; it performs the serial step and then releases the other threads.
     function is_last_at(barrier) result(yes) bind(C, name="barrier_arrive")
       import :: barrier_t, c_bool
       type(barrier_t), intent(inout) :: barrier
       logical(c_bool) :: yes
     end function is_last_at
 
-    !> Releases the waiting threads; they see everything that the calling thread has written.
+    !> Releases the waiting threads. All data that the calling thread has written are then visible to the other threads.
     subroutine release(barrier) bind(C, name="barrier_release")
       import :: barrier_t
       type(barrier_t), intent(inout) :: barrier
     end subroutine release
 
-    !> Destroys the barrier, once no thread waits any more.
+    !> Destroys the barrier. No thread may be waiting at the barrier.
     subroutine close_barrier(barrier) bind(C, name="barrier_close")
       import :: barrier_t
       type(barrier_t), intent(inout) :: barrier
@@ -53,7 +53,7 @@ module team
 
 contains
 
-  !> Sets the number of threads that share a loop, unless a loop specifies another. Without OpenMP there is one thread.
+  !> Sets the number of threads for loops that do not specify another number. Without OpenMP there is one thread.
   subroutine make_team(n)
     integer, intent(in) :: n
 

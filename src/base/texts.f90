@@ -22,7 +22,7 @@ module texts
     procedure :: text => text_so_far
   end type growing_text_t
 
-  !> A number as text, in the form in which a person would write it.
+  !> A number as text, in a short and readable form.
   interface written
     procedure :: written_integer, written_long_integer, written_real
   end interface written
@@ -34,7 +34,7 @@ module texts
 
 contains
 
-  !> Appends a piece.
+  !> Appends a piece to the text.
   pure subroutine add(self, piece)
     class(growing_text_t), intent(inout) :: self
     character(len=*), intent(in) :: piece
@@ -86,7 +86,7 @@ contains
     character(len=24) :: buffer
     integer :: exponent
 
-    if (.not. ieee_is_normal(number)) then          ! NaN, infinite, or its power of ten underflows
+    if (.not. ieee_is_normal(number)) then          ! the number is NaN or infinite, or its power of ten underflows
       write (buffer, "(es24.16e3)") number
       text = trim(adjustl(buffer))
     else if (number == 0 .or. (abs(number) >= 1.0e-3_real64 .and. abs(number) < 1.0e6_real64)) then
@@ -138,7 +138,8 @@ contains
     end do
   end function legible
 
-  !> A text from a user or a file in a form fit for a message: quoted, legible, and cut if it is long.
+  !> A text from a user or a file, prepared for a message: the text is quoted, control characters are replaced, and a long text is
+  !> truncated.
   pure function shown(text) result(quoted)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: quoted
@@ -147,7 +148,7 @@ contains
 
     last = min(len(text), longest)
     do while (last > longest - 4 .and. last < len(text))
-      if (iand(iachar(text(last + 1:last + 1)), 192) /= 128) exit   ! never cut inside a UTF-8 character
+      if (iand(iachar(text(last + 1:last + 1)), 192) /= 128) exit   ! do not truncate inside a UTF-8 character
       last = last - 1
     end do
     quoted = legible(text(:last))
@@ -170,8 +171,8 @@ contains
     line = growing%text()
   end function joined
 
-  !> The text in lines of at most `width` characters, broken at blanks. All lines but the first start with `margin`. A word that
-  !> is longer gets a line of its own.
+  !> The text in lines of at most `width` characters, broken at blanks. All lines except the first start with `margin`. A word that
+  !> is longer than `width` is on a line of its own.
   pure function wrapped(text, width, margin) result(lines)
     character(len=*), intent(in) :: text, margin
     integer, intent(in) :: width
@@ -190,7 +191,7 @@ contains
     lines = lines//trim(text(first:))
   end function wrapped
 
-  !> The position of a word in a list; 0 if it is not there.
+  !> The position of a word in a list; 0 if the list does not contain the word.
   pure function place_of(word, words) result(place)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: words(:)
@@ -206,7 +207,7 @@ contains
   pure function suggestion(word, known, listed) result(advice)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
-    character(len=*), intent(in), optional :: listed(:)  !! words to list instead of the known ones
+    character(len=*), intent(in), optional :: listed(:)  !! words to list in place of `known`
     character(len=:), allocatable :: advice
 
     advice = nearest_word(word, known)
@@ -219,8 +220,8 @@ contains
     end if
   end function suggestion
 
-  !> The known word that was probably meant: one that starts with `word`, or one in which at most a third of the letters
-  !> differ. Empty if there is none.
+  !> The known word that was probably meant: a known word that starts with `word`, or a known word in which at most a third of the
+  !> letters differ. Empty if there is no such word.
   pure function nearest_word(word, known) result(nearest)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
@@ -298,7 +299,7 @@ contains
     if (number /= 1) text = text//"s"
   end function counted
 
-  !> The line of a text that contains character k, which may lie just behind its end.
+  !> The line of a text that contains character k. The position k may be just after the end of the text.
   pure function line_at(text, k) result(line)
     character(len=*), intent(in) :: text
     integer, intent(in) :: k                      !! position of the character
@@ -320,7 +321,8 @@ contains
     do while (first <= len(text))
       last = first - 1 + index(text(first:)//eol, eol)
       line%text = text(first:last - 1)
-      lines = [lines, line]                           ! with text_t(...) gfortran 12 loses memory: see `command_line: take_option`
+      lines = [lines, line]                           ! a constructor text_t(...) would leak memory with gfortran 12: see
+                                                      ! `command_line: take_option`
       first = last + 1
     end do
   end subroutine lines_of

@@ -1,5 +1,5 @@
-!> Layout of an output file, which follows H5MD 1.1 (https://www.nongnu.org/h5md/h5md.html). This module holds groups and fixed
-!> paths; the names of observables are in `observables`, those of the event log in `samples`.
+!> Layout of an output file, which follows H5MD 1.1 (https://www.nongnu.org/h5md/h5md.html). This module defines groups and fixed
+!> paths. The names of observables are defined in `observables`, and the names in the event log in `samples`.
 module h5md_layout
   implicit none
   private
@@ -31,7 +31,7 @@ module h5md_layout
     saved_at = provenance//"/saved_at", &
     replaced_file = provenance//"@replaced"       !! identity of the file that the finished output may replace
 
-  ! Elements: groups of step, time, value
+  ! H5MD elements: groups that contain the datasets step, time and value
   character(len=*), parameter, public :: &
     position = disks_group//"position", &
     velocity = disks_group//"velocity", &
@@ -41,13 +41,14 @@ module h5md_layout
     image = disks_group//"image", &
     step_of = "/step", time_of = "/time", value_of = "/value"
 
-  ! Counters of complete samples
+  ! Datasets that contain the numbers of complete samples
   character(len=*), parameter, public :: &
     frame_counter = disks_group//"committed", &
     sample_counter = observables_group//"committed", &
     event_counter = events_group//"committed"
 
-  !> Names in the groups of species and observables that are not names of species, besides those of observables.
+  !> Names that a species must not have, because the groups of species and of observables contain objects with these names. The
+  !> names of observables are excluded as well.
   character(len=*), parameter, public :: beside_species(3) = [character(len=9) :: "committed", "names", "counts"]
 
 end module h5md_layout

@@ -1,4 +1,4 @@
-!> An open HDF5 file: creating, opening, renaming, flushing and closing it, groups in it, and hard links.
+!> An open HDF5 file, with procedures that create, open, rename, flush and close the file and that create groups and hard links.
 !>
 !> The first failed call is recorded, and all later calls do nothing. A writer therefore need not test every call: `report` returns
 !> the recorded failure at the end.
@@ -24,10 +24,10 @@ module hdf5_handle
   type :: hdf5_handle_t
     character(len=:), allocatable :: path
     character(len=:), allocatable :: final_path   !! path of the completed file, used in messages
-    character(len=:), allocatable :: failure      !! the first action that failed, in words that follow "cannot "
+    character(len=:), allocatable :: failure      !! the first action that failed, as a phrase that can follow "cannot "
     logical, private :: has_reason = .false.      !! `failure` includes the reason
     integer(hid_t) :: id = -1
-    integer(hid_t) :: links = -1                  !! HDF5 properties of links: missing groups on the path are created
+    integer(hid_t) :: links = -1                  !! HDF5 properties of links, which let HDF5 create the missing groups on a path
     integer(hid_t) :: storage = -1                !! HDF5 properties of datasets: see `prepare`
     integer(int64) :: unsaved = 0                 !! amount written since the last flush [bytes]
   contains
@@ -57,10 +57,10 @@ contains
   !> Records the failed action if `status` is an error and no failure has been recorded before.
   subroutine check(self, status, action, reason, needed)
     class(hdf5_handle_t), intent(inout) :: self
-    integer, intent(in) :: status                 !! return value of an HDF5 call; negative: it failed
-    character(len=*), intent(in) :: action        !! the intended action, in words that follow "cannot "
+    integer, intent(in) :: status                 !! return value of an HDF5 call, which is negative after a failure
+    character(len=*), intent(in) :: action        !! the intended action, as a phrase that can follow "cannot "
     character(len=*), intent(in), optional :: reason    !! reason of the failure, if known
-    integer(int64), intent(in), optional :: needed  !! space that the action needs, if it differs from the unsaved amount [bytes]
+    integer(int64), intent(in), optional :: needed  !! disk space that the action needs; default: the amount of unsaved data [bytes]
     integer(hsize_t) :: bytes                     ! size of the file, including space allocated in advance
     integer(int64) :: most
     integer :: known
@@ -80,7 +80,8 @@ contains
     end if
   end subroutine check
 
-  !> Returns the recorded failure, if any, as an error. It names the file, the action, and the reason or the free space on the disk.
+  !> Returns the recorded failure as an error; `error` is not allocated if there was no failure. The message names the file, the
+  !> action, and the reason or the free space on the disk.
   subroutine report(self, error)
     class(hdf5_handle_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
@@ -103,9 +104,10 @@ contains
     text = written(major)//"."//written(minor)//"."//written(release)
   end function hdf5_version
 
-  !> Initialises the HDF5 library, once per process, because each initialisation leaks memory. The library then prints no
-  !> errors. It gets no exit handler: by then files are closed, or could not be closed (disk full), in which case the handler
-  !> would crash. External links are disabled, because they could lead to devices or to files of others.
+  !> Initialises the HDF5 library, once per process, because each initialisation leaks memory. The library is set up to print no
+  !> errors and to install no exit handler. At the exit of the program the files have been closed, or they could not be closed
+  !> because the disk is full; in the latter case the handler would crash. External links are disabled, because they could refer to
+  !> devices or to files of other users.
   subroutine start_library(status)
     integer, intent(out) :: status
     logical, save :: started = .false.
@@ -121,10 +123,10 @@ contains
     started = status >= 0
   end subroutine start_library
 
-  !> Sets the properties of a file. HDF5's file locks are disabled: they would keep readers out, and a reader's lock could stop a
-  !> run. The storage of datasets is allocated at once, is not filled, and has no time stamps, so that equal runs write equal
-  !> bytes. Small datasets do not share a block: HDF5 would release such a block in two steps, between which the header of the
-  !> file states a wrong length.
+  !> Sets the properties of a file. The file locks of HDF5 are disabled: they would prevent other programs from reading the file,
+  !> and the lock of a reader could stop a run. The storage of a dataset is allocated when the dataset is created. It is not filled
+  !> with a value and has no time stamps, so that equal runs write equal bytes. Small datasets do not share a block of storage. HDF5
+  !> would release such a block in two steps, and between these steps the header of the file would contain a wrong length.
   subroutine prepare(self, access, status)
     class(hdf5_handle_t), intent(inout) :: self
     integer(hid_t), intent(out) :: access         !! HDF5 properties for access to the file
@@ -193,7 +195,7 @@ contains
     if (moved) self%path = self%final_path
   end subroutine rename_file
 
-  !> Passes all written data to the operating system, so that they survive a kill of the program.
+  !> Passes all written data to the operating system, so that the data are not lost if the program is killed.
   subroutine flush_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     integer :: status
@@ -204,8 +206,8 @@ contains
     if (status >= 0) self%unsaved = 0
   end subroutine flush_file
 
-  !> Closes the file if it is open, and frees its HDF5 properties, which exist even if the file could not be opened. A
-  !> recorded failure can still be reported.
+  !> Closes the file if it is open, and frees the HDF5 property lists, which exist even if the file could not be opened. A recorded
+  !> failure can still be reported.
   subroutine close_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     integer :: status

@@ -1,4 +1,4 @@
-!> Groups, attributes, datasets and parts of them in an open HDF5 file.
+!> Reads and writes attributes and datasets, or parts of datasets, in an open HDF5 file.
 !>
 !> A name is a path, `group/dataset`, or with @ an attribute, `group@name`.
 module hdf5_objects
@@ -20,7 +20,8 @@ module hdf5_objects
 
   integer, parameter :: scalar(0) = [integer ::]  !! extents of a single value
 
-  ! Limits on the texts in a file. No output of this program exceeds them; the sizes that a damaged file states are not trusted.
+  ! Limits on the texts in a file. No output of this program exceeds these limits. They are needed because the sizes in a damaged
+  ! file may be wrong.
   integer(int64), parameter :: most_texts = 10000
   integer(size_t), parameter :: longest_text = 67108864      !! [bytes]
 
@@ -41,10 +42,10 @@ module hdf5_objects
 
 contains
 
-  !> Removes the dataset that was created last; the file then ends where the values of the dataset `before` end. The file can be
-  !> opened at every moment in between. First the dataset loses its name, while it is still open and therefore still stored. Then
-  !> the new length is written into the header of the file (HDF5 itself would do so only after cutting the file). Then the
-  !> dataset is closed, which frees its storage.
+  !> Removes the dataset that was created last. The file then ends at the end of the values of the dataset `before`. The file can be
+  !> opened at every moment during this procedure, because it has three steps. First the link to the dataset is deleted; the dataset
+  !> is still open and its storage is therefore not freed. Then the new length is written into the header of the file (HDF5 itself
+  !> would write it only after the truncation of the file). Finally the dataset is closed, which frees its storage.
   subroutine remove_last(self, name, before)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, before
@@ -67,7 +68,7 @@ contains
     call self%flush()
     if (allocated(self%failure)) return
     call write_word(self%path, header_end, int(offset + bytes, int64), done)
-    if (done) call h5dclose_f(dataset, closed)     ! otherwise it stays open, because closing it would cut the file
+    if (done) call h5dclose_f(dataset, closed)     ! otherwise the dataset stays open, because closing it would truncate the file
     call self%check(merge(0, -1, done), "remove "//name)
   end subroutine remove_last
 
@@ -76,7 +77,7 @@ contains
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(hid_t), intent(in) :: type            !! HDF5 type in the file
-    integer(hsize_t), intent(in) :: extents(:)    !! shape; empty for a single value
+    integer(hsize_t), intent(in) :: extents(:)    !! shape of the dataset; an empty array for a single value
     integer(hid_t) :: dataset, space
     integer :: status, closed
 
@@ -88,8 +89,9 @@ contains
     call h5sclose_f(space, closed)
   end subroutine make_dataset
 
-  !> Opens a dataset whose values are stored completely in this file. Values in other files are refused, because those could be
-  !> devices or files of others. The stored size is checked, because HDF5 1.10 reads beyond the end of a damaged dataset.
+  !> Opens a dataset whose values are stored completely in this file. A dataset whose values are in other files is refused, because
+  !> these could be devices or files of other users. The size of the storage is checked, because HDF5 1.10 reads beyond the end of a
+  !> damaged dataset.
   subroutine open_dataset(self, name, dataset, extents, status, like, bytes_each)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -115,7 +117,8 @@ contains
     if (status >= 0) call h5dget_space_f(dataset, space, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
     call h5sget_simple_extent_npoints_f(space, n, closed)
-    if (closed < 0) n = 0                          ! for a dataset of no values HDF5 reports failures here and for the storage size
+    if (closed < 0) n = 0                          ! for a dataset without values HDF5 reports a failure here and for the storage
+                                                   ! size
     if (status >= 0) call h5sget_simple_extent_dims_f(space, shape, most, status)
     call h5sclose_f(space, closed)
     if (status >= 0) call h5dget_type_f(dataset, type, status)
@@ -132,7 +135,7 @@ contains
     end if
     call h5tclose_f(type, closed)
     if (status >= 0) extents = shape(:rank)
-    if (status >= 0 .and. rank == 0 .and. n == 0) extents = [n]           ! the dataset was created with no values
+    if (status >= 0 .and. rank == 0 .and. n == 0) extents = [n]           ! the dataset was created without values
     if (status < 0) call h5dclose_f(dataset, closed)
   end subroutine open_dataset
 
@@ -151,7 +154,8 @@ contains
     if (status >= 0) call h5dclose_f(dataset, status)
   end function extents
 
-  !> Number of values in a dataset; -1 if it does not exist, or if its stated size exceeds that of any file.
+  !> Number of values in a dataset. The result is -1 if the dataset does not exist, or if its stated size exceeds the largest size
+  !> of a file.
   function length(self, name) result(n)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -160,7 +164,7 @@ contains
     n = product_of(self%extents(name))
   end function length
 
-  !> Number of values of an array with these extents; -1 if no file can hold as many.
+  !> Number of values of an array with the given extents; -1 if no file can contain so many values.
   pure function product_of(extents) result(n)
     integer(hsize_t), intent(in) :: extents(:)
     integer(int64) :: n
@@ -169,13 +173,13 @@ contains
     if (product(real(extents, real64)) < real(huge(n), real64)) n = product(extents)
   end function product_of
 
-  !> Writes or reads a part of a dataset, from or to a memory address.
+  !> Writes a part of a dataset from a memory address, or reads it to a memory address.
   subroutine transfer(self, name, first, counts, type, address, writing)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
-    integer(int64), intent(in) :: first           !! first index along the last dimension, from 1
-    integer(int64), intent(in) :: counts(:)  !! number of values along each dimension; all but the last dimension are transferred
-                                             !! completely
+    integer(int64), intent(in) :: first           !! first index along the last dimension, which starts at 1
+    integer(int64), intent(in) :: counts(:)  !! number of values along each dimension; only the last dimension may be transferred in
+                                             !! part
     integer(hid_t), intent(in) :: type            !! HDF5 type in memory
     type(c_ptr), intent(in) :: address
     logical, intent(in) :: writing
@@ -201,7 +205,7 @@ contains
     call self%check(status, trim(merge("write   ", "be read:", writing))//" "//name)
     call h5sclose_f(in_file, closed)
     call h5sclose_f(in_memory, closed)
-    call h5dclose_f(dataset, status)              ! also writes buffered values
+    call h5dclose_f(dataset, status)              ! closing the dataset also writes buffered values
     call self%check(status, "write "//name)
   end subroutine transfer
 
@@ -235,7 +239,7 @@ contains
     call self%put_values(name, extents, h5t_std_i64le, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
   end subroutine put_longs
 
-  !> Writes one text. An empty text is stored as a blank.
+  !> Writes one text. An empty text is stored as one blank.
   subroutine put_text(self, name, text)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, text
@@ -250,7 +254,7 @@ contains
     call h5tclose_f(string, closed)
   end subroutine put_text
 
-  !> Writes a list of texts, padded with blanks to the longest.
+  !> Writes a list of texts, padded with blanks to the length of the longest text.
   subroutine put_texts(self, name, texts)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -275,7 +279,8 @@ contains
     call h5tset_size_f(string, int(length, size_t), status)
   end function string_of
 
-  !> Writes a dataset or an attribute. It is created if necessary; an existing one must have the same number of values.
+  !> Writes a dataset or an attribute, which is created if necessary. An existing dataset or attribute must have the same number of
+  !> values.
   subroutine put_values(self, name, extents, stored_as, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -302,7 +307,7 @@ contains
     if (product_of(there) /= product(int(extents, int64))) call self%check(-1, "write "//name)
     if (.not. allocated(self%failure)) call h5dwrite_f(dataset, in_memory, address, status)
     call self%check(status, "write "//name)
-    call h5dclose_f(dataset, status)              ! also writes buffered values
+    call h5dclose_f(dataset, status)              ! closing the dataset also writes buffered values
     call self%check(status, "write "//name)
   end subroutine put_values
 
@@ -348,8 +353,8 @@ contains
     call self%fetch_values(name, n, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
   end subroutine fetch_longs
 
-  !> Reads a dataset or an attribute of n values. `values` is unchanged if it has another number of values or another type, or
-  !> cannot be read.
+  !> Reads a dataset or an attribute of n values. `values` does not change if the dataset or attribute has another number of values
+  !> or another type, or cannot be read.
   subroutine fetch_values(self, name, n, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -389,7 +394,7 @@ contains
     call self%check(status, "be read: "//name)
   end subroutine fetch_values
 
-  !> Reads a list of texts. Each is cut or padded to the given length.
+  !> Reads a list of texts. Each text is truncated or padded to the given length.
   subroutine fetch_texts(self, name, length, texts)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name

@@ -1,6 +1,6 @@
-!> Datasets to which samples are added along the last dimension. Their whole storage is allocated when they are
-!> created (the disk provides space only for the filled part). Later only values are written, so that the file is consistent
-!> for a reader, and after a kill, at any moment.
+!> Datasets to which samples are added along the last dimension. The whole storage of a dataset is allocated when the dataset is
+!> created, although the file system uses disk space only for the part that has been written. Later only values are written. The
+!> file is therefore consistent at any time, for a reader and after the program has been killed.
 module hdf5_series
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8, real32
@@ -18,12 +18,13 @@ module hdf5_series
   integer, parameter :: bytes_of(4) = [8, 4, 4, 8]
   integer(int64), parameter :: copied_at_once = 1048576     !! size of the buffer for copying [bytes]
 
-  !> One series. Its name, storage and shape are set first; then it is created, or located in a file.
+  !> One series. The name, the storage type and the shape are set first. Then the series is created in a new file, or located in an
+  !> existing file.
   type :: series_t
     character(len=96) :: name = ""                !! path of the dataset
     integer :: storage = double_precision
-    integer :: rank = 0                           !! number of dimensions of one sample; 0: a single number
-    integer :: shape(2) = 1                       !! shape of one sample; 1 in dimensions that it lacks
+    integer :: rank = 0                           !! number of dimensions of one sample; 0 if a sample is a single number
+    integer :: shape(2) = 1                       !! shape of one sample; unused dimensions have the extent 1
     integer(int64) :: capacity = 0                !! number of samples that fit into the dataset
   contains
     procedure :: make
@@ -93,7 +94,7 @@ contains
     call file%make_dataset(trim(self%name), self%storage_type(), int(self%extents(capacity), hsize_t))
   end subroutine make
 
-  !> Locates the series in a file. The samples there must have the expected shape; their integers may be longer.
+  !> Locates the series in a file. The samples in the file must have the expected shape, but their integers may have more bits.
   subroutine find(self, file)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -109,12 +110,12 @@ contains
     call file%check(merge(0, -1, there), "be read: there is no "//trim(self%name)//" of the expected shape")
   end subroutine find
 
-  !> Stores samples, converted to the type in the file. HDF5's own conversion to shorter reals would take ten times as long. A
-  !> single sample in double precision is not copied, because it may be large.
+  !> Stores samples after their conversion to the type in the file. The conversion to single precision by HDF5 itself would take ten
+  !> times as long. A single sample in double precision is written without a copy, because it may be large.
   subroutine store(self, file, first, values)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: first           !! number of the first of these samples, counted from 1
+    integer(int64), intent(in) :: first           !! number of the first of these samples; the numbers start at 1
     real(real64), intent(in), target :: values(:, :)     !! (width,samples)
     real(real64), allocatable, target :: doubles(:, :)
     real(real32), allocatable, target :: singles(:, :)
@@ -154,7 +155,7 @@ contains
   subroutine load(self, file, number, values)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: number          !! number of the sample, counted from 1
+    integer(int64), intent(in) :: number          !! number of the sample; the numbers start at 1
     real(real64), intent(inout), target :: values(*)
 
     if (number < 1 .or. number > self%capacity) call file%check(-1, "be read: "//trim(self%name)//" has no sample " &

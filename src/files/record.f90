@@ -1,5 +1,5 @@
-!> A sequence of numbers stored in one dataset of an open file, followed by a checksum. The same calls count, write or read the
-!> numbers, depending on the mode, so that all three treat them in the same order.
+!> A sequence of numbers that is stored in one dataset of an open file, followed by a checksum. Depending on the mode, the same
+!> calls count, write or read the numbers, so that the order of the numbers is always the same.
 module record
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_int, c_int8_t, c_loc, c_long, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8
@@ -19,7 +19,7 @@ module record
     character(len=:), allocatable :: name         !! path of the dataset
     integer :: mode = counting
     integer(int64) :: words = 0                   !! number of words so far
-    integer(int64), private :: crc = 0            !! checksum of these words
+    integer(int64), private :: crc = 0            !! checksum of the words so far
   contains
     generic :: exchange => exchange_real, exchange_reals, exchange_long, exchange_longs
     procedure :: make
@@ -33,7 +33,7 @@ module record
     !> CRC-32 from zlib, which is a dependency of HDF5.
     pure function crc32(crc, bytes, length) bind(C) result(continued)
       import :: c_int, c_int8_t, c_long
-      integer(c_long), value :: crc                   !! checksum of the preceding bytes; 0 if there are none
+      integer(c_long), value :: crc                   !! checksum of the preceding bytes; 0 if there are no preceding bytes
       integer(c_int8_t), intent(in) :: bytes(*)
       integer(c_int), value :: length
       integer(c_long) :: continued
@@ -106,7 +106,7 @@ contains
     call self%pass(file, c_loc(values), size(values))
   end subroutine exchange_longs
 
-  !> Writes the checksum at the end of a record, or reads and compares it. A difference is a failure of the file.
+  !> Writes the checksum at the end of a record, or reads and compares it. A difference is recorded as a failure of the file.
   subroutine seal(self, file)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -118,7 +118,8 @@ contains
     if (there /= crc) call file%check(-1, "be read: the checksum of "//self%name//" is wrong")
   end subroutine seal
 
-  !> Counts n words, or transfers them from or to a memory address, where they are numbers or derived types without padding.
+  !> Counts n words, or transfers n words from or to a memory address. The words are numbers, or components of derived types without
+  !> padding.
   subroutine pass(self, file, address, n)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file

@@ -1,5 +1,5 @@
-!> The files of a run, whose names follow from its output OUT.h5, and the rules for replacing and removing them: only files that
-!> a run has written are replaced or removed, and no results without `--force`.
+!> The files of a run, whose names follow from the path of the output, OUT.h5. This module also contains the rules for replacing and
+!> removing files: only files that a run has written are replaced or removed, and files with results only with `--force`.
 module run_files
   use errors, only: error_t, exit_files, exit_usage, fail
   use kinds, only: int64
@@ -11,14 +11,15 @@ module run_files
 
   ! Endings of the names of these files
   character(len=*), parameter, public :: &
-    unfinished = ".part", &                       !! the output while it is being written
-    unfinished_new = ".part_new", &               !! the same, until all data that are written only once are in it
-    lock = ".lock"                                !! lock file that keeps other runs from this output
+    unfinished = ".part", &                       !! ending of the output while the run writes it
+    unfinished_new = ".part_new", &               !! ending of a new file of this kind until it contains all data that are written
+                                                  !! only once
+    lock = ".lock"                                !! ending of the lock file that prevents other runs from writing to this output
   character(len=9), parameter :: endings(*) = [character(len=9) :: "", unfinished, unfinished_new, lock]
 
 contains
 
-  !> Path of the output to which an auxiliary file of this name belongs; empty if the name is not one of an auxiliary file.
+  !> Path of the output to which an auxiliary file of this name belongs; empty if the name does not belong to an auxiliary file.
   pure function output_of(path) result(output)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: output
@@ -40,7 +41,7 @@ contains
     yes = what_is(path) /= "nothing"
   end function is_file
 
-  !> The file from which a run is resumed: the finished output, or the unfinished one if it exists.
+  !> The file from which a run is resumed: the unfinished output if it exists, otherwise the finished output.
   function source_of(output) result(path)
     character(len=*), intent(in) :: output        !! path of the finished output
     character(len=:), allocatable :: path
@@ -58,7 +59,7 @@ contains
       //"for files of the run with the output "//shown(output_of(output))//"; choose another name")
   end subroutine check_name
 
-  !> Fails if one of the paths that the run will write to is taken by a file that no run has written.
+  !> Reports an error if a file that no run has written exists at one of the paths to which the run will write.
   subroutine check_places(output, error)
     character(len=*), intent(in) :: output        !! path of the output
     type(error_t), allocatable, intent(out) :: error
@@ -79,7 +80,8 @@ contains
     end do
   end subroutine check_places
 
-  !> Whether the first bytes of a file are those of an HDF5 file, or of one whose run was killed early (empty or zeros).
+  !> Whether a file begins with the first bytes of an HDF5 file, or is empty or contains only zeros, as a file of a run that was
+  !> killed early.
   function begins_like_a_run(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
@@ -91,10 +93,10 @@ contains
       repeat(achar(0), 8)]))
   end function begins_like_a_run
 
-  !> Fails if the file that the finished output would replace is not the one that existed when the run began.
+  !> Reports an error if the file that the finished output would replace is not the file that existed when the run started.
   subroutine check_replaced(output, replaced, error)
     character(len=*), intent(in) :: output        !! path of the output
-    integer(int64), intent(in) :: replaced(:)     !! identity of that file
+    integer(int64), intent(in) :: replaced(:)     !! identity of the file that existed when the run started
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: there(3)
 
@@ -107,7 +109,7 @@ contains
   !> Renames a completed output to its final name.
   subroutine take_final_name(output, replaced, error)
     character(len=*), intent(in) :: output        !! path of the output
-    integer(int64), intent(in) :: replaced(:)     !! identity of the file that it may replace
+    integer(int64), intent(in) :: replaced(:)     !! identity of the file that the output may replace
     type(error_t), allocatable, intent(out) :: error
     logical :: done
 

@@ -1,8 +1,8 @@
-!> Series that are filled together: frames, observables, or events. A counter in the file holds the number of complete samples. It
-!> is written after the values have been flushed; readers and resumed runs rely on it.
-!>
-!> A sample is an array of reals that contains the values of all series in turn. Integers are exact up to 2**53. Small samples are
-!> buffered, because one HDF5 call costs as much time as writing a hundred kilobytes.
+!> A track: series to which samples are added together, for frames, observables, or events. A counter in the file contains the
+!> number of complete samples. Because the counter is written after the values have been flushed, readers and resumed runs can rely
+!> on it.
+!>  A sample is an array of reals that contains the values of all series, one series after another. Integers are exact up to 2**53.
+!> Small samples are buffered, because one HDF5 call costs as much time as writing a hundred kilobytes.
 module sample_track
   use kinds, only: int64, real64
   use hdf5_objects, only: hdf5_file_t, scalar
@@ -13,20 +13,21 @@ module sample_track
   private
   public :: track_t
 
-  integer(int64), parameter :: batch_bytes = 262144     !! size of the samples that are written together
+  integer(int64), parameter :: batch_bytes = 262144     !! largest total size of samples that are written together [bytes]
   integer(int64), parameter :: most_in_batch = 512      !! largest number of samples that are written together
-  integer(int64), parameter :: first_bytes = 67108864   !! space reserved when the number of samples is unknown
+  integer(int64), parameter :: first_bytes = 67108864   !! space that is reserved if the number of samples is unknown [bytes]
   integer(int64), parameter :: fewest = 16              !! smallest number of samples for which space is reserved
-  integer(int64), parameter :: growth = 4               !! factor by which the capacity grows when it is used up
+  integer(int64), parameter :: growth = 4               !! factor by which the capacity increases when the file is full
 
   type :: track_t
-    type(series_t), allocatable :: series(:)            !! the series; step and time come first if the others share them
+    type(series_t), allocatable :: series(:)            !! the series; step and time are the first two if the other series share
+                                                        !! them
     character(len=:), allocatable :: counter            !! path of the counter dataset
-    integer(int64) :: planned = 0                       !! number of samples of the whole run; 0: unknown
+    integer(int64) :: planned = 0                       !! number of samples of the whole run; 0 if it is unknown
     integer(int64) :: capacity = 0                      !! number of samples that fit into the file
     integer(int64), private :: committed = 0            !! number of complete samples in the file
     integer(int64), private :: waiting = 0              !! number of samples in the buffer
-    real(real64), private :: waiting_since = 0.0_real64 !! time when the oldest of them was added [s]
+    real(real64), private :: waiting_since = 0.0_real64 !! time when the oldest sample in the buffer was added [s]
     real(real64), allocatable, private :: buffer(:, :)  !! (width,batch)
   contains
     procedure :: appended
@@ -46,7 +47,7 @@ module sample_track
 
 contains
 
-  !> Number of samples accepted, whether written or still in the buffer.
+  !> Number of samples added so far, whether they are written or still in the buffer.
   elemental function appended(self) result(n)
     class(track_t), intent(in) :: self
     integer(int64) :: n
@@ -79,7 +80,8 @@ contains
     if (n == 0) n = max(fewest, first_bytes/self%bytes_per_sample())
   end function first_capacity
 
-  !> Capacity required for `count` more samples. If it has to grow, it grows by a factor, to leave space for later samples.
+  !> Capacity required for `count` more samples. If the present capacity is too small, it is multiplied by a factor, which leaves
+  !> space for later samples.
   pure function enlarged(self, count) result(n)
     class(track_t), intent(in) :: self
     integer(int64), intent(in) :: count
@@ -91,7 +93,8 @@ contains
     end do
   end function enlarged
 
-  !> Switches series to 64-bit integers where these samples require it. The change takes effect in the next file.
+  !> Switches series to 64-bit integers if the given samples contain integers that are too large for 32 bits. The change takes
+  !> effect in the next file.
   subroutine widen(self, samples, widened)
     class(track_t), intent(inout) :: self
     real(real64), intent(in) :: samples(:, :)           !! (width,count)
@@ -126,7 +129,8 @@ contains
     call self%put_counter(file)
   end subroutine make
 
-  !> Links step and time of the first element into all others, as H5MD prescribes for elements that are sampled together.
+  !> Creates links to step and time of the first element in all other elements, as H5MD prescribes for elements that are sampled
+  !> together.
   subroutine link_step_and_time(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -142,7 +146,7 @@ contains
     end do
   end subroutine link_step_and_time
 
-  !> Locates the series in a file and returns to the first `count` samples. The file is not changed.
+  !> Locates the series in a file and continues after the first `count` samples. The file is not changed.
   subroutine resume(self, file, count)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -163,7 +167,7 @@ contains
     self%committed = count
   end subroutine resume
 
-  !> Writes the number of complete samples. After `resume` this hides the samples behind the first `count` from readers.
+  !> Writes the number of complete samples. After `resume`, readers can then no longer see the samples after the first `count`.
   subroutine put_counter(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -184,7 +188,7 @@ contains
     end do
   end subroutine move
 
-  !> Checks that the file holds all samples and no unused space; otherwise a failure of the file is recorded.
+  !> Checks that the file contains all samples and no unused space. Otherwise a failure of the file is recorded.
   subroutine verify(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -202,7 +206,8 @@ contains
     end do
   end subroutine verify
 
-  !> Appends samples, for which there must be space in the file. A full batch is committed at once.
+  !> Appends samples, for which the file must have space. When the number of buffered samples reaches the size of a batch, they are
+  !> committed.
   subroutine append(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -234,7 +239,7 @@ contains
     self%waiting = 0
   end subroutine flush_buffer
 
-  !> Stores samples behind the complete ones, flushes them, and only then increases the counter.
+  !> Stores samples after the complete samples, flushes the file, and then increases the counter.
   subroutine commit(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file

@@ -7,8 +7,8 @@ module table_file
   public :: read_table
 
   interface
-    !> Reads a table. The submodule `table_in_hdf5` implements this; `table_without_hdf5` refuses it. The linker selects one of
-    !> them.
+    !> Reads a table. The submodule `table_in_hdf5` implements this procedure. The submodule `table_without_hdf5` only reports that
+    !> such files cannot be read. The linker selects one of the two.
     module subroutine read_table(path, names, widths, most, table, error)
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: names(:)                 !! names of the datasets

@@ -17,7 +17,7 @@ contains
     real(real64), allocatable, intent(out) :: table(:, :)
     type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
-    real(real64), allocatable :: values(:)                     ! the values in the order of rows
+    real(real64), allocatable :: values(:)                     ! the values of a dataset, row by row
     integer(int64) :: length
     integer :: k, n, first
 

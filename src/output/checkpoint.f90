@@ -1,10 +1,9 @@
 !> Checkpoints: the variable state of a simulation and the progress of its output, stored in the output file. A resumed run yields
 !> data that are bit-identical to those of an uninterrupted run.
-!>
-!> During a run its file has two slots for checkpoints. One of them is valid, the next checkpoint is written to the other. When it
-!> has reached the disk completely, a number in the file is changed and makes it the valid one. A complete checkpoint therefore
-!> exists at every moment. Each has a checksum. A finished file keeps one slot. The file of a run that broke off has no valid
-!> checkpoint.
+!>  During a run its output file contains two slots, datasets with space for one checkpoint each. One slot is valid, and the next
+!> checkpoint is written to the other slot. When the data have been stored on the disk completely, a number in the file is changed,
+!> which makes the new checkpoint the valid one. A complete checkpoint therefore exists at every moment. Each checkpoint has a
+!> checksum. A finished file contains one slot. The file of a run that broke off has no valid checkpoint.
 module checkpoint
   use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int8
@@ -37,15 +36,15 @@ module checkpoint
   integer, parameter :: none = 0
   character(len=*), parameter :: described = checkpoint_group//"input_checksum"
 
-  !> A hard link to the first slot. When the link that was created last is deleted, HDF5 overwrites its name one call before it
-  !> removes it from the list; after a kill in between, h5dump could not list the file. This link is therefore created last and
-  !> never deleted.
+  !> A hard link to the first slot. When HDF5 deletes the link that was created last, it overwrites the name of the link before it
+  !> removes the link from the list. If the program were killed between these two steps, h5dump could not list the file. The present
+  !> link is therefore created last and never deleted.
   character(len=*), parameter :: kept = checkpoint_group//"kept"
 
 contains
 
-  !> Identifies the program and the properties by which two builds can give different bits: the version of checkpoints, and
-  !> compiler flags that permit inexact arithmetic.
+  !> A text that identifies the program and the properties of a build that can affect the bits of its results: the version of
+  !> checkpoints, and compiler flags that permit inexact arithmetic.
   pure function program() result(text)
     character(len=:), allocatable :: text
 
@@ -63,7 +62,7 @@ contains
 
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
-        if (groups(g)%values(k)%name == "relative_to") cycle           ! included in the values of other variables
+        if (groups(g)%values(k)%name == "relative_to") cycle           ! the values of other variables include it
         if (.not. groups(g)%values(k)%is_set() .or. table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add(groups(g)%value_line(k)//eol)
       end do
@@ -71,7 +70,7 @@ contains
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
         if (.not. allocated(groups(g)%values(k)%reals)) cycle
-        if (size(groups(g)%values(k)%reals) <= most_written) cycle      ! written completely in the text above
+        if (size(groups(g)%values(k)%reals) <= most_written) cycle      ! the text above contains the value completely
         if (table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add("checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
           //trim(groups(g)%values(k)%name)//" = "//checksum(transfer(groups(g)%values(k)%reals, [0_int8]))//eol)
@@ -80,12 +79,14 @@ contains
     text = growing%text()
   end function fixed_input
 
-  !> Adds the overrides of the original command line that may not change on `--resume`, so that they need not be repeated.
+  !> Adds the overrides of the original command line whose variables must not change on `--resume`, so that users need not repeat
+  !> them.
   subroutine recall_overrides(output, overrides, error)
     character(len=*), intent(in) :: output                       !! path of the output
-    type(text_t), allocatable, intent(inout) :: overrides(:)  !! in: GROUP.VARIABLE=VALUE of the present command line; out: with
-                                                              !! those recalled
-    type(error_t), allocatable, intent(out) :: error          !! the output is of another version, or its input is damaged
+    type(text_t), allocatable, intent(inout) :: overrides(:)  !! in: GROUP.VARIABLE=VALUE of the present command line; out: these
+                                                              !! and the overrides from the file
+    type(error_t), allocatable, intent(out) :: error          !! set if another version wrote the output, or if the input in the
+                                                              !! output is damaged
     type(hdf5_file_t) :: file
     type(text_t) :: override
     type(text_t), allocatable :: given(:)
@@ -96,7 +97,7 @@ contains
     call file%open(source_of(output), writable=.false.)
     call file%fetch_text(parameters_group//"overrides", text)
     if (checkpoint_number(file) /= none) then
-      call check_program(file, error)                         ! the names of variables may have changed since another version
+      call check_program(file, error)                         ! another version may use other names of variables
       if (.not. allocated(error)) call check_description(file, error)
     end if
     call file%close()
@@ -114,7 +115,7 @@ contains
     overrides = [overrides, given]
   end subroutine recall_overrides
 
-  !> Reads the texts of the input that a file contains, after checking that they are undamaged and were written by this program.
+  !> Reads the texts of the input from a file, after a check that the texts are undamaged and that this program wrote them.
   subroutine recall_input(file, text, overrides, changes, error)
     type(hdf5_file_t), intent(inout) :: file
     character(len=:), allocatable, intent(out) :: text, overrides
@@ -131,7 +132,7 @@ contains
     call check_description(file, error)
   end subroutine recall_input
 
-  !> Refuses a file in which the texts of the input have changed since they were written.
+  !> Reports an error if the texts of the input in the file have changed since they were written.
   subroutine check_description(file, error)
     type(hdf5_file_t), intent(inout) :: file
     type(error_t), allocatable, intent(out) :: error
@@ -155,7 +156,7 @@ contains
     text = checksum(transfer(input//eol//overrides//eol//changes, [0_int8]))
   end function description_checksum
 
-  !> Name of the variable of an override.
+  !> Name of the variable that an override sets.
   pure function variable_of(override) result(name)
     character(len=*), intent(in) :: override
     character(len=:), allocatable :: name
@@ -202,7 +203,8 @@ contains
     call file%link(slots(1), kept)
   end subroutine copy_checkpoints
 
-  !> Writes a checkpoint to the slot that is not valid, and makes this slot the valid one when the data have reached the disk.
+  !> Writes a checkpoint to the slot that is not valid, and makes this slot the valid one when the data have been stored on the
+  !> disk.
   subroutine put_checkpoint(file, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim      !! unchanged on return
@@ -237,7 +239,7 @@ contains
     call file%put(current, scalar, [int(none, int64)])
   end subroutine mark_as_broken
 
-  !> Number of the valid slot, or `none`; -1 if the file lacks it.
+  !> Number of the valid slot, or `none`; -1 if the file does not contain this number.
   function checkpoint_number(file) result(number)
     type(hdf5_file_t), intent(inout) :: file
     integer :: number
@@ -298,7 +300,7 @@ contains
     call exchange_all(file, record, sim, copy)
   end subroutine put_slot
 
-  !> Restores a run from its output, finished or not. The output continues from the returned `progress`.
+  !> Restores a run from its finished or unfinished output. The output has to be continued from the returned `progress`.
   subroutine read_checkpoint(output, input, sim, progress, finished, error)
     character(len=*), intent(in) :: output      !! path of the finished output
     type(run_input_t), intent(in) :: input
@@ -331,7 +333,7 @@ contains
     call progress%schedule%look_ahead(sim)
   end subroutine read_checkpoint
 
-  !> Reads the valid checkpoint; if it is damaged, the other one.
+  !> Reads the valid checkpoint or, if this checkpoint is damaged, the other one.
   subroutine read_slot(file, sim, progress, error)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
@@ -368,7 +370,7 @@ contains
     call file%report(error)
   end subroutine read_slot
 
-  !> Refuses a checkpoint that another program, or another version, has written.
+  !> Reports an error if another program, or another version, has written the checkpoint.
   subroutine check_program(file, error)
     type(hdf5_file_t), intent(inout) :: file
     type(error_t), allocatable, intent(out) :: error
@@ -381,7 +383,7 @@ contains
     if (.not. allocated(error)) call file%report(error)
   end subroutine check_program
 
-  !> Refuses a checkpoint of another program or of another input.
+  !> Reports an error if the checkpoint belongs to another program or to another input.
   subroutine check_origin(file, groups, error)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -435,7 +437,8 @@ contains
     end if
     call exchange_disks()
     do k = 1, size(progress%schedule)
-      associate (schedule => progress%schedule(k))  ! intervals belong to the input; the times of the next samples follow from these
+      associate (schedule => progress%schedule(k))  ! the input contains the intervals, from which the times of the next samples
+                                                    ! follow
                                                   ! numbers
         call record%exchange(file, schedule%count)
         call record%exchange(file, schedule%last_events)
@@ -462,7 +465,7 @@ contains
       end associate
     end subroutine exchange_tally
 
-    !> The integers that represent each exact sum; they are twice as long as ordinary integers.
+    !> The integers that represent each exact sum; each of these integers is twice as long as an ordinary integer.
     subroutine exchange_sums(sums)
       type(exact_sum_t), intent(inout) :: sums(:)
       integer(int128), target :: parts(2*size(sums))
@@ -487,16 +490,17 @@ contains
         call exchange_short(tag%id)
         call record%exchange(file, tag%collisions)
         call exchange_short(tag%last_partner)
-        if (sim%features%own_sizes) call record%exchange(file, disk%radius)  ! otherwise the radii follow from the input
+        if (sim%features%own_sizes) call record%exchange(file, disk%radius)  ! without individual radii, the radii follow from the
+                                                                             ! input
       end associate
       settled = merge(1, 0, sim%events_done)
       do k = 1, merge(1, 0, sim%features%rotation) + merge(2, 0, sim%features%orientation)
-        call record%exchange(file, settled)  ! padding words: the length of the record shows whether disks have rotation and
-                                             ! orientation
+        call record%exchange(file, settled)  ! padding words, so that the length of the record differs between runs with and without
+                                             ! rotation and orientation
       end do
       if (allocated(sim%extra)) call record%pass(file, c_loc(sim%extra(1)), size(sim%extra)*storage_size(sim%extra)/64)
       if (.not. sim%features%own_sizes) return
-      mass = sim%masses()                       ! may all be equal to the masses of the species
+      mass = sim%masses()                       ! stored even if all masses are equal to the masses of the species
       call record%exchange(file, mass)
       if (record%mode == reading) sim%own_mass = mass
     end subroutine exchange_disks

@@ -1,8 +1,8 @@
-!> Output of a run: decides when something is written, and manages the file. During the run its name is OUT.h5.part, and a lock file
-!> keeps other runs away; the name OUT.h5 means that the run has finished.
-!>
-!> The layout of a file never changes. If the number of samples is known at the start, the file has space for exactly these.
-!> Otherwise a new file replaces it, by an atomic renaming, when the space is used up and at the end.
+!> Output of a run: determines when samples and checkpoints are written, and manages the output file. During the run the name of
+!> this file is OUT.h5.part, and a lock file prevents other runs from writing to it. A file with the name OUT.h5 belongs to a
+!> finished run.
+!>  The layout of a file never changes. If the number of samples is known at the start, the file has space for exactly these
+!> samples. Otherwise a new file replaces the file, by an atomic renaming, whenever the space is used up and at the end of the run.
 module output
   use kinds, only: int64, real64
   use sampling_schedule, only: frames, progress_t, values
@@ -30,9 +30,9 @@ module output
   public :: output_t, planned_bytes
 
   real(real64), parameter :: longest_wait = 0.05_real64  !! longest time that a sample waits in a buffer while the run is active [s]
-  integer, parameter :: events = 3              !! index of the track of the event log, behind `frames` and `values`
-  integer, parameter :: kept = 1, anew = 2, dropped = 3  !! checkpoints of a new file: copied, written for the present state, or
-                                                         !! none
+  integer, parameter :: events = 3              !! index of the track of the event log, which follows `frames` and `values`
+  integer, parameter :: kept = 1, anew = 2, dropped = 3  !! treatment of checkpoints in a new file: copied from the old file,
+                                                         !! written for the present state, or omitted
 
   type :: output_t
     type(progress_t) :: progress
@@ -42,8 +42,8 @@ module output
     type(track_t), allocatable, private :: track(:)      !! (2 or 3) frames, observables and, if requested, the event log
     type(frame_column_t), allocatable, private :: columns(:)  !! columns of the frames
     type(lock_t), private :: lock
-    integer(int64), private :: replaced(3) = 0_int64     !! identity of the file that had this path when the run began
-    real(real64), private :: opened = 0.0_real64  !! time when this part of the run began, by the clock `seconds` [s]
+    integer(int64), private :: replaced(3) = 0_int64     !! identity of the file that existed at `path` when the run started
+    real(real64), private :: opened = 0.0_real64  !! time when this part of the run started, on the clock `seconds` [s]
     real(real64), private :: spent = 0.0_real64   !! wall time of earlier parts of the run [s]
   contains
     procedure :: claim
@@ -69,7 +69,7 @@ contains
     character(len=:), allocatable :: problem
     logical :: made
 
-    call record_signals()                         ! from here on data could be lost
+    call record_signals()                         ! from this point on a sudden end could lose data
     self%file = hdf5_file_t()
     self%path = path
     self%opened = seconds()
@@ -83,7 +83,8 @@ contains
       if (problem /= "") call fail(error, exit_files, path//": "//problem)
     end if
     if (.not. allocated(error)) call check_places(path, error)
-    if (.not. allocated(error)) call remove_file(path//unfinished_new)      ! left incomplete by a run that was killed
+    if (.not. allocated(error)) call remove_file(path//unfinished_new)      ! this file may be the incomplete file of a run that was
+                                                                            ! killed
     self%replaced = identity_of(path)
     if (is_file(path) .and. all(self%replaced == 0) .and. .not. allocated(error)) &
       call fail(error, exit_files, path//": cannot be examined: "//last_problem())
@@ -94,7 +95,8 @@ contains
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(inout) :: sim
-    logical, intent(in) :: force                  !! allows that an unfinished output is replaced now and a finished one at the end
+    logical, intent(in) :: force                  !! allows the run to replace an unfinished output now and a finished output at its
+                                                  !! end
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: planned
     integer :: k
@@ -127,7 +129,7 @@ contains
     if (allocated(error)) call self%file%discard()
   end subroutine open_output
 
-  !> Fails if a new run would replace a finished output, or an unfinished one, unless the run of the latter broke off.
+  !> Reports an error if a new run would replace a finished output, or an unfinished output that can still be resumed.
   subroutine check_start(self, error)
     class(output_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
@@ -142,8 +144,9 @@ contains
     end if
   end subroutine check_start
 
-  !> Opens the output of a resumed run after `claim`, and returns to the samples of its checkpoint. The output of a finished run
-  !> is not changed until the longer run has finished. If the file does not describe the present input, it is rebuilt.
+  !> Opens the output of a resumed run after `claim`, and continues after the samples that had been written at the checkpoint. The
+  !> output of a finished run that is continued for longer is not changed until the longer run has finished. If the file does not
+  !> describe the present input, a new file is written.
   subroutine resume(self, input, sim, progress, finished, error)
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
@@ -211,8 +214,8 @@ contains
     end associate
   end subroutine plan
 
-  !> Smallest possible size of the output of a run in bytes. Where the number of samples is unknown, only the first and the last
-  !> are counted.
+  !> Smallest possible size of the output of a run in bytes. If the number of samples is unknown, only the first and the last sample
+  !> are included.
   function planned_bytes(input, sim) result(bytes)
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(inout) :: sim      !! unchanged on return
@@ -247,7 +250,7 @@ contains
     call self%progress%schedule(values)%tighten(limits)
   end subroutine tighten
 
-  !> Takes the samples that are due. Called whenever the simulation has stopped at a limit.
+  !> Takes the samples that are due. The main loop calls this procedure whenever the simulation has stopped at a limit.
   subroutine take_due_samples(self, sim, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -276,7 +279,7 @@ contains
     end associate
   end subroutine take_sample
 
-  !> Moves the collisions in the log to the output, and empties the log. A failure is reported by the next `take_due_samples`.
+  !> Moves the collisions in the log to the output, and empties the log. The next call of `take_due_samples` reports a failure.
   subroutine take_events(self, sim, log)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -288,7 +291,7 @@ contains
     log%n = 0
   end subroutine take_events
 
-  !> Adds samples to a track. If they do not fit, the file is replaced by a larger one first.
+  !> Adds samples to a track. If the samples do not fit into the file, a larger file first replaces it.
   subroutine add(self, track, samples, sim)
     class(output_t), intent(inout) :: self
     integer, intent(in) :: track
@@ -304,7 +307,7 @@ contains
     call self%track(track)%append(self%file, samples)
   end subroutine add
 
-  !> Commits the samples that have waited in a buffer for at least `least_wait`; without this argument all samples.
+  !> Commits the samples that have been in a buffer for at least `least_wait`. Without this argument all samples are committed.
   subroutine flush_buffers(self, least_wait)
     class(output_t), intent(inout) :: self
     real(real64), intent(in), optional :: least_wait      !! [s]
@@ -318,12 +321,12 @@ contains
     end do
   end subroutine flush_buffers
 
-  !> Replaces the file by one with other capacities.
+  !> Replaces the file by a new file with other capacities.
   subroutine rebuild(self, capacities, sim, checkpoints)
     class(output_t), intent(inout) :: self
     integer(int64), intent(in) :: capacities(:)
     type(simulation_t), intent(inout) :: sim
-    integer, intent(in) :: checkpoints  !! checkpoints of the new file: `kept`, written `anew` for the present state, or `dropped`
+    integer, intent(in) :: checkpoints  !! treatment of the checkpoints: `kept`, written `anew` for the present state, or `dropped`
     type(hdf5_file_t), allocatable :: new
     integer(int64) :: needed
     integer :: k
@@ -364,13 +367,13 @@ contains
     call self%file%report(error)
   end subroutine save
 
-  !> Completes the output of a finished run: the file is checked and gets its final name. If that fails, the checkpoint in it
-  !> allows the run to be resumed just before its end.
+  !> Completes the output of a finished run: checks the file and renames it to its final name. If this fails, the run can be resumed
+  !> just before its end from the checkpoint in the file.
   subroutine finish(self, sim, cost, note, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: cost(3)           !! see `write_end`
-    character(len=*), intent(in) :: note          !! reason of the end, if no stop rule was met
+    character(len=*), intent(in) :: note          !! reason why the run ended, if no stop rule was met
     type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
     integer :: k
@@ -390,13 +393,13 @@ contains
   end subroutine finish
 
   !> Writes the last samples, removes unused space, and records how the run ended. The checkpoint of a finished run precedes the
-  !> last samples: in a longer run they might not be due.
+  !> last samples, because these samples might not be due if the run is continued for longer.
   subroutine write_end(self, sim, cost, note, broken)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: cost(3)           !! since the start or the last resume: wall time [s], collisions per
     !! processor time [1/s], events on one core where there were more
-    character(len=*), intent(in) :: note          !! reason of the end, if no stop rule was met
+    character(len=*), intent(in) :: note          !! reason why the run ended, if no stop rule was met
     logical, intent(in) :: broken
     type(progress_t) :: before
     integer :: track
@@ -412,7 +415,7 @@ contains
     if (.not. broken) call put_last_checkpoint(self%file, sim, before)
   end subroutine write_end
 
-  !> Completes the output of a run that broke off, with its last state, but leaves it under the name of an unfinished output.
+  !> Completes the output of a run that broke off, including its last state. The file keeps the name of an unfinished output.
   subroutine break_off(self, sim, cost, note)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -424,7 +427,7 @@ contains
     if (.not. allocated(uncountable)) call self%write_end(sim, cost, note, broken=.true.)
   end subroutine break_off
 
-  !> Closes the file, finished or not, and removes the lock.
+  !> Closes the finished or unfinished file, and removes the lock.
   subroutine release(self)
     class(output_t), intent(inout) :: self
 

@@ -16,7 +16,7 @@ module progress_line
     private
     real(real64) :: started = 0.0_real64           !! time when the program started [s]
     integer :: n = 0                               !! number of reports so far
-    ! At the last reports, in a ring buffer:
+    ! Values at the times of the last reports, in circular buffers:
     real(real64) :: clock(0:window - 1) = 0.0_real64       !! [s]
     real(real64) :: share(0:window - 1) = 0.0_real64       !! completed fraction of the run
     integer(int64) :: collisions(0:window - 1) = 0_int64
@@ -27,7 +27,7 @@ module progress_line
 
 contains
 
-  !> Prepares the report for a run, or for the next part of one.
+  !> Prepares the reports for a run, or for the next part of a run.
   subroutine start(self, sim, stop_rule, started)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -61,7 +61,7 @@ contains
     call self%show(trim(line))
   end subroutine report
 
-  !> Records the present state, for rates over the last reports.
+  !> Records the present counts and times, from which the rates over the last reports are computed.
   subroutine remember(self, sim, stop_rule)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

@@ -21,12 +21,13 @@ module run_description
   private
   public :: describe_end, describe_run, describes
 
-  integer, parameter :: longest_attribute = 1000      !! largest number of values; HDF5 limits attributes to 64 kB
-  integer, parameter :: longest_note = 500            !! length of the text with the reason of the end
+  integer, parameter :: longest_attribute = 1000      !! largest number of values in an attribute, because HDF5 limits attributes to
+                                                      !! 64 kB
+  integer, parameter :: longest_note = 500            !! length of the text that states why the run ended
 
 contains
 
-  !> Writes everything, with placeholders for values that are known only at the end.
+  !> Writes all constant contents, with placeholders for values that are known only at the end.
   subroutine describe_run(file, input, sim)
     type(hdf5_file_t), intent(inout) :: file
     type(run_input_t), intent(in) :: input
@@ -91,14 +92,14 @@ contains
       call file%put(disk_radius, [size(sizes)], sizes)
     end subroutine describe_disks
 
-    !> The input as it was given, and the value of every variable as it was used.
+    !> The text of the input, and the value of every variable that the run uses.
     subroutine describe_input()
       character(len=:), allocatable :: group
       integer :: g, k
 
       do g = 1, size(input%groups)
         associate (own => input%groups(g))
-          if (any(obstacle_groups == own%name)) cycle     ! described by one table for each name of group
+          if (any(obstacle_groups == own%name)) cycle     ! one table for each group name describes these groups
           group = parameters_group//trim(own%name)
           if (is_repeated(own%name)) group = group//"/"//trim(own%instance)
           call file%make_group(group)
@@ -112,7 +113,8 @@ contains
       if (allocated(input%changes)) call file%put(changes_at_work, input%changes)
     end subroutine describe_input
 
-    !> Dimension and number of particles, which the thermodynamics module of H5MD requires beside the observables of a group.
+    !> Dimension and number of particles, which the thermodynamics module of H5MD requires in addition to the observables of a
+    !> group.
     subroutine describe_populations()
       character(len=:), allocatable :: group
       integer(int32) :: n
@@ -156,7 +158,7 @@ contains
   !> Whether the results of a run are independent of a variable. This holds for `run.threads`, which is therefore not stored
   !> among the parameters.
   pure function changes_nothing(variable) result(yes)
-    character(len=*), intent(in) :: variable      !! name; it may be followed by its value
+    character(len=*), intent(in) :: variable      !! name of the variable, which may be followed by its value
     logical :: yes
 
     yes = index(variable, "run.threads") == 1
@@ -187,7 +189,7 @@ contains
     yes = text == input%text .and. overrides == overrides_text(input)
   end function describes
 
-  !> Writes the value of one variable, if it has one.
+  !> Writes the value of one variable, if the variable has a value.
   subroutine describe_value(file, group, value)
     type(hdf5_file_t), intent(inout) :: file
     character(len=*), intent(in) :: group
@@ -217,8 +219,8 @@ contains
     end select
   end subroutine describe_value
 
-  !> Writes all groups of one name as a table, with a dataset for each variable. A choice of two words is stored as a
-  !> flag that is named after the second word.
+  !> Writes all groups of one name as a table, with a dataset for each variable. A variable with a choice of two words is stored as
+  !> a flag with the name of the second word.
   subroutine describe_table(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -233,7 +235,8 @@ contains
       associate (row => table(groups(1)%values(k)%row))
         path = parameters_group//trim(row%group)//"/"
         second = trim(row%choices(index(trim(row%choices), " ", back=.true.) + 1:))
-        if (row%name == "file") cycle                       ! the obstacles themselves are stored: see `describe_rows`
+        if (row%name == "file") cycle                       ! not stored here, because the obstacles themselves are stored: see
+                                                            ! `describe_rows`
         if (row%kind == "text") then
           do g = 1, n
             texts(g) = groups(g)%text_of(trim(row%name))
@@ -242,7 +245,7 @@ contains
           if (second /= "") call file%put(path//second, [n], merge(1_int32, 0_int32, texts == second))
         else
           if (.not. any([(groups(g)%values(k)%is_set(), g=1, n)])) cycle
-          if (row%size == 0) cycle                          ! a polyline: see `describe_rows`
+          if (row%size == 0) cycle                          ! a list of points, which is stored as obstacles: see `describe_rows`
           values = spread(ieee_value(0.0_real64, ieee_quiet_nan), 1, row%size*n)     ! NaN for groups without a value
           do g = 1, n
             if (size(groups(g)%reals_of(trim(row%name))) /= row%size) cycle
@@ -256,7 +259,7 @@ contains
   end subroutine describe_table
 
   !> Writes the geometry of all obstacles in the groups of one name, in the order of their codes, and the number of the group of
-  !> each. Needed where a group contains several obstacles, from a file or as a polyline.
+  !> each. These data are needed if a group describes several obstacles by a file or a polyline.
   subroutine describe_rows(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -270,7 +273,7 @@ contains
     allocate (values(0))
     do k = 1, size(groups(1)%values)
       associate (row => table(groups(1)%values(k)%row))
-        if (row%status /= "example") cycle            ! all other variables are in `describe_table`
+        if (row%status /= "example") cycle            ! `describe_table` stores all other variables
         values = [(groups(g)%reals_of(trim(row%name)), g=1, size(groups))]
         n = [(size(groups(g)%reals_of(trim(row%name)))/row%size, g=1, size(groups))]
         if (row%size == 1) call file%put(path//trim(row%name), [size(values)], values)
@@ -286,8 +289,8 @@ contains
     type(hdf5_file_t), intent(inout) :: file
     integer, intent(in) :: threads                    !! number of threads in the last part of the run
     real(real64), intent(in) :: wall_seconds          !! wall time of the whole run, summed over its parts [s]
-    real(real64), intent(in) :: rate(2)  !! last part of the run: collisions per processor time [1/s], number of events executed by
-                                         !! the serial engine
+    real(real64), intent(in) :: rate(2)  !! in the last part of the run: collisions per processor time [1/s], and number of events
+                                         !! executed by the serial engine
     character(len=*), intent(in) :: note              !! reason of the end, if no stop rule was met
     character(len=longest_note) :: padded
 

@@ -1,5 +1,5 @@
-!> The series in a frame, in a sample of the observables and in a sample of the event log. The order is the same
-!> as that of the values in `sample_values`.
+!> The series in a frame, in a sample of the observables and in a sample of the event log. The series are in the same order as the
+!> values in `sample_values`.
 module samples
   use kinds, only: int32, int64, largest_exact
   use errors, only: error_t, exit_broken, fail
@@ -57,7 +57,7 @@ contains
       series_t(events_group//"momentum_change", double_precision, 1, [2, 1])]
   end function event_series
 
-  !> Fails if a counter of the simulation is too large for a sample, in which it is stored as a real.
+  !> Reports an error if a counter of the simulation is too large to be represented exactly in a sample, which consists of reals.
   subroutine check_counts(sim, error)
     type(simulation_t), intent(in) :: sim
     type(error_t), allocatable, intent(out) :: error
@@ -66,7 +66,8 @@ contains
 
     too_far = .false.
     do i = 1, merge(sim%n_disks(), 0, any(sim%box%periodic))
-      too_far = too_far .or. any(abs(sim%extra(i)%image) >= largest_exact)      ! a frame may have to count one more period
+      too_far = too_far .or. any(abs(sim%extra(i)%image) >= largest_exact)      ! one period less than the limit, because a frame
+                                                                                ! may add one
     end do
     if (sim%tally%events > int(largest_exact, int64) .or. too_far) &
       call fail(error, exit_broken, "more than 2**53 collisions or periods: the output cannot count further")

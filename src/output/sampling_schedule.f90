@@ -1,5 +1,5 @@
-!> Sampling schedules: samples are due at multiples of a time, of a number of collisions or of a number of events, at given
-!> times, and at the start and the end of a run. Also the progress of the output.
+!> Sampling schedules. Samples are due at multiples of a time, of a number of collisions or of a number of events, at given times,
+!> and at the start and the end of a run. The module also defines the progress of the output.
 module sampling_schedule
   use kinds, only: int64, never, real64
   use evolution, only: limits_t
@@ -13,12 +13,13 @@ module sampling_schedule
   !> Quantities by which intervals are measured.
   integer, parameter :: by_time = 1, by_collisions = 2, by_events = 3
 
-  integer, parameter :: units_lost = 4  !! times that differ by at most this number of units in the last place count as equal
+  integer, parameter :: units_lost = 4  !! times that differ by at most this number of units in the last place are treated as equal
 
   type :: schedule_t
-    real(real64) :: every(3) = never  !! intervals of time, of collisions and of events; the latter two need not be integers
+    real(real64) :: every(3) = never  !! intervals of time, of collisions and of events; the intervals of collisions and events need
+                                      !! not be integers
     type(sampling_t) :: chosen                    !! the sampling rules of the input, for the given times
-    integer(int64) :: count = 0                   !! number of samples taken; the first is due at once
+    integer(int64) :: count = 0                   !! number of samples taken; the first sample is due at the start
     real(real64) :: next(3) = never               !! time, collisions and events at which the next samples are due
     real(real64) :: last_time = -1.0_real64       !! time of the last sample [time]
     integer(int64) :: last_events = -1            !! number of events and kicks before the last sample
@@ -32,7 +33,7 @@ module sampling_schedule
     procedure, private :: next_time, number_within
   end type schedule_t
 
-  !> The progress of the output. Together with the state of the simulation it is all that is needed to resume a run.
+  !> The progress of the output. The progress and the state of the simulation together are sufficient to resume a run.
   type :: progress_t
     type(schedule_t) :: schedule(2)               !! schedules of frames and of observables
     integer(int64) :: events = 0                  !! number of collisions written to the event log
@@ -96,9 +97,9 @@ contains
     call self%look_ahead(sim)
   end subroutine take
 
-  !> Finds when the next samples are due: at the next multiples of the intervals. The result follows from the present state,
-  !> independently of when the last sample was taken. Exception: a sample that is due now, at a time at which events may still
-  !> occur.
+  !> Finds the times and counts at which the next samples are due, which are the next multiples of the intervals. The result follows
+  !> from the present state and does not depend on the time of the last sample. The only exception is a sample that is due now, at a
+  !> time at which events may still occur.
   elemental subroutine look_ahead(self, sim)
     class(schedule_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -121,8 +122,8 @@ contains
   end subroutine tighten
 
   !> The first time at which a sample is due that is not before `time` and later than `past`: a multiple of the interval, a
-  !> logarithmic step, or a given time. Multiples are computed as products, because sums would accumulate rounding errors. If such
-  !> times differ only by rounding, one sample is due, at the last of them.
+  !> logarithmic step, or a given time. Multiples are computed as products, because sums would accumulate rounding errors. If
+  !> several such times differ only by rounding errors, a single sample is due at the last of these times.
   pure function next_time(self, time, past) result(next)
     class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: time, past        !! [time]
@@ -154,14 +155,14 @@ contains
     end do
   contains
 
-    !> Whether a time is still to come.
+    !> Whether a time is later than the present time.
     pure logical function is_ahead(t)
       real(real64), intent(in) :: t
 
       is_ahead = t >= time .and. t > past + units_lost*spacing(past)
     end function is_ahead
 
-    !> The first of the given times that is still to come.
+    !> The first of the given times that is later than the present time.
     pure real(real64) function first_ahead(times)
       real(real64), intent(in) :: times(:)        !! in ascending order [time]
       integer :: behind, ahead, middle
@@ -181,8 +182,8 @@ contains
     end function first_ahead
   end function next_time
 
-  !> The first number of collisions or events beyond n at which the next multiple of an interval is reached. A run with a stop
-  !> rule of that multiple would end at the same number.
+  !> The first number of collisions or events beyond n at which the next multiple of an interval is reached. A run with this
+  !> multiple as a stop rule would end at the same number.
   elemental function next_number(n, every) result(next)
     integer(int64), intent(in) :: n
     real(real64), intent(in) :: every
@@ -198,8 +199,8 @@ contains
     next = whole_collisions(multiple*every)
   end function next_number
 
-  !> Number of samples of a run, if it is known in advance, otherwise 0. It is known if there is at most one interval, and if the
-  !> only stop rule is of the same kind as the interval (of time if times are given).
+  !> Number of samples of a run, if it is known in advance, otherwise 0. The number is known if there is at most one interval, and
+  !> if the only stop rule limits the same quantity as the interval, or the time if times are given.
   elemental function planned(self, limits) result(n)
     class(schedule_t), intent(in) :: self
     type(limits_t), intent(in) :: limits          !! of the run
@@ -219,7 +220,8 @@ contains
     if (given(by_events)) n = numbers_within(limits%events, self%every(by_events))
   end function planned
 
-  !> Number of times from 0 to t at which samples are due, including both. 0: too many to plan for.
+  !> Number of times from 0 to t at which samples are due, including 0 and t. The result is 0 if the number is too large to reserve
+  !> space for all samples.
   pure function number_within(self, t) result(n)
     class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: t                 !! [time]
@@ -237,7 +239,8 @@ contains
     if (n > too_many) n = 0
   end function number_within
 
-  !> Number of times 0, dt, 2 dt, ... up to t, including t itself. 0: too many to plan for.
+  !> Number of times 0, dt, 2 dt, ... up to t, including t itself. The result is 0 if the number is too large to reserve space for
+  !> all samples.
   pure function multiples_within(t, dt) result(n)
     real(real64), intent(in) :: t, dt
     integer(int64) :: n
@@ -251,7 +254,7 @@ contains
     n = n + 1
   end function multiples_within
 
-  !> Number of samples from 0 up to a limit of collisions or events, including both.
+  !> Number of samples from 0 up to a limit of collisions or events, including the samples at 0 and at the limit.
   pure function numbers_within(limit, every) result(n)
     integer(int64), intent(in) :: limit
     real(real64), intent(in) :: every

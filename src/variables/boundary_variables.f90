@@ -98,7 +98,7 @@ module boundary_variables
       //"which the program is started.", excludes="from to points", &
       otherwise="none; the group describes one wall or polyline")]
 
-  !> The collision rule of a boundary, in the group of each.
+  !> The collision rule of a boundary, which is set in the group of the boundary.
   type(variable_t), parameter :: law_rows(*) = [ &
     variable_t("", "restitution", "real", 1, "optional", "0.9", &
       "Coefficient of restitution of collisions of disks with this boundary: 1 is elastic, 0 perfectly inelastic. The rule " &

@@ -5,7 +5,7 @@ module choices
   public :: meaning_of
 
   type :: choice_t
-    character(len=19) :: name                !! of the variable
+    character(len=19) :: name                !! name of the variable
     character(len=17) :: word                !! the choice
     character(len=300) :: meaning            !! a full phrase or sentence
   end type choice_t
@@ -97,9 +97,9 @@ module choices
 
 contains
 
-  !> The meaning of a choice; empty if the table has none.
+  !> The meaning of a choice; empty if the table does not contain the choice.
   pure function meaning_of(name, word) result(meaning)
-    character(len=*), intent(in) :: name     !! of the variable
+    character(len=*), intent(in) :: name     !! name of the variable
     character(len=*), intent(in) :: word
     character(len=:), allocatable :: meaning
     integer :: k

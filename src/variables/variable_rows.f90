@@ -1,4 +1,4 @@
-!> The type of a row of the table of `variables`, ranges of numbers, and limits that the program shares with its users.
+!> The type of a row of the table of `variables`, ranges of numbers, and limits that users of the program need to know.
 module variable_rows
   use kinds, only: real64
   implicit none
@@ -6,15 +6,16 @@ module variable_rows
 
   integer, parameter, public :: name_length = 37, help_length = 1000
   integer, parameter, public :: most_threads = 1024, most_disks = 100000000
-  real(real64), parameter, public :: smallest = 1.0e-100_real64    !! numbers beyond these would overflow when
-  real(real64), parameter, public :: largest = 1.0e100_real64      !! squared or multiplied
+  real(real64), parameter, public :: smallest = 1.0e-100_real64    !! smallest magnitude of an input value other than 0
+  real(real64), parameter, public :: largest = 1.0e100_real64      !! largest magnitude; products of larger values could overflow
 
-  !> When a variable may have another value than at the start of a run: never; on `--resume`, because it has no effect on
-  !> the trajectory; or in a running simulation, because it acts on disks and neither places nor describes them.
+  !> When the value of a variable may differ from its value at the start of a run: never; on `--resume`, if the variable has no
+  !> effect on the trajectory; or in a running simulation, if the variable affects the motion of the disks but not their number,
+  !> properties or initial state.
   character(len=9), parameter, public :: never = "never", on_resume = "on resume", in_motion = "running"
 
   type, public :: range_t
-    real(real64) :: lower, upper             !! both belong to the range
+    real(real64) :: lower, upper             !! limits of the range, which include both ends
     character(len=24) :: words
   end type range_t
 
@@ -41,17 +42,20 @@ module variable_rows
     character(len=8) :: group
     character(len=name_length) :: name
     character(len=8) :: kind                 !! "integer", "real", "logical" or "text"
-    integer :: size                          !! number of values; 0: any number
+    integer :: size                          !! number of values; 0 if any number is allowed
     character(len=8) :: status               !! see below
-    character(len=24) :: value               !! as written in a file
-    character(len=help_length) :: help       !! full sentences; the first names the quantity
-    type(range_t) :: range = anything        !! of numbers
+    character(len=24) :: value               !! the value as written in an input file: see below
+    character(len=help_length) :: help       !! help text in full sentences, of which the first names the quantity
+    type(range_t) :: range = anything        !! range of numbers
     character(len=16) :: unit = ""
-    character(len=100) :: choices = ""       !! of texts, separated by blanks; none: free text. Their meanings are in `choices`
-    character(len=60) :: goes_with = ""      !! a choice, then its words with which this variable has an effect
-    character(len=80) :: excludes = ""       !! variables of the same group that are not given with it
-    character(len=9) :: may_change = never   !! when it may have another value than at the start
-    character(len=100) :: otherwise = ""     !! the default in words, where it is no constant
+    character(len=100) :: choices = ""       !! allowed texts, separated by blanks; empty if any text is allowed. The module
+                                             !! `choices` contains their meanings
+    character(len=60) :: goes_with = ""      !! name of a choice variable, then its values for which the present variable has an
+                                             !! effect
+    character(len=80) :: excludes = ""       !! variables of the same group that must not be given together with the present
+                                             !! variable
+    character(len=9) :: may_change = never   !! when the value may differ from the value at the start
+    character(len=100) :: otherwise = ""     !! the default in words, if the default is not a constant
   end type variable_t
 
   ! status     value                           line in the reference file

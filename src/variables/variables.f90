@@ -1,5 +1,5 @@
-!> The one table of input variables. It drives reading, checking, `--print-defaults`, `--explain`,
-!> `/parameters` in the output file and the reference page.
+!> The table of all input variables. The reading and checking of inputs, `--print-defaults`, `--explain`, `/parameters` in the
+!> output file and the reference page follow from this table.
 module variables
   use boundary_variables, only: boundary_rows
   use disk_variables, only: disk_rows
@@ -20,7 +20,8 @@ module variables
 
 contains
 
-  !> When a variable may have another value, by its full name, which may hold that of an instance: `side.left.velocity`.
+  !> When the value of a variable may differ from its value at the start. The full name of the variable may contain the name of an
+  !> instance, as in `side.left.velocity`.
   pure function change_of(name) result(when)
     character(len=*), intent(in) :: name
     character(len=len(never)) :: when
@@ -33,7 +34,7 @@ contains
     end do
   end function change_of
 
-  !> Whether a group may occur several times in a file, told apart by `name`.
+  !> Whether a group may occur several times in a file. The variable `name` distinguishes the instances of such a group.
   elemental function is_repeated(group)
     character(len=*), intent(in) :: group
     logical :: is_repeated
@@ -41,7 +42,7 @@ contains
     is_repeated = any(wall_groups == group) .or. group == "species"
   end function is_repeated
 
-  !> Names of the variables of a group, in order.
+  !> Names of the variables of a group, in the order of the table.
   pure function variables_of(group) result(names)
     character(len=*), intent(in) :: group
     character(len=name_length), allocatable :: names(:)
@@ -49,7 +50,7 @@ contains
     names = pack(table%name, table%group == group)
   end function variables_of
 
-  !> Row of a variable within its group, as in `variables_of`; 0 if there is none.
+  !> Row of a variable within its group, in the order of `variables_of`; 0 if the group does not contain the variable.
   pure function row_of(group, name) result(row)
     character(len=*), intent(in) :: group, name
     integer :: row
@@ -64,7 +65,8 @@ contains
     row = 0
   end function row_of
 
-  !> The variable of this name in every group that has one: `obstacle.radius or species.radius`; else empty.
+  !> The full names of the variables with a given name in all groups, as in `obstacle.radius or species.radius`; empty if there is
+  !> none.
   pure function full_names(name) result(text)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: text
@@ -78,7 +80,8 @@ contains
     end do
   end function full_names
 
-  !> Whether one variable is not given with another of its group; of those that time the same samples, one is.
+  !> Whether two variables of a group must not be given together. This also holds for two variables that determine the times of the
+  !> same samples.
   pure function excludes(one, other) result(yes)
     integer, intent(in) :: one, other        !! rows
     logical :: yes
@@ -87,7 +90,7 @@ contains
     if (other < one .and. track_of(table(one)%name) /= "") yes = track_of(table(one)%name) == track_of(table(other)%name)
   end function excludes
 
-  !> Names of the variables of its group that must not be given together with a variable.
+  !> Names of the variables that must not be given together with a variable of the same group.
   pure function excluded_by(row) result(names)
     integer, intent(in) :: row
     character(len=name_length), allocatable :: names(:)
@@ -97,7 +100,7 @@ contains
       k=1, size(table))])
   end function excluded_by
 
-  !> The first sentence of a help.
+  !> The first sentence of a help text.
   pure function first_sentence(help) result(sentence)
     character(len=*), intent(in) :: help
     character(len=:), allocatable :: sentence
@@ -105,7 +108,8 @@ contains
     sentence = help(:index(trim(help)//" ", ". "))
   end function first_sentence
 
-  !> Kind of samples whose times a variable sets: `frames` for frames_every_time; empty for variables that set no times.
+  !> Kind of samples whose times a variable sets, as `frames` for frames_every_time; empty for variables that do not set times of
+  !> samples.
   pure function track_of(name) result(track)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: track
@@ -113,7 +117,7 @@ contains
     track = name(:max(index(name, "_every_") - 1, 0))
   end function track_of
 
-  !> The words of a line.
+  !> The words in a line.
   pure function words_of(line) result(words)
     character(len=*), intent(in) :: line
     character(len=len(line)), allocatable :: words(:)
@@ -123,7 +127,7 @@ contains
     if (size(words) > 0) read (line, *) words
   end function words_of
 
-  !> Allowed values in words: `a number > 0`, `'wall' or 'periodic'`.
+  !> Allowed values in words, as in `a number > 0` or `'wall' or 'periodic'`.
   pure function allowed(row) result(words)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: words
