@@ -1,5 +1,5 @@
-!> The C interface for other programs. `ricochet.h` is its contract and describes each function. A handle is an open simulation. The
-!> functions print nothing, do not end the process, and share no data between handles.
+!> The C interface for other programs. `ricochet.h` is the reference of this interface and describes each function. A handle is an
+!> open simulation. The functions print nothing, do not end the process, and share no data between handles.
 module library
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_int64_t, c_loc, &
@@ -33,7 +33,7 @@ module library
   public :: advance_to, answer, begin, changes_of, goal_of, renew, session_of, session_t, text_of
 
   integer(c_int), parameter :: going_on = 1          !! the only result of `advance` that is not an exit code
-  integer, parameter :: most_logged = 1000000         !! smallest number of latest events that are kept
+  integer, parameter :: most_logged = 1000000         !! smallest number of latest events that the log keeps
 
   type :: session_t
     type(run_input_t) :: input
@@ -42,7 +42,7 @@ module library
     type(stop_rule_t) :: rule
     integer(int64) :: iterations = 1                  !! number of iterations between two checks of the clock
     logical :: logged = .false.                       !! events are logged
-    type(event_log_t) :: log                          !! latest events; older ones are dropped
+    type(event_log_t) :: log                          !! the latest events; older events are deleted
   end type session_t
 
 contains
@@ -70,7 +70,8 @@ contains
   !> Starts the engine of a new simulation and returns its handle; after an error the simulation is deallocated.
   function begin(session, threads, error) result(handle)
     type(session_t), pointer, intent(inout) :: session
-    integer(c_int), intent(in) :: threads             !! number of threads; 0: the value of the input, or one
+    integer(c_int), intent(in) :: threads             !! number of threads; 0 for the value in the input or, if the input contains
+                                                      !! none, one
     type(error_t), allocatable, intent(in) :: error
     type(c_ptr) :: handle
     character(len=:), allocatable :: warning
@@ -118,7 +119,7 @@ contains
     if (allocated(error) .or. code /= going_on) code = answer(error, message, room)
   end function advance
 
-  !> The rule by which an advance to these values ends; that of the input, if none of them is a limit.
+  !> The limits of an advance to the given values. If none of the values is a limit, the stop rule of the input applies.
   pure function goal_of(session, time, collisions, events) result(rule)
     type(session_t), intent(in) :: session
     real(real64), intent(in) :: time                  !! since the start of the run [time]
@@ -131,15 +132,15 @@ contains
     if (time >= never) rule%limits%time = never
   end function goal_of
 
-  !> Advances a simulation until a rule is met, or until several seconds have passed; `code` is then `going_on`.
+  !> Advances a simulation until a rule is met, or until `patience` seconds have passed. In the latter case `code` is `going_on`.
   subroutine advance_to(session, rule, patience, code, error)
     type(session_t), intent(inout) :: session
     type(stop_rule_t), intent(in) :: rule
-    real(real64), intent(in) :: patience              !! [s]
+    real(real64), intent(in) :: patience              !! wall-clock time after which the procedure returns [s]
     integer(c_int), intent(out) :: code
     type(error_t), allocatable, intent(out) :: error
     type(limits_t) :: limits
-    real(real64) :: began, looked                     ! [s]
+    real(real64) :: began, looked                     ! wall-clock time after which the procedure returns [s]
 
     code = going_on
     if (ieee_is_nan(rule%limits%time)) then
@@ -165,7 +166,7 @@ contains
     code = 0
   end subroutine advance_to
 
-  !> See ricochet.h. The changed input is stored as a new text, on which later changes and saved files are based.
+  !> See ricochet.h. The changed input is stored as a new text. Later changes and saved files are based on this text.
   function change(handle, overrides, message, room) bind(C, name="ricochet_change") result(code)
     type(c_ptr), value :: handle
     character(kind=c_char), intent(in) :: overrides(*)
@@ -221,7 +222,7 @@ contains
   !> Whether a changed input has the same values as the present one. A side that is not in the present input has the default values.
   function changes_nothing(session, lines, input) result(yes)
     type(session_t), intent(in) :: session
-    type(text_t), intent(in) :: lines(:)              !! changes as GROUP.VARIABLE=VALUE
+    type(text_t), intent(in) :: lines(:)              !! changes in the form GROUP.VARIABLE=VALUE
     type(run_input_t), intent(in) :: input            !! changed input
     logical :: yes, complete, new(size(lines))
     type(run_input_t) :: present
@@ -240,7 +241,7 @@ contains
     present%overrides = pack(lines, new)
     do k = 1, size(present%overrides)
       associate (override => present%overrides(k))
-        override%text = override%text(:index(override%text, "="))      ! without a value: the default
+        override%text = override%text(:index(override%text, "="))      ! an override without a value restores the default
       end associate
     end do
     call read_groups(input_of(session%input%groups), present%overrides, present%groups, problems, complete)
@@ -249,7 +250,7 @@ contains
     if (yes) yes = same_values(present%groups, input%groups)
   end function changes_nothing
 
-  !> Sets the positions of sides whose motion changes, such that the new motion continues from the present position.
+  !> Sets the positions of sides whose motion changes, so that the new motion continues at the present position.
   subroutine keep_sides(session, groups)
     type(session_t), intent(in) :: session
     type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
@@ -274,7 +275,7 @@ contains
           end associate
         end do
         if (same) cycle
-        inwards = 2*modulo(side, 2) - 1               ! direction along the axis
+        inwards = 2*modulo(side, 2) - 1               ! sign of the inward normal along the axis
         x = at((side + 1)/2, merge(1, 2, inwards > 0))
         position%given = any(group%text_of("motion") == [character(len=17) :: "still", "constant_velocity", "piston"])
         call position%clear()
@@ -324,7 +325,7 @@ contains
     code = answer(error, message, room)
   end function give_velocities
 
-  !> The list of changes so far.
+  !> The text that lists all changes so far.
   function changes_of(session) result(list)
     type(session_t), intent(in) :: session
     character(len=:), allocatable :: list
@@ -407,7 +408,7 @@ contains
       if (size(list) == 0) return
       width = list(1)%width
       sample = frame_sample(sim, 0_int64, list)
-      values(:width*n) = sample(3:, 1)                ! the first two numbers are step and time
+      values(:width*n) = sample(3:, 1)                ! the first two numbers of a sample are step and time
     end associate
   end function copy_column
 
@@ -459,7 +460,7 @@ contains
           do k = 1, size(groups(g)%values)
             if (.not. groups(g)%values(k)%is_set()) cycle
             most = most_written
-            ! All values, because they describe the geometry from a file.
+            ! All values are included, because they describe the geometry that was read from a file.
             if (any(obstacle_groups == groups(g)%name)) most = huge(most)
             call growing%add(groups(g)%value_line(k, most)//eol)
           end do
@@ -498,7 +499,7 @@ contains
     call give(error%message, message, room)
   end function answer
 
-  !> Copies a text into a C buffer; it is cut if the buffer is too short.
+  !> Copies a text into a C buffer. The text is truncated if the buffer is too short.
   subroutine give(text, buffer, room)
     character(len=*), intent(in) :: text
     character(kind=c_char), intent(inout) :: buffer(*)

@@ -1,4 +1,4 @@
-!> Single events and states of simulations: functions of the C interface `ricochet.h` beside those of `library`.
+!> Functions of the C interface `ricochet.h` in addition to those in `library`: single events, and states of simulations.
 module library_events
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int64_t, c_ptr
   use changes, only: change_positions
@@ -39,7 +39,7 @@ contains
     code = answer(error, message, room)
   end function copy
 
-  !> See ricochet.h. The log begins anew, unless the input has one.
+  !> See ricochet.h. The log is emptied first, unless the input requests an event log.
   function advance_event(handle, time, collisions, events, patience, message, room) bind(C, name="ricochet_advance_event") &
     result(code)
     type(c_ptr), value :: handle
@@ -75,7 +75,8 @@ contains
     if (n > 0) records(:, :n) = session%log%record(:, session%log%n - n + 1:session%log%n)
   end function last_events
 
-  !> See ricochet.h. The collisions are found by advancing a copy, because a disk may collide twice, or be kicked in between.
+  !> See ricochet.h. The collisions are found by advancing a copy of the simulation, because a disk may collide twice, or a kick may
+  !> change its velocity before its next collision.
   function next_events(handle, most, records) bind(C, name="ricochet_next_events") result(n)
     type(c_ptr), value :: handle
     integer(c_int), value :: most

@@ -41,7 +41,7 @@
 
    Lengths, times, masses and energies are in the units of the input. Disks are in the order of the input.
 
-   `message` is a buffer of `room` bytes for an error message, including the zero at its end; a longer message is cut.
+   `message` is a buffer of `room` bytes for an error message, including the zero at its end; a longer message is truncated.
    An exit code is 0 for success, 2 for invalid input, 3 for a file that cannot be read or written, and 4 for a
    simulation that broke off. Negative values of counts and of `room` are treated as 0.
 
@@ -57,7 +57,7 @@ typedef struct ricochet ricochet;
 /* Opens a simulation in its initial state.
    text:       contents of an input file; the group &stop may be missing
    overrides:  lines GROUP.VARIABLE=VALUE, which have precedence over the text; may be empty
-   threads:    number of threads; 0: the value of the input, or one
+   threads:    number of threads; 0 for the value in the input or, if the input contains none, one
    code:       exit code
    Returns a handle, or NULL after a failure. */
 ricochet *ricochet_open(const char *text, const char *overrides, int threads, char *message, int room, int *code);
@@ -70,20 +70,21 @@ void ricochet_close(ricochet *);
 
 /* Advances a simulation until the first of three values is reached, each counted from the start of the run: a time, a number of
    collisions of disks, or a number of events. INFINITY and INT64_MAX stand for no limit. Without any limit the stop rule of
-   the input is used, if there is one. The results do not depend on the number of calls in which a simulation is advanced.
-   Returns 0 when a limit is reached, 1 if `patience` seconds have passed before (call it again), or an exit code: 2 if `time` is
-   NAN, other codes if the simulation cannot be continued. */
+   the input applies, if the input contains one. The results do not depend on the number of calls in which a simulation is advanced.
+   Returns 0 when a limit is reached, 1 if `patience` seconds have passed before a limit is reached (call the function again), or
+   an exit code: 2 if `time` is NAN, other codes if the simulation cannot be continued. */
 int ricochet_advance(ricochet *, double time, int64_t collisions, int64_t events, double patience, char *message, int room);
 
-/* As ricochet_advance, but ends after the next event at the latest, with all events of its moment. Returns 0 also if no event
-   occurred before one of the limits was reached. The events are those that ricochet_last_events copies. */
+/* Advances a simulation as ricochet_advance, but at most to the time of the next event, and executes all events at this time.
+   The function also returns 0 if no event occurred before one of the limits was reached. ricochet_last_events copies the events
+   that were executed. */
 int ricochet_advance_event(ricochet *, double time, int64_t collisions, int64_t events, double patience, char *message, int room);
 
 /* Copies the latest events.
    most:     largest number of events
-   records:  as of ricochet_next_events
-   Returns the number of events. At least 1,000,000 events are kept if output.event_log is true in the input, else those of the
-   last call of ricochet_advance_event. */
+   records:  for each event the same values as in ricochet_next_events
+   Returns the number of events. At least the last 1,000,000 events can be copied if output.event_log is true in the input.
+   Otherwise only the events of the last call of ricochet_advance_event can be copied. */
 int ricochet_last_events(ricochet *, int most, double records[][6]);
 
 /* Time since the start of the run. */
@@ -96,30 +97,31 @@ void ricochet_count(ricochet *, int64_t counts[3]);
 /* Copies one property of all disks.
    name:    position, velocity, event_count, image, angular_velocity, orientation, radius, mass or species
    values:  array of WIDTH numbers for each disk
-   Returns the width: 2 for position, velocity and image, 1 for the others, or 0 if the disks do not have this property. */
+   Returns the width: 2 for position, velocity and image, 1 for the other properties, or 0 if the disks do not have this
+   property. */
 int ricochet_column(ricochet *, const char *name, double *values);
 
 /* Copies all observables at the present time.
    names:   buffer of `room` bytes for a line `NAME WIDTH` per observable; the width of an integer observable is negative
    values:  array of |WIDTH| numbers for each observable, at most 4
-   Returns the length of the names in bytes, without the zero at the end. If `room` is not larger than that, nothing is
-   copied. */
+   Returns the length of the names in bytes, without the zero at the end. Nothing is copied unless `room` is larger
+   than this length. */
 int ricochet_observables(ricochet *, char *names, int room, double *values);
 
 /* Changes forces, contact laws and motions at the present time.
    overrides:  lines GROUP.VARIABLE=VALUE of box.gravity, drive, contact, side, wall and obstacle
-   The change of the total energy counts as work. Returns an exit code; unless it is 0, nothing is changed. */
+   The change of the total energy counts as work. Returns an exit code; if the code is not 0, nothing is changed. */
 int ricochet_change(ricochet *, const char *overrides, char *message, int room);
 
 /* Sets the velocities of all disks at the present time.
    velocities:  x and y component for each disk
-   The change of the total energy counts as work. Returns an exit code; unless it is 0, nothing is changed. */
+   The change of the total energy counts as work. Returns an exit code; if the code is not 0, nothing is changed. */
 int ricochet_set_velocities(ricochet *, const double *velocities, char *message, int room);
 
 /* Sets the positions of all disks at the present time.
    positions:  x and y for each disk
-   Positions at which disks overlap each other, an obstacle or a side are refused, and any in a sheared box. The change of
-   the total energy counts as work. Returns an exit code; unless it is 0, nothing is changed. */
+   It is an error if disks overlap each other, an obstacle or a side at these positions, or if the box is sheared. The change
+   of the total energy counts as work. Returns an exit code; if the code is not 0, nothing is changed. */
 int ricochet_set_positions(ricochet *, const double *positions, char *message, int room);
 
 /* Copies a text that describes the simulation at the present time.
@@ -128,8 +130,8 @@ int ricochet_set_positions(ricochet *, const double *positions, char *message, i
           "changes": a line TIME GROUP.VARIABLE=VALUE for each change
           "note": a note about inelastic collapses, or about a gas that is too cold to continue; may be empty
    text:  buffer of `room` bytes
-   Returns the length of the text in bytes, without the zero at the end. If `room` is not larger than that, nothing is
-   copied. */
+   Returns the length of the text in bytes, without the zero at the end. Nothing is copied unless `room` is larger
+   than this length. */
 int ricochet_text(ricochet *, const char *what, char *text, int room);
 
 /* Predicts the next events without changing the simulation.
@@ -142,16 +144,17 @@ int ricochet_next_events(ricochet *, int most, double records[][6]);
 
 /* --- Only in libricochet_files.so --- */
 
-/* Saves a simulation as the unfinished output of a run that was stopped at the present time. `ricochet INPUT -o OUT.h5 --resume`
-   continues it. The file contains samples of the initial state only or, after a change, of the present state only.
+/* Saves a simulation as the unfinished output of a run that was stopped at the present time. The command
+   `ricochet INPUT -o OUT.h5 --resume` continues this run. The file contains only the samples of the initial state
+   or, after a change, only the samples of the present state.
    path:   path of the finished output, OUT.h5; the file that is written is OUT.h5.part
    force:  nonzero to replace an existing output
    Returns an exit code. */
 int ricochet_save(ricochet *, const char *path, int force, char *message, int room);
 
-/* Opens a simulation in the state of the last checkpoint of a run, finished or not.
+/* Opens a simulation in the state of the last checkpoint of a finished or unfinished run.
    path:     output of the run
-   threads:  number of threads; 0: the value of the input, or one
+   threads:  number of threads; 0 for the value in the input or, if the input contains none, one
    code:     exit code
    Returns a handle, or NULL after a failure. */
 ricochet *ricochet_load(const char *path, int threads, char *message, int room, int *code);

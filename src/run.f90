@@ -29,7 +29,8 @@ module run
   public :: perform_run
 
   integer, parameter :: most_unwritten = 4096              !! capacity of the event log [collisions]
-  integer(int64), parameter :: much = 250000000             !! size of the output above which it is announced [bytes]
+  integer(int64), parameter :: much = 250000000             !! size of the output above which the program prints it at the start
+                                                            !! [bytes]
 
   type :: run_t
     type(command_t) :: command
@@ -41,13 +42,14 @@ module run
     type(output_t) :: output
     type(progress_line_t) :: line
     real(real64) :: started = 0.0_real64                   !! time when the program started, by the clock `seconds` [s]
-    real(real64) :: rate = 0.0_real64                      !! collisions per processor time of this part [1/s]
-    integer(int64) :: serial_events = 0  !! number of events of this part executed by the serial engine of a parallel run
+    real(real64) :: rate = 0.0_real64                      !! collisions per processor time in this part of the run [1/s]
+    integer(int64) :: serial_events = 0  !! number of events in this part of the run that the serial engine of a parallel run
+                                         !! executed
   end type run_t
 
 contains
 
-  !> Reads the input and performs the run. `error` also carries the exit status of a run that was stopped.
+  !> Reads the input and performs the run. `error` also contains the exit status of a run that was stopped.
   subroutine perform_run(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
@@ -90,7 +92,7 @@ contains
     call run%output%release()
   end subroutine perform_run
 
-  !> Creates the state of a new run and opens its output. With --check it only reports that the input is valid.
+  !> Creates the state of a new run and opens the output. With --check the procedure only reports that the input is valid.
   subroutine begin(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
@@ -121,7 +123,7 @@ contains
     end associate
   end subroutine begin
 
-  !> Restores the state of a run and opens its output. With --check it only reports that the run can be resumed.
+  !> Restores the state of a run and opens the output. With --check the procedure only reports that the run can be resumed.
   subroutine go_on(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
@@ -148,7 +150,7 @@ contains
     end associate
   end subroutine go_on
 
-  !> Prints warnings about settings that are legal but rarely sensible.
+  !> Prints warnings about settings that are valid but rarely sensible.
   subroutine warn(run)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
@@ -159,7 +161,7 @@ contains
       "warning: stop.energy_fraction: no disk moves at the start, so that the rule is met at once"
   end subroutine warn
 
-  !> Advances the simulation to its end and measures the speed.
+  !> Advances the simulation to the end of the run and measures the speed of the program.
   subroutine follow(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
@@ -173,7 +175,7 @@ contains
     call cpu_time(cpu(2))
     run%rate = (run%sim%tally%collisions - collisions)/max(cpu(2) - cpu(1), 1.0e-9_real64)
     run%serial_events = run%evolution%serial_events
-    deallocate (run%evolution)                             ! releases memory for the end of the output
+    deallocate (run%evolution)                             ! frees memory for the completion of the output
   end subroutine follow
 
   !> Cost of this part of the run, for the output: see `write_end`.
@@ -184,7 +186,7 @@ contains
     cost = [seconds() - run%started, run%rate, real(run%serial_events, real64)]
   end function cost_of
 
-  !> Main loop: advances the simulation from one sample, checkpoint or check to the next, until its end.
+  !> Main loop: advances the simulation from one sample, checkpoint or check to the next, until the end of the run.
   subroutine main_loop(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
@@ -193,7 +195,7 @@ contains
     integer :: requests, requests_served
     logical :: stopping
     real(real64) :: now, next_checkpoint              ! [s]
-    real(real64) :: first_time                        ! time of the simulation at the beginning of this part [time]
+    real(real64) :: first_time                        ! time of the simulation at the start of this part of the run [time]
 
     iterations = 1
     requests_served = 0
@@ -218,17 +220,17 @@ contains
       if (allocated(error)) exit
       now = seconds()
       stopping = stop_requested()
-      ! Each part of a run makes some progress, however short the wall-clock limit is.
+      ! Each part of a run advances the simulation at least once, even if the wall-clock limit is very short.
       if (run%sim%time() > first_time .and. now - run%started > run%stop_rule%wall_clock) stopping = .true.
       requests = checkpoint_requests()
       if (stopping .or. requests > requests_served .or. now > next_checkpoint) then
         requests_served = requests
         call run%output%save(run%sim, error)
-        if (stop_requested()) stopping = .true.            ! requested during the write
+        if (stop_requested()) stopping = .true.            ! the stop was requested during the write
         if (stopping .and. .not. allocated(error)) call fail(error, exit_stopped, "stopped at time "// &
           written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to continue")
         if (allocated(error)) exit
-        next_checkpoint = seconds() + run%input%settings%output%checkpoint_every     ! counted from the end of the write
+        next_checkpoint = seconds() + run%input%settings%output%checkpoint_every     ! the interval starts at the end of the write
       end if
       call run%line%report(run%sim, run%stop_rule)
     end do
@@ -263,7 +265,8 @@ contains
     if (note(run) /= "") text = text//eol//"note = "//note(run)
   end function summary
 
-  !> A note about the results: collapses, and the reason of the end if no stop rule was met; empty if there is none.
+  !> A note about the results: collapses, and the reason why the run ended if no stop rule was met. The note is empty if there is
+  !> nothing to report.
   function note(run) result(text)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text

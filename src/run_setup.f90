@@ -29,11 +29,11 @@ module run_setup
 
 contains
 
-  !> Reads the file `path`, applies the overrides and checks everything. With `printed` the input is printed as far as it could be
-  !> interpreted, even if it is invalid.
+  !> Reads the file `path`, applies the overrides and checks everything. With `printed`, the part of the input that could be
+  !> interpreted is printed, even if the input is invalid.
   subroutine read_input(path, overrides, input, error, printed)
     character(len=*), intent(in) :: path
-    type(text_t), intent(in) :: overrides(:)                        !! overrides as GROUP.VARIABLE=VALUE
+    type(text_t), intent(in) :: overrides(:)                        !! overrides in the form GROUP.VARIABLE=VALUE
     type(run_input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error
     logical, intent(in), optional :: printed
@@ -43,7 +43,7 @@ contains
     if (.not. allocated(error)) call input_from_text(text, path, overrides, input, error, printed)
   end subroutine read_input
 
-  !> The same for a text; `path` is used only in messages. All problems are collected in one error.
+  !> The same for the text of an input; `path` is used only in messages. All problems are collected in one error.
   subroutine input_from_text(text, path, overrides, input, error, printed, stepped)
     character(len=*), intent(in) :: text
     character(len=*), intent(in) :: path
@@ -71,7 +71,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     logical, intent(in), optional :: stepped                        !! see `resolve_settings`
 
-    if (complete) then                                    ! otherwise values in skipped parts would be reported as missing
+    if (complete) then                                    ! otherwise variables in skipped parts would be reported as missing
       call resolve_settings(input%groups, input%settings, problems, stepped)
       call complete_settings(input%settings, input%groups, problems, complete)
       if (complete) call check_fit(input%settings, input%groups, problems)
@@ -123,11 +123,11 @@ contains
     end if
   end subroutine choose_evolution
 
-  !> Starts the threads of a run, which exist until it ends. A run that uses the serial engine has a single thread.
+  !> Starts the threads of a run, which exist until it ends. A run that uses the serial engine has one thread.
   subroutine start_threads(settings, warning)
     type(settings_t), intent(inout) :: settings
-    character(len=:), allocatable, intent(out) :: warning  !! warning about settings that are probably unintended; empty if there
-                                                           !! are none
+    character(len=:), allocatable, intent(out) :: warning  !! warning about settings that are probably unintended; empty if there is
+                                                           !! nothing to report
     character(len=:), allocatable :: name
     integer :: cores
     type(parallel_events_t) :: usual
@@ -152,9 +152,10 @@ contains
     call make_team(settings%run%threads)
   end subroutine start_threads
 
-  !> Determines the number of threads from the input or the environment; default: one.
+  !> Determines the number of threads from the input or the environment. The default is one thread.
   subroutine ask(threads, name)
-    integer, intent(inout) :: threads                      !! in: number of threads in the input; 0: not given
+    integer, intent(inout) :: threads                      !! in: number of threads in the input, or 0 if it is not given; out:
+                                                           !! number of threads to use
     character(len=:), allocatable, intent(out) :: name
     character(len=16) :: value
     integer :: status

@@ -15,16 +15,16 @@ module command_line
 
   type :: command_t
     character(len=:), allocatable :: question  !! question to be answered: help, version, print-defaults, print-variables or
-                                               !! explain; "": a run
+                                               !! explain; empty for a run
     character(len=:), allocatable :: topic         !! variable or word of --explain
     character(len=:), allocatable :: input         !! path of the input file
     character(len=:), allocatable :: output        !! path of the output file
     type(text_t), allocatable :: overrides(:)      !! GROUP.VARIABLE=VALUE of each --set
     logical :: resume = .false.
-    logical :: check = .false.                     !! only validate the input
-    logical :: print_input = .false.               !! only print the input as JSON
+    logical :: check = .false.                     !! .true.: only validate the input
+    logical :: print_input = .false.               !! .true.: only print the input as JSON
     logical :: quiet = .false.
-    logical :: force = .false.                     !! replace a finished output, or an unfinished one
+    logical :: force = .false.                     !! .true.: replace a finished or unfinished output
   end type command_t
 
   character(len=17), parameter :: switches(*) = [character(len=17) :: "--resume", "--check", "--quiet", "--force", &
@@ -48,7 +48,7 @@ contains
     call parse_arguments(arguments, command, error)
   end subroutine read_command_line
 
-  !> Converts the arguments to a command, or reports the first invalid one. Reading ends at a question.
+  !> Converts the arguments to a command, or reports the first invalid one. Arguments after a question are not read.
   subroutine parse_arguments(arguments, command, error)
     type(text_t), intent(in) :: arguments(:)
     type(command_t), intent(out) :: command
@@ -109,7 +109,7 @@ contains
       case ("--set")
         call take_value(name, override%text)
         call expect_assignment(override%text)
-        command%overrides = [command%overrides, override]    ! with a constructor `text_t(...)` gfortran 12 would lose the memory
+        command%overrides = [command%overrides, override]    ! a constructor `text_t(...)` would leak memory with gfortran 12
       case ("--explain")
         command%question = "explain"
         call take_value(name, command%topic)
@@ -132,7 +132,7 @@ contains
       end select
     end subroutine take_option
 
-    !> Reads the value after `=` or in the next argument.
+    !> Reads the value of an option, which is the text after `=` or the next argument.
     subroutine take_value(name, value)
       character(len=*), intent(in) :: name
       character(len=:), allocatable, intent(out) :: value
@@ -145,7 +145,7 @@ contains
       if (value == "") call refuse("option "//name//" needs a value")
     end subroutine take_value
 
-    !> Refuses `--set NAME VALUE`, in which the value would be read as a file name.
+    !> Reports an error for `--set NAME VALUE`, because the value would be interpreted as a file name.
     subroutine expect_assignment(text)
       character(len=*), intent(in) :: text
 

@@ -10,18 +10,18 @@ module input_groups
   public :: value_t, group_t, text_length, range_of, json_text, same_value, same_values
 
   integer, parameter :: text_length = 512      !! longest text value, in bytes
-  integer, parameter, public :: most_written = 100      !! longest list of values in an assignment; longer lists are cut
+  integer, parameter, public :: most_written = 100      !! largest number of values in an assignment; longer lists are truncated
 
   !> One variable. Real numbers are stored in `reals`, all other values in `texts`: integers as digits, so that all 64 bits are
-  !> kept, logicals as `.true.` or `.false.`. Without a value neither is allocated.
+  !> represented, and logicals as `.true.` or `.false.`. If the variable has no value, neither component is allocated.
   type :: value_t
     integer :: row = 0                         !! row in the table of variables
     character(len=name_length) :: name = ""
     character(len=8) :: kind = ""              !! "integer", "real", "logical" or "text"
-    logical :: given = .false.                 !! set by the user
-    logical :: faulty = .false.                !! set by the user, but invalid, which has been reported
-    integer :: line = 0                        !! line of the file, or -k for override k
-    integer :: elements = 0                    !! bit i: element i has been set (name(i) = value)
+    logical :: given = .false.                 !! the user has set the variable
+    logical :: faulty = .false.                !! the user has set an invalid value, which has been reported
+    integer :: line = 0                        !! line of the file in which the variable is set, or -k for override k
+    integer :: elements = 0                    !! bit mask: bit i is 1 if element i has been set by name(i) = value
     real(real64), allocatable :: reals(:)
     character(len=text_length), allocatable :: texts(:)
   contains
@@ -32,14 +32,14 @@ module input_groups
     procedure :: json
   end type value_t
 
-  !> One group of the input, or one instance of a repeated group. The functions return the value of a variable, or `otherwise` if it
-  !> has none.
+  !> One group of the input, or one instance of a repeated group. The functions return the value of a variable, or `otherwise` if
+  !> the variable has no value.
   type :: group_t
     character(len=8) :: name = ""
     character(len=text_length) :: instance = ""  !! `name` of an obstacle or species; otherwise blank
-    integer :: number = 0                      !! number among the groups of the same name, from 1
-    integer :: line = 0                        !! its first line in the file; 0: not in the file
-    integer :: first = 0, last = 0             !! position in the text, from & to /
+    integer :: number = 0                      !! number among the groups of the same name, which starts at 1
+    integer :: line = 0                        !! first line of the group in the file; 0 if the group is not in the file
+    integer :: first = 0, last = 0             !! positions of the first character (&) and the last character (/) in the text
     type(value_t), allocatable :: values(:)
   contains
     procedure :: integer_of, real_of, reals_of, text_of
@@ -83,9 +83,9 @@ contains
     end if
   end function integers
 
-  !> Whether all variables, given or default, have the same values in the groups of two inputs.
+  !> Whether all variables have the same values in the groups of two inputs. Default values are included.
   pure function same_values(one, other) result(yes)
-    type(group_t), intent(in) :: one(:), other(:)  !! in the same order
+    type(group_t), intent(in) :: one(:), other(:)  !! groups of the two inputs, in the same order
     logical :: yes
     integer :: g, k
 
@@ -112,7 +112,7 @@ contains
     end if
   end function same_value
 
-  !> Removes the value.
+  !> Removes the value of the variable.
   pure subroutine clear(self)
     class(value_t), intent(inout) :: self
 
@@ -133,7 +133,7 @@ contains
     end associate
   end function integer_of
 
-  !> All values of a variable of kind "real"; none if it has no value.
+  !> All values of a variable of kind "real"; an empty array if the variable has no value.
   pure function reals_of(self, name) result(numbers)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -165,7 +165,7 @@ contains
     end associate
   end function real_of
 
-  !> The first value of a variable of any kind except "real"; empty if it has none.
+  !> The first value of a variable of any kind except "real"; an empty text if the variable has no value.
   pure function text_of(self, name) result(text)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -217,7 +217,8 @@ contains
     self%values(row_of(self%name, name))%reals = numbers
   end subroutine put_reals
 
-  !> Reports a problem of a variable with the line where it is set or, if it is not set, the first line of its group.
+  !> Reports a problem of a variable. The report contains the line that sets the variable or, if the variable is not set, the first
+  !> line of its group.
   pure subroutine complain(self, name, what, problems)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -229,7 +230,7 @@ contains
     end associate
   end subroutine complain
 
-  !> Reports a variable that is required and missing.
+  !> Reports that a required variable is missing.
   pure subroutine demand(self, name, problems)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -240,10 +241,11 @@ contains
     end associate
   end subroutine demand
 
-  !> Sets choices that are not given and follow from variables that require them. The last such variable in the table decides.
+  !> Sets choices that are not given but follow from a variable that is used only with this choice. If several such variables are
+  !> given, the last one in the table determines the choice.
   pure subroutine infer_choices(self)
     class(group_t), intent(inout) :: self
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, followed by its words
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of the choice variable, followed by its allowed values
     integer :: k
 
     do k = 1, size(self%values)
@@ -253,12 +255,13 @@ contains
     end do
   end subroutine infer_choices
 
-  !> Checks choices. A choice may require a variable. A variable that does not apply to the choice has no value; if it is given,
-  !> that is reported, because nothing may be ignored silently. Mutually exclusive variables are reported as well.
+  !> Checks the variables that depend on choices. A choice may require a variable. If a variable has no effect with the present
+  !> choice, its value is removed, and a given value is reported as an error, because no part of an input may be ignored silently.
+  !> Mutually exclusive variables are reported as well.
   pure subroutine check_choices(self, problems)
     class(group_t), intent(inout) :: self
     type(problem_list_t), intent(inout) :: problems
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, followed by its words
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of the choice variable, followed by its allowed values
     character(len=len(table%goes_with)) :: word
     integer :: j, k
 
@@ -284,10 +287,11 @@ contains
     end do
   end subroutine check_choices
 
-  !> Indices of the first and the last group with one of these names. If there are none, the last index is smaller than the first.
+  !> Indices of the first and the last group with one of these names. If there are no such groups, the last index is smaller than
+  !> the first.
   pure function range_of(groups, names) result(range)
-    type(group_t), intent(in) :: groups(:)   !! in the order of the table
-    character(len=*), intent(in) :: names(:)           !! adjacent in the table
+    type(group_t), intent(in) :: groups(:)   !! groups in the order of the table
+    character(len=*), intent(in) :: names(:)           !! names that are adjacent in the table
     integer :: range(2), k
     logical :: named(size(groups))
 
@@ -300,7 +304,7 @@ contains
   pure function value_line(self, k, most) result(text)
     class(group_t), intent(in) :: self
     integer, intent(in) :: k                   !! index of the variable in the group
-    integer, intent(in), optional :: most      !! largest number of values; a longer list is cut
+    integer, intent(in), optional :: most      !! largest number of values; a longer list is truncated
     character(len=:), allocatable :: text
     integer :: longest
 
@@ -311,7 +315,7 @@ contains
     text = text//trim(self%values(k)%name)//" = "//self%values(k)%json(longest)
   end function value_line
 
-  !> The value or list of values as JSON. A list is cut if it is longer than `most`.
+  !> The value or list of values as JSON. A list with more than `most` values is truncated.
   pure function json(self, most) result(text)
     class(value_t), intent(in) :: self
     integer, intent(in), optional :: most

@@ -1,4 +1,4 @@
-!> The problems of an input, collected in order to be reported together.
+!> Collects the problems of an input, which are reported together.
 module input_problems
   use errors, only: error_t, exit_files, exit_usage
   use texts, only: legible, text_t, written
@@ -14,11 +14,12 @@ module input_problems
     character(len=:), allocatable :: text
   end type problem_t
 
-  !> The problems in the order of the report: by line, then those of the whole file, then those of overrides.
+  !> The problems in the order of the report: first the problems of lines of the file, by line, then the problems of the whole file,
+  !> then the problems of overrides.
   type :: problem_list_t
     integer :: count = 0
     integer :: unreadable = 0                   !! number of problems with unreadable files
-    logical :: cut_short = .false.              !! there were more problems than the list can hold
+    logical :: cut_short = .false.              !! there were more problems than the list can contain
     type(problem_t) :: items(most_problems)
   contains
     procedure :: add
@@ -66,7 +67,7 @@ contains
     class(problem_list_t), intent(in) :: self
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
-    type(text_t), intent(in), optional :: overrides(:)    !! overrides to which problems may refer
+    type(text_t), intent(in), optional :: overrides(:)    !! texts of the overrides, which are quoted in reports of their problems
     character(len=:), allocatable :: text, place
     integer :: k
 
@@ -81,7 +82,7 @@ contains
       end associate
     end do
     if (self%cut_short) text = text//new_line("a")//legible(path)//": there are more problems than these "//written(most_problems)
-    allocate (error)                            ! not by `fail`, which accepts a single line
+    allocate (error)                            ! `fail` is not used, because it accepts only a single line
     error%message = text(2:)
     error%code = merge(exit_files, exit_usage, self%unreadable == self%count)
   end subroutine report

@@ -1,4 +1,4 @@
-!> Converts the groups of the input to `settings`: derives values from others and checks combinations.
+!> Converts the groups of the input to `settings`. Derives values that follow from other values, and checks combinations of values.
 module input_settings
   use kinds, only: int64, never, real64
   use box_geometry, only: box_t
@@ -21,14 +21,14 @@ module input_settings
 
 contains
 
-  !> Fills the settings. Derived values are also stored in the groups, so that these contain every value as it is used.
+  !> Fills the settings. Derived values are also stored in the groups, so that the groups contain all values that the run uses.
   subroutine resolve_settings(groups, settings, problems, stepped)
     type(group_t), intent(inout) :: groups(:)             !! groups of the same name are adjacent
     type(settings_t), intent(out) :: settings
     type(problem_list_t), intent(inout) :: problems
-    logical, intent(in), optional :: stepped              !! the caller decides when the run ends; `&stop` may be empty
+    logical, intent(in), optional :: stepped              !! .true.: the caller ends the run, so that `&stop` may be empty
     logical :: must_end
-    type(wall_law_t) :: wall_law                          ! law in `&contact`
+    type(wall_law_t) :: wall_law                          ! the default law of walls, from `&contact`
     integer :: o(2), s(2), w(2), k
 
     must_end = .true.

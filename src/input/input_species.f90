@@ -1,4 +1,4 @@
-!> The species of the input: names, placement, velocities, and relations between species.
+!> Converts the species of the input to settings: names, placement, velocities, and relations between species.
 module input_species
   use kinds, only: int64, pi, real64
   use box_geometry, only: box_t
@@ -80,7 +80,7 @@ contains
       call take_pairs(group, "position", s%position)
     end subroutine take_placement
 
-    !> Polydispersity, and whether masses follow from radii.
+    !> Reads the polydispersity, and whether masses follow from radii.
     subroutine take_spread(group, s)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(inout) :: s
@@ -159,7 +159,7 @@ contains
     subroutine resolve_sizes()
       real(real64), dimension(size(species)) :: mass, radius
       character(len=:), allocatable :: wanted
-      integer :: base(size(species)), k, j, step            ! base: index of the species in `relative_to`; 0: none
+      integer :: base(size(species)), k, j, step            ! base: index of the species in `relative_to`, or 0
       logical :: fits
 
       do k = 1, size(species)
@@ -198,7 +198,8 @@ contains
       species%mean_radius = species%radius
     end subroutine resolve_sizes
 
-    !> The radius, as given, as a multiple, or from the packing fraction; 0 if it is unknown.
+    !> The radius of a species: the given radius, a multiple of the radius of another species, or the radius that follows from the
+    !> packing fraction; 0 if it is unknown.
     function own_radius(group, s, number) result(radius)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(in) :: s
@@ -210,7 +211,7 @@ contains
       relative = group%given("relative_to")
       radius = group%real_of("radius", 0.0_real64)
       if (group%given("packing_fraction") .and. (given .or. relative)) then
-        radius = 0                                        ! reported elsewhere
+        radius = 0                                        ! another procedure reports this problem
       else if (group%given("packing_fraction")) then
         if (s%count > 0 .and. area(s%region) > 0) &
           radius = sqrt(group%real_of("packing_fraction", 0.0_real64)*area(s%region)/(pi*s%count))
@@ -223,7 +224,8 @@ contains
     end function own_radius
   end subroutine take_species
 
-  !> Checks the name of an obstacle or species. It must be valid in file paths, override paths and messages, and unique.
+  !> Checks the name of an obstacle or species. The name must be unique, and valid in paths of the output file, in overrides and in
+  !> messages.
   subroutine check_name(groups, k, problems)
     type(group_t), intent(in) :: groups(:)                !! all obstacles, or all species
     integer, intent(in) :: k
@@ -238,14 +240,14 @@ contains
     else if (any(own_names() == name) .or. any(beside_species == name)) then
       call groups(k)%complain("name", shown(name)//" is reserved for the output file", problems)
     end if
-    do j = 1, k - 1                                       ! avoids a copy of all names for each of them
+    do j = 1, k - 1                                       ! a loop avoids a copy of all names for each name
       if (groups(j)%instance == name) exit
     end do
     if (j < k) call groups(k)%complain("name", shown(name)//" is already the name of the group in line "// &
       written(groups(j)%line), problems)
   end subroutine check_name
 
-  !> Area of a region; 0 if its ends are interchanged.
+  !> Area of a region; 0 if its lower and upper limits are interchanged.
   pure function area(region)
     real(real64), intent(in) :: region(4)                 !! xlo, xhi, ylo, yhi [length]
     real(real64) :: area

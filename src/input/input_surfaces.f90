@@ -35,7 +35,7 @@ contains
       call take_points(groups(k), problems)
       do v = 1, size(groups(k)%values)
         associate (value => groups(k)%values(v))
-          if (table(value%row)%status /= "example") cycle           ! has a default, or is optional
+          if (table(value%row)%status /= "example") cycle           ! the variable has a default or is optional
           if (.not. has_many(groups(k))) call groups(k)%demand(trim(value%name), problems)
           complete = complete .and. value%is_set()
         end associate
@@ -62,7 +62,7 @@ contains
 
     !> The straight walls of a group.
     subroutine take_walls(from, to)
-      real(real64), intent(in) :: from(:), to(:)          !! x and y of each wall [length]
+      real(real64), intent(in) :: from(:), to(:)          !! x and y of the two end points of each wall [length]
       integer :: i
 
       do i = 1, size(to)/2
@@ -72,7 +72,7 @@ contains
 
     !> The circles of a group.
     subroutine take_circles(centre, radius, encloses)
-      real(real64), intent(in) :: centre(:)               !! x and y of each circle [length]
+      real(real64), intent(in) :: centre(:)               !! x and y of the centre of each circle [length]
       real(real64), intent(in) :: radius(:)               !! [length]
       logical, intent(in) :: encloses
       integer :: i
@@ -91,7 +91,7 @@ contains
     yes = has(group, "file") .or. has(group, "points")
   end function has_many
 
-  !> Whether the group has a variable of this name and it is given.
+  !> Whether the group contains a variable of this name and the user has set the variable.
   pure function has(group, name) result(yes)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: name
@@ -100,7 +100,7 @@ contains
     yes = any(group%values%name == name .and. group%values%given)
   end function has
 
-  !> Stores the obstacles of a file in the variables of a single obstacle.
+  !> Stores the obstacles from a file as values of the variables that describe a single obstacle.
   subroutine take_file(group, problems)
     type(group_t), intent(inout) :: group
     type(problem_list_t), intent(inout) :: problems
@@ -140,7 +140,7 @@ contains
     end associate
   end subroutine take_points
 
-  !> The laws of all walls: from their own groups or, by default, from `&contact`.
+  !> The contact laws of all walls, from the groups of the walls or, by default, from `&contact`.
   subroutine take_wall_laws(sides, obstacles, otherwise, box, problems)
     type(group_t), intent(inout) :: sides(:)
     type(group_t), intent(inout) :: obstacles(:)
@@ -171,7 +171,7 @@ contains
         width = box%upper(axis) - box%lower(axis)
         call take_motion(sides(k), box%surface(side)%motion)
         if (.not. box%surface(side)%motion%moves()) cycle
-        ! Opposite sides must never touch each other, whatever their phases are.
+        ! Opposite sides must never touch each other, for any phases of their motions.
         if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%innermost_position()) >= width) call sides(k)%complain( &
           culprit(box%surface(side)%motion), "lets the sides meet, which are "// &
           written(width)//" apart (box.upper)", problems)
@@ -183,7 +183,7 @@ contains
 
   contains
 
-    !> The law of one wall. Values that follow from `&contact` are stored in its group.
+    !> The contact law of one wall. Values that follow from `&contact` are stored in the group of the wall.
     subroutine take_law(group, law)
       type(group_t), intent(inout) :: group
       type(wall_law_t), intent(out) :: law
@@ -267,7 +267,7 @@ contains
       problems)
   end subroutine check_least
 
-  !> Tangential law of disks or walls, from variables whose names have a prefix in &contact.
+  !> Tangential contact law of disks or walls, from variables whose names begin with a given prefix in &contact.
   subroutine take_grip(group, prefix, otherwise, grip, problems)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: prefix

@@ -1,9 +1,10 @@
-!> The text of an input file: its bytes, lines and tokens. Fortran's own namelist reader silently accepts invalid text, names
-!> neither line nor variable, and can crash. The text is therefore read here and in `namelist_input`, with a small strict grammar:
+!> The text of an input file: its bytes, lines and tokens. The namelist reader of Fortran accepts some invalid texts without a
+!> message, its messages contain neither the line nor the variable, and it can crash. The text is therefore read by this module and
+!> `namelist_input`, with a small and strict grammar:
 !>
 !>     &group  name = value, value  name(2) = value  name = 3*value  /     ! comment
 !>
-!> All other text is reported with its line number.
+!> Any other text is reported as an error with its line number.
 module input_text
   use kinds, only: int64
   use errors, only: error_t, exit_files, exit_usage, fail
@@ -20,24 +21,24 @@ module input_text
   character(len=1), parameter :: control(*) = [(achar(i), i=0, 8), achar(11), achar(12), (achar(i), i=14, 31), achar(127)]
   character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
 
-  !> Kinds of tokens, besides quotes and single characters such as & and =.
+  !> Kinds of tokens. The kind of a quoted text or of a single character such as & or = is the character itself.
   character(len=1), parameter :: word = "w", unclosed = "u", junk = "?", ending = "e"
   character(len=*), parameter :: blanks = " "//achar(9), quotes = "'""", marks = "&/=,()"
   character(len=*), parameter :: word_characters = digits//".+-"//letters//"_*%#:$@?<>|[]{}~^`\"
 
-  !> A token. `first` and `last` are its position in the text, including quotes.
+  !> A token. `first` and `last` are the positions of its first and last character in the text, including quotes.
   type :: token_t
     character(len=1) :: kind
     integer :: first, last, line
-    integer :: repeats                           !! the 3 of 3*value
+    integer :: repeats                           !! repeat count: the 3 in 3*value
   end type token_t
 
   type :: assignment_t
     integer :: line = 0                          !! > 0: line of the file; otherwise not in the file, see `value_t`
     character(len=:), allocatable :: where       !! group.variable, for messages
-    integer :: element = 0                       !! the 2 of name(2) = value; 0: none
-    type(token_t), allocatable :: tokens(:)      !! tokens of its values
-    logical :: sound = .true.                    !! .false.: problems of the assignment have been reported
+    integer :: element = 0                       !! index of an element: the 2 in name(2) = value; 0 if there is no index
+    type(token_t), allocatable :: tokens(:)      !! tokens of the values of the assignment
+    logical :: sound = .true.                    !! .false. if problems of the assignment have been reported
   end type assignment_t
 
 contains
@@ -110,7 +111,7 @@ contains
     if (advice /= "") advice = "; did you mean "//advice//"?"
   end function advice
 
-  !> The text with line feeds as the only line ends, without byte order mark, and with a line feed at the end.
+  !> The text in a normal form: line feeds are the only line ends, there is no byte order mark, and the text ends in a line feed.
   pure function unix_lines(text) result(lines)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: lines
@@ -171,7 +172,7 @@ contains
 
   contains
 
-    !> Finds the end of a quoted text, which must be in the same line. Doubled quotes represent a single one.
+    !> Finds the end of a quoted text, which must be in the same line. Two quotes in succession represent one quote in the text.
     pure subroutine end_quote(token)
       type(token_t), intent(inout) :: token
 
@@ -188,7 +189,7 @@ contains
     end subroutine end_quote
   end subroutine cut
 
-  !> The value of a token. Doubled quotes are replaced by single ones.
+  !> The value of a token. Two quotes in succession are replaced by one quote.
   pure function content(text, token) result(value)
     character(len=*), intent(in) :: text
     type(token_t), intent(in) :: token
@@ -207,7 +208,7 @@ contains
     value = value(:n)
   end function content
 
-  !> A name in the form used in messages: cut and quoted if it is long.
+  !> A name in the form used in messages: a long name is truncated and quoted.
   pure function plain(name)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: plain

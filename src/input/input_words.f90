@@ -17,8 +17,8 @@ module input_words
 
 contains
 
-  !> Stores the values of an assignment in `slot`. Invalid values are reported; the slot is then marked as faulty and keeps its
-  !> previous value.
+  !> Stores the values of an assignment in `slot`. Invalid values are reported. In this case `slot` is marked as faulty and its
+  !> previous value does not change.
   subroutine store_values(slot, text, assignment, problems)
     type(value_t), intent(inout) :: slot
     character(len=*), intent(in) :: text                 !! text to which the tokens refer
@@ -82,14 +82,14 @@ contains
       end if
     end subroutine check_number
 
-    !> A hint if one real number was written with a decimal comma, as in `0,9`.
+    !> A hint for the case that one real number was written with a decimal comma, as in `0,9`.
     function decimal_hint() result(hint)
       character(len=:), allocatable :: hint
 
       hint = ""
       associate (tokens => assignment%tokens)
         do k = 1, size(tokens), 2
-          if (tokens(k + 1)%first /= tokens(k)%last + 2) return     ! more than a comma between them
+          if (tokens(k + 1)%first /= tokens(k)%last + 2) return     ! there is more than a comma between the two numbers
           if (verify(content(text, tokens(k + 1)), digits) > 0) return
         end do
         hint = "; did you mean "//content(text, tokens(1))//"."//content(text, tokens(2))// &
@@ -97,7 +97,7 @@ contains
       end associate
     end function decimal_hint
 
-    !> Checks one word and stores it behind the first n values.
+    !> Checks one word and stores it after the first n values.
     subroutine store_token(token, word)
       type(token_t), intent(in) :: token
       character(len=*), intent(in) :: word
@@ -137,7 +137,8 @@ contains
       end if
     end subroutine store_token
 
-    !> Checks a text: it must be in quotes (except in overrides), not too long, and one of the choices, if there are any.
+    !> Checks a text. It must be in quotes (except in overrides), and it must not be too long. If the variable has choices, the text
+    !> must be one of them.
     subroutine check_text(word, quoted)
       character(len=*), intent(in) :: word
       logical, intent(in) :: quoted
@@ -185,14 +186,14 @@ contains
     if (status == 0) problem = ""
   end subroutine read_integer
 
-  !> Reads a decimal number with an optional exponent e or d, as in Fortran. It must be zero or have a size between 1e-100 and
-  !> 1e100, so that neither overflow nor denormal numbers can occur.
+  !> Reads a decimal number with an optional exponent e or d, as in Fortran. The number must be 0, or its absolute value must be
+  !> between 1e-100 and 1e100, so that neither overflow nor denormal numbers can occur.
   pure subroutine read_real(word, value, problem)
     character(len=*), intent(in) :: word
     real(real64), intent(out) :: value
     character(len=:), allocatable, intent(out) :: problem
     integer, parameter :: longest = 60
-    character(len=longest) :: mantissa                 ! without the decimal point
+    character(len=longest) :: mantissa                 ! the digits without the decimal point
     integer :: mark, exponent, status
 
     value = 0
@@ -211,7 +212,7 @@ contains
     end if
     problem = ""
     if (scan(word(:mark - 1), "123456789") == 0) return
-    if (abs(exponent) <= 200) then                 ! so short a word neither overflows nor underflows
+    if (abs(exponent) <= 200) then                 ! a word of this length cannot overflow or underflow then
       read (word, "(f60.0)", iostat=status) value
       if (status == 0 .and. abs(value) >= smallest .and. abs(value) <= largest) return
     end if

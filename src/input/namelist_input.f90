@@ -1,4 +1,4 @@
-!> Reads the input text and the `--set` overrides: tokens, assignments, values. All problems are collected.
+!> Reads the input text and the `--set` overrides, and converts their tokens to assignments and values. All problems are collected.
 module namelist_input
   use input_groups, only: group_t, value_t
   use input_problems, only: most_problems, problem_list_t
@@ -12,7 +12,7 @@ module namelist_input
   private
   public :: read_groups
 
-  integer, parameter :: most_instances = 5000, most_repeats = 10000000  !! largest number of groups of one name; largest n in
+  integer, parameter :: most_instances = 5000, most_repeats = 10000000  !! largest number of groups with the same name; largest n in
                                                                         !! n*value
 
 contains
@@ -23,18 +23,20 @@ contains
     type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
     type(group_t), allocatable, intent(out) :: groups(:)  !! in the order of the table; groups of the same name are adjacent
     type(problem_list_t), intent(out) :: problems
-    logical, intent(out) :: complete                                !! .false.: parts of the text were skipped
+    logical, intent(out) :: complete                                !! .false. if parts of the text were skipped
     type(value_t) :: defaults(size(table))
     type(group_t), allocatable :: found(:)                          ! groups in the order of the text
     integer :: n, i, j, k                                           ! n: number of groups found
-    character(len=:), allocatable :: source                         ! text that is being read: a default, the input, or an override
+    character(len=:), allocatable :: source                         ! the text that is read at present: a default, the input, or an
+                                                                    ! override
     type(token_t), allocatable :: token(:)                          ! tokens of the source
     integer :: at                                                   ! index of the next token
-    character(len=:), allocatable :: own                            ! name of the open group, for messages
-    integer :: group  ! index of the group to which assignments belong; 0: its name is unknown
-    integer :: opened                                               ! first line of the open group; 0: none is open
-    logical :: too_many                                             ! too many groups of one name
-    logical :: quote_open  ! a quote is not closed in this group; its / may be part of a text
+    character(len=:), allocatable :: own                            ! name of the group that is read at present, for messages
+    integer :: group  ! index of the group to which assignments belong; 0 if the name of the group is unknown
+    integer :: opened                                               ! first line of the group that is read at present; 0 between
+                                                                    ! groups
+    logical :: too_many                                             ! there are too many groups with the same name
+    logical :: quote_open  ! a quote in this group is not closed, so that the / may be part of a text
 
     complete = .true.
     too_many = .false.
@@ -46,7 +48,7 @@ contains
     end do
     allocate (found(size(group_names) + n_sides + min(count([(text(k:k) == "&", k=1, len(text))]), &
       count(is_repeated(group_names))*most_instances)))
-    do k = 1, size(group_names)                                     ! groups that cannot be repeated exist from the start
+    do k = 1, size(group_names)                                     ! groups that must not be repeated are created at the start
       if (.not. is_repeated(group_names(k))) call add_group(group_names(k), 0, 1)
     end do
     call open_source(unix_lines(text))
@@ -69,7 +71,7 @@ contains
 
   contains
 
-    !> Begins to read another text.
+    !> Starts to read another text.
     subroutine open_source(text)
       character(len=*), intent(in) :: text
 
@@ -78,7 +80,7 @@ contains
       at = 1
     end subroutine open_source
 
-    !> Whether the next tokens are of these kinds.
+    !> Whether the next tokens have the given kinds.
     function follow(kinds)
       character(len=*), intent(in) :: kinds
       logical :: follow
@@ -90,7 +92,8 @@ contains
     !> Adds a group with the defaults of the table.
     subroutine add_group(name, line, number)
       character(len=*), intent(in) :: name
-      integer, intent(in) :: line, number                 !! number: index among the groups of this name
+      integer, intent(in) :: line, number                 !! line: first line of the group; number: index among the groups of this
+                                                          !! name
       integer, allocatable :: rows(:)
       integer :: v
 
@@ -107,12 +110,12 @@ contains
       end associate
     end subroutine add_group
 
-    !> Stores a value that is not from the file: a default or an override, in which texts need no quotes.
+    !> Stores a value that is not from the file, which is a default or an override. Texts in such values need no quotes.
     subroutine assign_text(slot, text, line, element)
       type(value_t), intent(inout) :: slot
       character(len=*), intent(in) :: text
       integer, intent(in) :: line                         !! -k for override k; 0 for a default
-      integer, intent(in) :: element                      !! index of the value; 0: all values of the variable
+      integer, intent(in) :: element                      !! index of the value; 0 for all values of the variable
       type(assignment_t) :: assignment
 
       call open_source(text//eol)
@@ -146,7 +149,7 @@ contains
           if (follow("&"//word) .and. lower_case(content(source, token(at + 1))) == "end") then
             call problems%add(token(at)%line, own, "a group ends with /, not with &end")
             at = at + 2
-          else if (.not. quote_open) then                 ! otherwise the quote may contain the end
+          else if (.not. quote_open) then                 ! otherwise the end of the group may be inside the quoted text
             call problems%add(opened, own, "the closing / is missing")
           end if
           opened = 0
@@ -159,7 +162,8 @@ contains
       end do
     end subroutine read_text
 
-    !> Reads the text between groups. Only `&name` is allowed; other text is skipped up to a line that begins with &.
+    !> Reads the text between groups, in which only `&name` is allowed. Other text is reported and skipped up to a line that begins
+    !> with &.
     subroutine between_groups()
       character(len=:), allocatable :: problem
 
@@ -222,7 +226,7 @@ contains
       end if
     end subroutine read_assignment
 
-    !> Reads the `(2)` of `name(2) = value`.
+    !> Reads the index of an element, as the `(2)` in `name(2) = value`.
     subroutine read_element(assignment)
       type(assignment_t), intent(inout) :: assignment
       integer :: status
@@ -279,7 +283,7 @@ contains
       assignment%tokens = pack(token(first:at - 1), token(first:at - 1)%kind /= ",")
     end subroutine read_values
 
-    !> Reads the repeat count of `3*value`; the value may be text in quotes.
+    !> Reads a repeat count, as in `3*value`. The value may be a text in quotes.
     subroutine read_repeats(assignment)
       type(assignment_t), intent(inout) :: assignment
       integer :: star, status
@@ -298,7 +302,7 @@ contains
         if (own%first <= own%last) return
         if (scan(next%kind, "'"""//unclosed) > 0 .and. next%first == own%first) then
           next%repeats = own%repeats
-          own%kind = ","                                  ! the count has been used
+          own%kind = ","                                  ! marks that the repeat count has been used
         else
           call complain(assignment, "a value is missing after the *")
         end if
@@ -311,7 +315,7 @@ contains
       integer :: instances
 
       own = plain(name)
-      do group = n, 1, -1                                 ! the latest of this name, 0 if there is none
+      do group = n, 1, -1                                 ! finds the last group with this name; 0 if there is none
         if (found(group)%name == name) exit
       end do
       instances = 0
@@ -329,7 +333,7 @@ contains
       else
         if (.not. too_many) call problems%add(opened, name, "more than "//written(most_instances)//" groups of this name" &
           //trim(merge("; a file may hold many obstacles (file)", repeat(" ", 39), any(obstacle_groups == name))))
-        too_many = .true.                                 ! reported once
+        too_many = .true.                                 ! reported only once
         group = 0
       end if
       if (group > 0) found(group)%first = token(at)%first
@@ -359,7 +363,7 @@ contains
       end associate
     end subroutine take_assignment
 
-    !> Reports an unknown variable, which may be misspelt, renamed, or in another group.
+    !> Reports an unknown variable. Its name may be misspelt, an earlier name, or the name of a variable in another group.
     subroutine report_unknown(group, name, line)
       character(len=*), intent(in) :: group, name
       integer, intent(in) :: line
@@ -375,7 +379,7 @@ contains
       call problems%add(line, trim(group)//"."//plain(name), "unknown variable; "//advice)
     end subroutine report_unknown
 
-    !> Sets the name of an obstacle or species that has none.
+    !> Sets the name of an obstacle or species whose name is not given.
     subroutine name_instance(group)
       type(group_t), intent(inout) :: group
 
@@ -384,8 +388,8 @@ contains
       group%instance = group%text_of("name")
     end subroutine name_instance
 
-    !> Applies an override `GROUP.VARIABLE=VALUE` or `GROUP.NAME.VARIABLE=VALUE`. VARIABLE may be an element, as in `gravity(2)`. An
-    !> empty VALUE restores the default.
+    !> Applies an override `GROUP.VARIABLE=VALUE` or `GROUP.NAME.VARIABLE=VALUE`. VARIABLE may be one element of an array, as in
+    !> `gravity(2)`. An empty VALUE restores the default.
     subroutine override(text, line)
       character(len=*), intent(in) :: text
       integer, intent(in) :: line                         !! -k for override k
@@ -425,10 +429,10 @@ contains
       end if
     end subroutine override
 
-    !> Separates the index of an element from the name of a variable. Brackets without a number stay in the name.
+    !> Separates the index of an element from the name of a variable. Brackets without a number remain part of the name.
     subroutine split_element(name, element)
       character(len=:), allocatable, intent(inout) :: name
-      integer, intent(out) :: element                     !! 0: no element
+      integer, intent(out) :: element                     !! index of the element; 0 if there is no index
       integer :: bracket
 
       element = 0
@@ -441,7 +445,8 @@ contains
       if (element > 0) name = name(:bracket - 1)
     end subroutine split_element
 
-    !> A sampling interval in an override replaces that of the file for the same samples.
+    !> Removes the sampling interval that the file contains for the same samples as an interval in an override, because the override
+    !> replaces it.
     subroutine replace_cadence(group, name)
       type(group_t), intent(inout) :: group
       character(len=*), intent(in) :: name                !! name of the variable that is set
@@ -456,7 +461,8 @@ contains
       end do
     end subroutine replace_cadence
 
-    !> Finds the group to which an override refers; 0, with a report, if there is none. A missing group of a side is created.
+    !> Finds the group to which an override refers. A missing group of a side is created. If there is no such group, the result is 0
+    !> and the problem is reported.
     subroutine find_group(group, instance, line, g)
       character(len=*), intent(in) :: group, instance
       integer, intent(in) :: line

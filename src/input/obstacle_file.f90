@@ -29,10 +29,10 @@ contains
     yes = index(path//"|", ".h5|") > 0
   end function is_hdf5
 
-  !> Reads the obstacles, or reports the place of a problem in the file.
+  !> Reads the obstacles from a file, or reports a problem and its place in the file.
   subroutine read_obstacles(path, walls, rows, error)
     character(len=*), intent(in) :: path
-    logical, intent(in) :: walls                           !! straight walls, not circles
+    logical, intent(in) :: walls                           !! .true. for straight walls, .false. for circles
     real(real64), allocatable, intent(out) :: rows(:, :)   !! (columns,n) in the order of `of_circles` or `of_walls` [length]
     type(error_t), allocatable, intent(out) :: error
 
@@ -58,7 +58,7 @@ contains
     if (allocated(error)) return
     do k = 1, size(rows, 2)
       do c = 1, size(rows, 1)
-        wrong = .not. ieee_is_finite(rows(c, k))           ! comparisons with NaN are trapped in debug builds
+        wrong = .not. ieee_is_finite(rows(c, k))           ! tested first, because debug builds stop at comparisons with NaN
         if (.not. wrong) wrong = abs(rows(c, k)) > largest .or. (c == 3 .and. .not. walls .and. rows(c, k) < smallest)
         if (.not. wrong) cycle
         call fail(error, exit_usage, path//": row "//written(k)//": "//written(rows(c, k))//" is out of range")
@@ -70,12 +70,12 @@ contains
   !> Reads the obstacles from a text file.
   subroutine read_text(path, walls, rows, error)
     character(len=*), intent(in) :: path
-    logical, intent(in) :: walls                           !! straight walls, not circles
+    logical, intent(in) :: walls                           !! .true. for straight walls, .false. for circles
     real(real64), allocatable, intent(out) :: rows(:, :)   !! (columns,n) in the order of `of_circles` or `of_walls` [length]
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: text, line, problem
     character(len=6), allocatable :: names(:)
-    integer, allocatable :: column(:)  ! index in `names` of each column of the file; empty while they are unknown
+    integer, allocatable :: column(:)  ! index in `names` of each column of the file; empty before the first line has been read
     integer :: first(longest_line), last(longest_line)     ! position of each word in the line
     integer(int64) :: past
     integer :: number, n, n_words
@@ -162,7 +162,7 @@ contains
     if (is_hdf5(path)) return
     call read_file(path, text, problem)
     number = 0
-    rows = -1                                              ! the line of names precedes the obstacles
+    rows = -1                                              ! the line of names is not an obstacle
     past = 1
     do while (past <= len(text, int64) .and. rows < n)
       call next_line(text, past, line)
@@ -176,13 +176,13 @@ contains
   !> Reads the next line of a text.
   subroutine next_line(text, past, line)
     character(len=*), intent(in) :: text
-    integer(int64), intent(inout) :: past                  !! in: beginning of the line; out: beginning of the line after it
+    integer(int64), intent(inout) :: past                  !! in: first position of the line; out: first position of the next line
     character(len=:), allocatable, intent(out) :: line
     integer(int64) :: begin
 
     begin = past
     past = begin + index(text(begin:), eol, kind=int64)
-    if (past == begin) past = len(text, int64) + 2         ! the last line may lack a line end
+    if (past == begin) past = len(text, int64) + 2         ! the last line may have no line end
     line = text(begin:past - 2)
     if (begin == 1 .and. index(line, byte_order_mark) == 1) line = line(len(byte_order_mark) + 1:)
   end subroutine next_line

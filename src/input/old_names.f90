@@ -1,4 +1,5 @@
-!> Names of variables and choices in earlier versions, and their present names, which are reported if an input uses an old one.
+!> Names of variables and choices in earlier versions, and the corresponding present names. If an input uses an old name, the
+!> message contains the present name.
 module old_names
   use variables, only: name_length
   implicit none
@@ -31,10 +32,10 @@ module old_names
 
 contains
 
-  !> The present name of a variable or choice that was renamed; empty if it was not.
+  !> The present name of a variable or choice that was renamed; empty if the name is not an old one.
   pure function new_name(group, name, choice) result(now)
     character(len=*), intent(in) :: group, name
-    character(len=*), intent(in) :: choice     !! blank: the variable
+    character(len=*), intent(in) :: choice     !! old name of the choice; blank for the variable itself
     character(len=:), allocatable :: now
     integer :: k
 
@@ -44,7 +45,8 @@ contains
     end do
   end function new_name
 
-  !> The variables or choices that replace an old one; empty if there are none. Variables are found with or without their group.
+  !> The variables or choices that replace an old variable or choice; empty if there are none. The name of a variable may be given
+  !> with or without its group.
   pure function present_names(name, of_choices) result(names)
     character(len=*), intent(in) :: name
     logical, intent(in) :: of_choices

@@ -1,5 +1,5 @@
 !> The radii of the disks of a species: equal, or drawn from a distribution. The largest possible radius is ten times the smallest
-!> one. Radii beyond these limits are drawn again, and a distribution with many radii beyond them is refused.
+!> one. A radius beyond these limits is drawn again. A distribution with many radii beyond the limits is not allowed.
 module radii
   use kinds, only: int64, real64
   use random_stream, only: random_stream_t
@@ -8,10 +8,11 @@ module radii
   private
   public :: drawn_radii, largest_radius, widest_spread
 
-  integer, parameter :: purpose = 7                         !! identifies the random streams of this module
-  real(real64), parameter :: part = 9.0_real64/11           !! largest deviation from the mean, relative to the mean
-  real(real64), parameter :: powers = 0.5_real64*log(10.0_real64)   !! largest deviation of logarithms
-  real(real64), parameter :: deviations = 3                 !! the limits must be at least this many standard deviations away
+  integer, parameter :: purpose = 7                         !! number that identifies the random streams of this module
+  real(real64), parameter :: part = 9.0_real64/11           !! largest deviation of a radius from the mean, relative to the mean
+  real(real64), parameter :: powers = 0.5_real64*log(10.0_real64)   !! largest deviation of the logarithm of a radius from its mean
+  real(real64), parameter :: deviations = 3                 !! smallest allowed distance of the limits from the mean, in standard
+                                                            !! deviations
 
 contains
 

@@ -14,7 +14,8 @@ module settings
   private
   public :: run_input_t, settings_t, run_settings_t, sampling_t, species_settings_t, output_settings_t, disks_in_file_t
 
-  integer, parameter :: many_disks = 500000           !! number of disks from which domains that fit into the cache pay
+  integer, parameter :: many_disks = 500000           !! smallest number of disks for which domains that fit into the cache save
+                                                      !! time on one core
 
   type :: run_settings_t
     character(len=:), allocatable :: title
@@ -23,69 +24,76 @@ module settings
     real(real64) :: dt                                !! time step of 'steps' [time]
     character(len=:), allocatable :: search           !! 'cells', 'pairs' or 'rescan'
     character(len=:), allocatable :: queue            !! 'calendar' or 'heap'
-    integer :: threads                                !! in: 0 for the value of the environment; later the number used
-    integer :: threads_asked = 1                      !! number requested
+    integer :: threads                                !! number of threads; in: 0 for the value of the environment; later the number
+                                                      !! that is used
+    integer :: threads_asked = 1                      !! number of threads that was requested
   end type run_settings_t
 
   !> Disks read from a file.
   type :: disks_in_file_t
     real(real64), allocatable :: table(:, :)          !! (column_names,n) see `position_file`; deallocated when the disks are placed
-    logical, allocatable :: there(:)                  !! (column_names) whether the file contains each column
+    logical, allocatable :: there(:)                  !! (column_names) for each column, whether the file contains it
     integer, allocatable :: rows(:)                   !! (n) lines of a text file, or rows in the last frame of a run
-    type(error_t), allocatable :: error               !! reason why they cannot be used
+    type(error_t), allocatable :: error               !! reason why the disks cannot be used
   end type disks_in_file_t
 
   !> A species and its initial state.
   type, extends(species_t) :: species_settings_t
-    real(real64) :: radius = 0.0_real64               !! radius of each disk, or the largest one, from a file or drawn [length]
+    real(real64) :: radius = 0.0_real64               !! radius of each disk, or the largest radius if radii are drawn or from a
+                                                      !! file [length]
     real(real64) :: mean_radius = 1.0_real64          !! mean of the radius distribution [length]
-    real(real64) :: polydispersity = 0.0_real64        !! standard deviation over mean of the radii; 0: all are equal
+    real(real64) :: polydispersity = 0.0_real64        !! standard deviation of the radii divided by their mean; 0 if all radii are
+                                                       !! equal
     character(len=:), allocatable :: distribution     !! 'uniform', 'gaussian', 'lognormal'
-    logical :: mass_by_area = .false.                 !! masses are proportional to areas; `mass` belongs to the mean radius
-    logical :: mass_in_file = .false.                 !! masses are from the file, if it contains them
-    logical :: radius_in_file = .false.               !! radii are from the file
-    logical :: spin_in_file = .false.                 !! angular velocities are from the file
+    logical :: mass_by_area = .false.                 !! masses are proportional to areas; `mass` is then the mass of a disk with
+                                                      !! the mean radius
+    logical :: mass_in_file = .false.                 !! masses are read from the file, if the file contains masses
+    logical :: radius_in_file = .false.               !! radii are read from the file
+    logical :: spin_in_file = .false.                 !! angular velocities are read from the file
     logical :: angle_in_file = .false.                !! the file contains orientations
-    logical :: is_base = .false.                      !! sizes of other species are relative to this one
+    logical :: is_base = .false.                      !! mass and radius of other species are relative to those of this species
     real(real64) :: region(4)                         !! xlo, xhi, ylo, yhi [length]
     character(len=:), allocatable :: placement        !! 'random', 'grid', 'lattice', 'dense', 'explicit', 'file', 'grown'
-    integer :: grid(2)                                !! nx, ny; 0, 0 when not given
+    integer :: grid(2)                                !! numbers of columns and rows; 0, 0 if they are not given
     character(len=:), allocatable :: file             !! for placement 'file' or 'grown': text file, or HDF5 file of a run
-    logical :: scale_positions = .false.              !! scale positions from the box of that run to this box
+    logical :: scale_positions = .false.              !! positions are scaled from the box of that run to the box of this run
     type(disks_in_file_t) :: in_file
-    real(real64), allocatable :: position(:, :)       !! (2,count) for 'explicit' [length]; otherwise (2,0)
+    real(real64), allocatable :: position(:, :)       !! (2,count) given positions for 'explicit' [length]; otherwise shape (2,0)
     character(len=:), allocatable :: velocities       !! 'rest', 'equal_speed', 'uniform', 'maxwell', 'explicit', 'file'
-    real(real64) :: speed                             !! for 'equal_speed' and 'uniform' (half width) [length/time]
+    real(real64) :: speed                             !! speed for 'equal_speed', and largest velocity component for 'uniform'
+                                                      !! [length/time]
     real(real64) :: temperature                       !! kT for 'maxwell' [energy]
-    real(real64) :: exact_temperature = -1.0_real64   !! kT to which velocities are scaled; negative: not given [energy]
+    real(real64) :: exact_temperature = -1.0_real64   !! kT to which velocities are scaled; negative if it is not given [energy]
     real(real64), allocatable :: velocity(:, :)       !! (2,count), or (2,1) for all disks, for 'explicit'; otherwise (2,0)
     real(real64) :: angular_velocity = 0.0_real64     !! angular velocity of all disks [1/time]
-    real(real64) :: rotational_temperature = -1.0_real64  !! mean of I omega**2; negative: not given [energy]
+    real(real64) :: rotational_temperature = -1.0_real64  !! kT of rotation, the mean of I omega**2; negative if it is not given
+                                                          !! [energy]
   end type species_settings_t
 
-  !> Quantities by which samples are scheduled, as in the names of variables.
+  !> Quantities by which samples are scheduled, in the form used in the names of variables.
   character(len=19), parameter, public :: sampled_by(4) = [character(len=19) :: "time", "collisions", "events", &
     "collisions_per_disk"]
 
-  !> Kinds of samples, as in the names of variables.
+  !> Kinds of samples, in the form used in the names of variables.
   character(len=11), parameter, public :: sampled(2) = [character(len=11) :: "frames", "observables"]
 
   !> A sampling schedule. An interval that is not set is `never`.
   type :: sampling_t
     real(real64) :: every(4) = never                  !! interval for each of `sampled_by`
-    real(real64), allocatable :: at(:)                !! given times in ascending order [time]
-    integer :: per_decade = 0                         !! number of times per decade; 0: none
-    real(real64) :: from = never                      !! the first of these times [time]
+    real(real64), allocatable :: at(:)                !! given sampling times in ascending order [time]
+    integer :: per_decade = 0                         !! number of logarithmic sampling times per decade; 0 if there are none
+    real(real64) :: from = never                      !! first logarithmic sampling time [time]
   end type sampling_t
 
   type :: output_settings_t
     type(sampling_t) :: sampling(2)                   !! schedule for each of `sampled`
-    character(len=text_length), allocatable :: frame_columns(:)  !! columns besides positions; not allocated: all
-    logical :: single_precision                       !! precision == 'single'
+    character(len=text_length), allocatable :: frame_columns(:)  !! columns of frames in addition to positions; not allocated for
+                                                                 !! all columns
+    logical :: single_precision                       !! frames are stored in single precision
     logical :: event_log
-    logical :: virial_tensor                          !! also for smooth disks
-    logical :: helfand                                !! accumulate the Helfand moments
-    real(real64) :: checkpoint_every                  !! interval of wall-clock time [s]
+    logical :: virial_tensor                          !! the virial tensor is accumulated for smooth disks as well
+    logical :: helfand                                !! the Helfand moments are accumulated
+    real(real64) :: checkpoint_every                  !! wall-clock time between two checkpoints [s]
   end type output_settings_t
 
   type, extends(system_t) :: settings_t
@@ -105,10 +113,11 @@ module settings
     character(len=:), allocatable :: path                !! path of the input file, for messages
     character(len=:), allocatable :: text                !! contents of the input file
     type(text_t), allocatable :: overrides(:)            !! GROUP.VARIABLE=VALUE of each --set
-    real(real64) :: saved_at = -1.0_real64  !! time at which a simulation in memory was saved; negative: it was not [time]
+    real(real64) :: saved_at = -1.0_real64  !! time at which a simulation in memory was saved; negative if it was not saved [time]
     character(len=:), allocatable :: changes             !! changes during the run, with a line `TIME VARIABLE=VALUE` for each
-    type(group_t), allocatable :: groups(:)    !! groups with every value as used
-    type(settings_t) :: settings                         !! the same as typed data
+                                                         !! change
+    type(group_t), allocatable :: groups(:)    !! groups with all values that the run uses
+    type(settings_t) :: settings                         !! the same values as typed data
   end type run_input_t
 
 contains

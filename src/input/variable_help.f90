@@ -35,7 +35,7 @@ contains
     end do
   end function defaults_text
 
-  !> Characters with which each line of a group begins in the reference file, where groups of boundaries are commented out.
+  !> Characters at the beginning of each line of a group in the reference file. Groups of boundaries are comments in this file.
   pure function margin(group)
     character(len=*), intent(in) :: group
     character(len=:), allocatable :: margin
@@ -69,7 +69,8 @@ contains
     padded = text//repeat(" ", max(comment_column - len(text), 0))
   end function padded
 
-  !> Answers `--explain` for a variable with or without its group, for a group, or for a word in names, choices or helps.
+  !> Answers `--explain`. The topic is a variable with or without its group, a group, or a word that is searched in names, choices
+  !> and help texts.
   pure subroutine explain(name, text, error)
     character(len=*), intent(in) :: name
     character(len=:), allocatable, intent(out) :: text
@@ -110,8 +111,8 @@ contains
     end do
   end function explanations
 
-  !> The name of a variable without the number of an element and the name of a species or boundary:
-  !> `species.velocity` of `species.gas.velocity(2)`.
+  !> The name of a variable without the index of an element and without the name of a species or boundary, as `species.velocity` for
+  !> `species.gas.velocity(2)`.
   pure function bare(name)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: bare
@@ -123,9 +124,9 @@ contains
     if (last > first) bare = bare(:first)//bare(last + 1:)
   end function bare
 
-  !> A line for each variable whose name or help contains a text, and for each such choice.
+  !> A line for each variable whose name or help contains a text, and for each choice whose name or meaning contains this text.
   pure function matches(wanted) result(text)
-    character(len=*), intent(in) :: wanted                 !! in lower case
+    character(len=*), intent(in) :: wanted                 !! the text, in lower case
     character(len=:), allocatable :: text
     integer :: k, c
 
@@ -201,7 +202,8 @@ contains
     end if
   end function default_of
 
-  !> The choice for which a variable has an effect; empty if it always has one. In &species the variable can imply the choice.
+  !> The choice with which a variable has an effect; empty if the variable always has an effect. In &species the choice can follow
+  !> from the variable.
   pure function condition_of(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
@@ -289,8 +291,9 @@ contains
       member("changeable", .true., trim(merge("true ", "false", row%may_change == in_motion)))
   end function row_text
 
-  !> The groups of an input in the order of the file, each with its given variables. `from` and `to` are its position in bytes of
-  !> the file, counted from 0, without byte order mark and with line feeds as line ends; null: not in the file.
+  !> The groups of an input in the order of the file, each with its given variables. `from` and `to` are the positions of the first
+  !> and last byte of the group in the file. They start at 0 and apply to the text without byte order mark and with line feeds as
+  !> line ends. They are null if the group is not in the file.
   pure function groups_text(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -320,7 +323,8 @@ contains
     text = "["//growing%text()//eol//"]"
   end function groups_text
 
-  !> An input file with the same content. Sizes of species have their resolved values, without `relative_to`.
+  !> An input file with the same content as the groups. Masses and radii of species have their final values, so that `relative_to`
+  !> is omitted.
   pure function input_of(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -356,7 +360,7 @@ contains
     text = growing%text()
   contains
 
-    !> A value that is not a real number, with texts in quotes.
+    !> The text of a value that is not a real number. A text is in quotes.
     pure function word(kind, value)
       character(len=*), intent(in) :: kind, value
       character(len=:), allocatable :: word
