@@ -1,10 +1,15 @@
 """The program started from Python: `ricochet.run`."""
 
+import copy
+import gc
 import io
+import multiprocessing
 import re
 import signal
 import subprocess
 import sys
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -103,6 +108,75 @@ def test_nothing_is_left_of_a_run_without_output(tmp_path):
     assert (python.returncode, python.stderr) == (0, "")
     assert python.stdout.strip() and not Path(python.stdout.strip()).exists()
     assert [path.name for path in tmp_path.iterdir()] == ["gas.nml"]
+
+
+def left(folder):
+    """Folders of temporary runs."""
+    return [path for path in folder.iterdir() if path.name.startswith("ricochet-")]
+
+
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    """The folder where temporary files are made, in worker processes, too."""
+    (tmp_path / "tmp").mkdir()
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "tmp"))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    yield tmp_path / "tmp"
+    tempfile.tempdir = None
+
+
+def test_a_temporary_file_lives_as_long_as_something_reads_it(temporary):
+    """Of a run, of its frames, or of a copy; with an output there is none."""
+    run = package.run(GROUPS)
+    again, frames = copy.deepcopy(run), run.velocity
+    place = run.path
+    del run
+    assert place.exists() and again.observable("collisions")[-1] == 30
+    del again
+    assert np.isfinite(frames.mean()) and len(left(temporary)) == 1
+    del frames
+    gc.collect()
+    assert not place.exists() and not left(temporary)
+    package.run(GROUPS, output=temporary / "kept.h5")
+    assert not left(temporary)
+    with pytest.raises(ProgramError):
+        package.run(GROUPS, {"contact.restitution": 2})
+    assert not left(temporary)
+    for _ in range(3):
+        package.run(GROUPS)
+        assert not left(temporary)
+
+
+def number(seed):
+    return package.run(GROUPS, {"run.seed": seed}).n_frames
+
+
+def whole_run(seed):
+    return package.run(GROUPS, {"run.seed": seed})
+
+
+def mean_of(run):
+    return float(run.velocity.mean())
+
+
+def refused(seed):
+    return package.run(GROUPS, {"contact.restitution": seed})
+
+
+def test_worker_processes_leave_no_temporary_folders(temporary):
+    """Whether they return numbers or runs, take runs, or fail."""
+    here = package.run(GROUPS)
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
+        assert len(list(pool.map(number, range(1, 4)))) == 3 and len(left(temporary)) == 1
+        runs = list(pool.map(whole_run, range(1, 4)))
+        assert list(pool.map(mean_of, [here, here])) == 2 * [mean_of(here)]
+        with pytest.raises(ProgramError, match="from 0 to 1") as caught:
+            pool.submit(refused, 2).result()
+        assert caught.value.code == USAGE
+    assert [run.seed for run in runs] == [1, 2, 3]
+    assert all(np.isfinite(run.velocity.mean()) for run in (*runs, here))
+    del runs
+    assert [path.samefile(here.path.parent) for path in left(temporary)] == [True]
 
 
 class Notebook(io.StringIO):

@@ -1,13 +1,19 @@
 """Open HDF5 files of runs, and prepare paths of results."""
 
+import multiprocessing
+import shutil
+import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
+from multiprocessing.util import Finalize
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+
+PRIORITY = 10  # of the removal of folders among what is done when a process ends
 
 
 class RunError(Exception):
@@ -90,3 +96,40 @@ def destination(path: Path) -> Path:
     if path.exists() and path.stat().st_nlink > 1:
         path.unlink()  # other hard links keep the old content
     return path
+
+
+class TemporaryFolder:
+    """Folder of a run without output, removed when nothing that reads its file is alive any more.
+
+    A run that a worker process returns is removed by the process that receives it; a run that is
+    sent to workers, when this process ends.
+    """
+
+    def __init__(self, path: Path | None = None):
+        """Make a folder, or take over the folder of a worker process."""
+        self.path = Path(tempfile.mkdtemp(prefix="ricochet-")) if path is None else path
+        self.removal = Finalize(self, shutil.rmtree, (self.path, True), exitpriority=PRIORITY)
+
+    def remove(self) -> None:
+        """Remove the folder now."""
+        self.removal()
+
+    def keep(self) -> None:
+        """Remove the folder when this process ends, and not before."""
+        if self.removal.still_active():
+            self.removal.cancel()
+            Finalize(None, shutil.rmtree, (self.path, True), exitpriority=PRIORITY)
+
+    def __deepcopy__(self, _: object) -> "TemporaryFolder":
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Hand the folder over."""
+        in_worker = multiprocessing.parent_process() is not None
+        self.removal.cancel() if in_worker else self.keep()
+        return received, (self.path, in_worker)
+
+
+def received(path: Path, sent_by_worker: bool) -> TemporaryFolder | None:
+    """Return the folder of a run that another process has sent, if this one has to remove it."""
+    return TemporaryFolder(path) if sent_by_worker else None

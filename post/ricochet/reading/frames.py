@@ -5,7 +5,7 @@ Objects of both kinds behave as arrays in expressions and in functions of NumPy:
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -127,6 +127,7 @@ class Frames(Values):
     path: Path
     name: str
     shape: tuple[int, ...]  # (T, N), or (T, N, 2)
+    folder: object = field(default=None, repr=False)  # keeps a temporary file while this is alive
 
     def __len__(self) -> int:
         return self.shape[0]

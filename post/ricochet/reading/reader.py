@@ -159,6 +159,7 @@ class Run:
     parameters: dict[str, Any]  # group -> variable -> value used in the run
     provenance: dict[str, Any]
     units: Units = field(default=UNNAMED, kw_only=True)  # names of the units for labels of axes
+    folder: object = field(default=None, kw_only=True, repr=False)  # keeps a temporary file
 
     def __repr__(self) -> str:
         """Return one line for any number of disks."""
@@ -895,17 +896,21 @@ def read_run(path: str | Path) -> Run:
     >>> ricochet.read_run(run.path).n_disks
     64
     """
-    path = Path(path)
+    return open_run(Path(path))
+
+
+def open_run(path: Path, folder: object = None) -> Run:
+    """Open the output file of a run; `folder` lives as long as anything that reads the file."""
     with open_file(path) as file:
         if DISKS not in file or "h5md" not in file:
             raise Unsound("an HDF5 file, but not of a Ricochet run")
         major, minor = file["h5md"].attrs["version"]
         if major != 1:
             raise Unsound(f"H5MD version {major}.{minor}, this program reads 1.x")
-        return run_of(path, file)
+        return run_of(path, file, folder)
 
 
-def run_of(path: Path, file: h5py.File) -> Run:
+def run_of(path: Path, file: h5py.File, folder: object = None) -> Run:
     """Return the run that an open file contains."""
     disks, count = file[DISKS], committed(file, DISKS)
     if {"pressure", "wall_collisions"} & set(file["observables"]):
@@ -914,7 +919,7 @@ def run_of(path: Path, file: h5py.File) -> Run:
     if count == 0:
         raise Unsound("holds no frame yet")
     frames = {
-        name: Frames(path, name, (count, *item["value"].shape[1:]))
+        name: Frames(path, name, (count, *item["value"].shape[1:]), folder)
         for name, item in disks.items()
         if isinstance(item, h5py.Group) and "value" in item
     }
@@ -926,8 +931,8 @@ def run_of(path: Path, file: h5py.File) -> Run:
         path=path,
         time=rows(disks["position/time"], count),
         position=frames.pop("position"),
-        velocity=frames.pop("velocity", Frames(path, "velocity", plane)),
-        image=frames.pop("image", Frames(path, "image", plane) if any(periodic) else None),
+        velocity=frames.pop("velocity", Frames(path, "velocity", plane, folder)),
+        image=frames.pop("image", Frames(path, "image", plane, folder) if any(periodic) else None),
         event_count=frames.pop("event_count", None),
         disk_data=frames,
         mass=rows(disks["mass"]),
@@ -941,6 +946,7 @@ def run_of(path: Path, file: h5py.File) -> Run:
         walls=walls_of(parameters),
         parameters=parameters,
         provenance=tree(file["provenance"]),
+        folder=folder,
     )
 
 

@@ -4,13 +4,11 @@ The program reports its progress only to a terminal; therefore its standard erro
 pseudo-terminal.
 """
 
-import atexit
 import os
 import re
 import shutil
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from numbers import Integral
@@ -21,8 +19,8 @@ import numpy as np
 from tqdm import tqdm
 
 from ..commands import HERE
-from ..reading.files import RunError, did_you_mean
-from ..reading.reader import Run, read_run
+from ..reading.files import RunError, TemporaryFolder, did_you_mean
+from ..reading.reader import Run, open_run
 
 STOPPED = 75
 PROGRESS = "\033[?7l"  # start of each update of the program's progress line on a terminal
@@ -43,6 +41,10 @@ class ProgramError(RunError):
         """Store the message, which has several lines if the input contains several errors."""
         super().__init__(message)
         self.message, self.code, self.path = message, code, path
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return all parts, so that worker processes can report the error."""
+        return type(self), (self.message, self.code, self.path)
 
 
 def run(
@@ -65,7 +67,7 @@ def run(
         values of variables, as in `{"species.gas.mass": 2}` or `{"contact": {"restitution": 0.9}}`;
         None stands for the default of a variable
     output : str or Path, optional
-        the output file [a temporary file, which is removed when Python ends]
+        the output file [a temporary file, which is removed with the last object that reads it]
     force, resume : bool
         the options of the program with these names
     threads : int, optional
@@ -92,12 +94,13 @@ def run(
     (20, 3)
     """
     program = find_program()
-    work = Path(tempfile.mkdtemp(prefix="ricochet-"))
-    atexit.register(shutil.rmtree, work, ignore_errors=True)
+    folder = TemporaryFolder()
+    work = folder.path
     groups = namelist(system) if isinstance(system, Mapping) else None
     if (text := unseen(system)) is not None:
         system = work / "input.nml"
         system.write_text(text, encoding="utf-8")
+    temporary = output is None
     output = work / "run.h5" if output is None else Path(output)
     cores = {"run.threads": threads} if whole_threads(threads) else {}
     pairs = settings_of({} if overrides is None else overrides) + settings_of(cores)
@@ -111,11 +114,13 @@ def run(
         part = output.with_name(f"{output.name}.part")
         written = part.is_file() and part.stat().st_mtime > began - 1  # newer than this run
         message = without_options(named(message, groups), pairs)
+        if temporary and written:
+            folder.keep()
         message = message or f"{program} ended with exit code {code}"
         raise ProgramError(message, code, part if written else None)
     if message:
         print(message, file=sys.stderr)
-    return read_run(output)
+    return open_run(output, folder if temporary else None)
 
 
 def example(name: str) -> Path:
