@@ -97,7 +97,7 @@ def test_what_is_missing_shows_before_anything_runs(study):
     run = study("gas", PYTHON="/nowhere/python")
     assert run.returncode == 2 and "make demo" in run.stderr.splitlines()[-1]
     run = study("figures", "gasses")
-    assert run.returncode == 2 and "there are: scattering" in run.stderr.splitlines()[-1]
+    assert run.returncode == 2 and "known: scattering" in run.stderr.splitlines()[-1]
 
 
 @pytest.mark.parametrize(("per_collision", "code"), [(2080, 0), (2120, 1), (0, 1)])
