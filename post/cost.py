@@ -24,7 +24,7 @@ LABELS = {
 
 
 def costs(runs: list[Run]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return N and the least time per collision in microseconds for each search, in ascending N."""
+    """Return N (ascending) and the shortest time per collision in microseconds for each search."""
     least: dict[str, dict[int, float]] = {}
     for run in runs:
         points = least.setdefault(str(run.parameter("run", "search", "cells")), {})

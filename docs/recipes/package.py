@@ -1,5 +1,5 @@
-# Spack: put it into packages/ricochet/ of a repository of yours, with the address of this project
-# as `git`. Not tried here.
+# Recipe for Spack: copy this file into packages/ricochet/ of your repository, with the address of
+# this project as `git`. Not tried here.
 from spack.package import *
 from spack_repo.builtin.build_systems.makefile import MakefilePackage
 

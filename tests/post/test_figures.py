@@ -194,7 +194,7 @@ def test_speeds_are_drawn_in_units_of_the_input_on_request(tmp_path, rng, figure
         assert np.sum(steps.values * np.diff(steps.edges)) == pytest.approx(1, abs=0.02)
     mixed = maxwellian(tmp_path / "mixed.h5", rng, mass=np.repeat([1.0, 4.0], 200))
     assert run_script("speeds", mixed, "-o", out, "--unscaled") == 2
-    assert "mixed.h5: has several masses; mixture.py" in capsys.readouterr().err
+    assert "mixed.h5: its disks have several masses; mixture.py" in capsys.readouterr().err
 
 
 def test_the_coefficient_of_speeds_is_explained_beside_its_band(tmp_path, rng, figures):

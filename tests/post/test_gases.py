@@ -918,4 +918,4 @@ def test_a_profile_and_a_map_are_drawn_with_their_numbers(simulated, tmp_path, c
     soon = ("stop.time=20", "output.frames_every_time=2", "output.observables_every_time=2")
     early = simulated(ROOT / "input/fourier.nml", *soon, name="early").path
     assert "flow_expected" not in drawn(tmp_path, "fields", early)[0]
-    assert "warning: no gas has these fluxes" in capsys.readouterr().err
+    assert "warning: no profile agrees with these fluxes" in capsys.readouterr().err

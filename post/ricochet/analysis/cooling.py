@@ -319,7 +319,7 @@ def rough_law(run: Run) -> tuple[float, float, float]:
     Returns
     -------
     tuple of float
-        normal and tangential restitution, and moment of inertia over m r^2
+        normal and tangential restitution, and moment of inertia divided by m r^2
 
     Raises
     ------

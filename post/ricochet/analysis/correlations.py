@@ -70,7 +70,7 @@ def lags_of(times: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     times : numpy.ndarray
-        (T,) times of the samples, each later than the one before
+        (T,) times of the samples in increasing order
 
     Returns
     -------

@@ -110,7 +110,7 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
     run : Run
         a run
     skip : float, optional
-        collisions per disk that are left out at the start [until nothing drifts]
+        collisions per disk that are left out at the start [until no observable drifts]
 
     Returns
     -------
@@ -180,7 +180,7 @@ def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
     run : Run
         a run
     skip : float, optional
-        collisions per disk that are left out at the start [until nothing drifts]
+        collisions per disk that are left out at the start [until no observable drifts]
 
     Returns
     -------
@@ -385,7 +385,7 @@ def temperature(run: Run, skip: float | None = None) -> SeriesMean:
     run : Run
         a run
     skip : float, optional
-        collisions per disk that are left out at the start [until nothing drifts]
+        collisions per disk that are left out at the start [until no observable drifts]
 
     Returns
     -------
@@ -429,7 +429,7 @@ def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
     mass : float
         mass of the disk
     skip : float, optional
-        collisions per disk that are left out at the start [until nothing drifts]
+        collisions per disk that are left out at the start [until no observable drifts]
 
     Returns
     -------
@@ -571,7 +571,7 @@ def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:
     run : Run
         a run
     skip : float, optional
-        collisions per disk that are left out at the start [until nothing drifts]
+        collisions per disk that are left out at the start [until no observable drifts]
 
     Returns
     -------
@@ -601,7 +601,7 @@ def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
     run : Run
         a run
     skip : float, optional
-        collisions per disk that are left out at the start [until nothing drifts]
+        collisions per disk that are left out at the start [until no observable drifts]
 
     Returns
     -------
@@ -630,7 +630,7 @@ def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
     run : Run
         a run
     skip : float, optional
-        collisions per disk that are left out at the start [until nothing drifts]
+        collisions per disk that are left out at the start [until no observable drifts]
 
     Returns
     -------
@@ -663,7 +663,7 @@ def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
     run : Run
         a run
     skip : float, optional
-        collisions per disk that are left out at the start [until nothing drifts]
+        collisions per disk that are left out at the start [until no observable drifts]
 
     Returns
     -------
@@ -695,7 +695,7 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     run : Run
         a run
     skip : float, optional
-        collisions per disk that are left out at the start [until nothing drifts]
+        collisions per disk that are left out at the start [until no observable drifts]
 
     Returns
     -------
@@ -727,7 +727,7 @@ def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     run : Run
         a run
     skip : float, optional
-        collisions per disk that are left out at the start [until nothing drifts]
+        collisions per disk that are left out at the start [until no observable drifts]
 
     Returns
     -------
@@ -767,7 +767,7 @@ def pair_rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     run : Run
         a run
     skip : float, optional
-        collisions per disk that are left out at the start [until nothing drifts]
+        collisions per disk that are left out at the start [until no observable drifts]
 
     Returns
     -------
@@ -806,7 +806,7 @@ def rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     run : Run
         a run
     skip : float, optional
-        collisions per disk that are left out at the start [until nothing drifts]
+        collisions per disk that are left out at the start [until no observable drifts]
 
     Returns
     -------

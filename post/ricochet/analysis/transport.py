@@ -177,7 +177,7 @@ def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
     return correlated_mean((far - near[: len(far)]) / (2 * step * (lag - half)))
 
 
-# --- coefficients over those of Enskog ---
+# --- coefficients relative to those of Enskog ---
 
 
 class Found(NamedTuple):
@@ -301,7 +301,7 @@ def coefficients(runs: list[Run], skip: float | None = None) -> dict[str, Found]
     runs : list of Run
         (R,) runs of one system, with `output.helfand`
     skip : float, optional
-        collisions per disk that are left out at the start [until nothing drifts]
+        collisions per disk that are left out at the start [until no observable drifts]
 
     Returns
     -------

@@ -332,7 +332,7 @@ def haff_by_collisions(tau: np.ndarray, xi: float) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        (T,) kinetic energy over that at the start
+        (T,) kinetic energy divided by its initial value
 
     Examples
     --------
@@ -357,7 +357,7 @@ def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        (T,) kinetic energy over that at the start
+        (T,) kinetic energy divided by its initial value
 
     Examples
     --------

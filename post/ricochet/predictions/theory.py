@@ -196,7 +196,7 @@ def rough_ratio(xi: float, beta: float, inertia: float) -> float:
     xi, beta : float
         normal and tangential restitution
     inertia : float
-        moment of inertia over m r^2
+        moment of inertia divided by m r^2
 
     Returns
     -------
@@ -228,7 +228,7 @@ def rough_temperatures(
     xi, beta : float
         normal and tangential restitution
     inertia : float
-        moment of inertia over m r^2
+        moment of inertia divided by m r^2
 
     Returns
     -------

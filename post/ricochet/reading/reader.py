@@ -296,7 +296,7 @@ class Run:
         Parameters
         ----------
         frame : int, slice, list of int or numpy.ndarray
-            which frames
+            frames to use
 
         Returns
         -------
@@ -316,7 +316,7 @@ class Run:
         Parameters
         ----------
         frame : int, slice, list of int or numpy.ndarray
-            which frames
+            frames to use
 
         Returns
         -------
@@ -340,7 +340,7 @@ class Run:
         Parameters
         ----------
         frame : int, slice, list of int or numpy.ndarray
-            which frames
+            frames to use
 
         Returns
         -------
@@ -371,7 +371,7 @@ class Run:
         Parameters
         ----------
         frame : int, slice, list of int or numpy.ndarray
-            which frames
+            frames to use
         origin : int
             frame of the reference positions
 

@@ -366,7 +366,7 @@ class Simulation:
         events : int, optional
             number of further collisions of any kind
         on_event : callable, optional
-            function that is called after each event, as of `advance`
+            function that is called after each event, as for `advance`
 
         Returns
         -------
@@ -420,7 +420,7 @@ class Simulation:
     def event_log(self, most: int) -> EventLog:
         """Return the latest events in chronological order.
 
-        At least the latest million is kept.
+        At least the latest million events are stored.
 
         Parameters
         ----------
