@@ -1,4 +1,4 @@
-"""Waits and pictures per second in the laboratory, as a browser has them: `make bench-lab`.
+"""Measure response times and pictures per second of the laboratory in a browser: `make bench-lab`.
 
 Headless Chromium draws without a graphics card, so that a screen is faster rather than slower.
 Fails where a goal is missed; say so only of a machine that does nothing else.
@@ -16,13 +16,13 @@ import pytest
 from browser import browsing
 
 LAB = Path(__file__).resolve().parents[1] / "post/lab.py"
-LONGEST = 20_000  # ms until a measurement gives up
-# In every document: when disks have moved first, in ms since it was asked for.
+LONGEST = 20_000  # time limit of a measurement [ms]
+# In every document: time from the request of the page to the first motion of disks, in ms.
 OPENING = """if (top === window) requestAnimationFrame(function look(now) {
   try { if (filmOf(current()).inside().moment.time > 0) { window.moved = now; return; } } catch {}
   requestAnimationFrame(look);
 });"""
-# In ms: from a value to a picture of disks that have moved under it.
+# Time from the change of a value to a picture of disks that moved with the new value, in ms.
 WAIT = """const [key, text, anew, longest] = arguments, box = current(), from = performance.now();
 const before = anew ? box.run : box.changes.length, seen = filmOf(box).inside;
 const isNew = () => anew
@@ -33,7 +33,7 @@ return new Promise(done => requestAnimationFrame(function look() {
   const taken = performance.now() - from;
   if (isNew() || taken > longest) done(taken); else requestAnimationFrame(look);
 }));"""
-# Pictures per second that differ from those before.
+# Number of pictures per second that differ from the previous one.
 PICTURES = """const seen = filmOf(current()).inside, from = performance.now();
 let count = 0, last = seen().moment.time;
 return new Promise(done => requestAnimationFrame(function look() {
@@ -44,7 +44,7 @@ return new Promise(done => requestAnimationFrame(function look() {
 
 
 def opened(browser, address):
-    """Open the page after a while, as people do; milliseconds until disks move."""
+    """Open the page after a pause, as users do; return the milliseconds until disks move."""
     time.sleep(2)
     browser.open(address)
     for _ in range(LONGEST // 16):
@@ -55,7 +55,7 @@ def opened(browser, address):
 
 
 def measured(browser, address, repeats):
-    """A measured quantity, its goal, and whether less is better."""
+    """A measured quantity, its goal, and whether smaller values are better."""
     script = {"cmd": "Page.addScriptToEvaluateOnNewDocument", "params": {"source": OPENING}}
     browser.call("POST", "/goog/cdp/execute", script)
 

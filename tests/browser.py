@@ -1,4 +1,4 @@
-"""A real browser for tests of pages: headless Chromium, by the protocol of its driver."""
+"""A real browser for tests of pages: headless Chromium, controlled through chromedriver."""
 
 import contextlib
 import json
@@ -27,7 +27,7 @@ FLAGS = [
 
 
 class Browser:
-    """A session of chromedriver, by its own protocol (W3C WebDriver)."""
+    """A session of chromedriver, which uses the protocol W3C WebDriver."""
 
     def __init__(self, port: int, profile: Path, size: tuple[int, int]) -> None:
         """Start chromium with an empty profile."""
@@ -65,7 +65,7 @@ class Browser:
         return self.call("POST", "/se/log", {"type": "browser"})
 
     def draw(self, count: int) -> None:
-        """Wait until so many pictures have been drawn."""
+        """Wait until the given number of pictures has been drawn."""
         self.run(
             """let left = arguments[0];
             return new Promise(done => requestAnimationFrame(function again() {
@@ -81,13 +81,13 @@ class Browser:
         self.call("POST", f"/element/{next(iter(self.element(name).values()))}/click", {})
 
     def on_stage(self, x: float, y: float) -> dict:
-        """A place in CSS pixels from the corner of the stage, as the driver has it."""
+        """Return driver coordinates of a position in CSS pixels from the corner of the stage."""
         box = self.run("return $('stage').getBoundingClientRect().toJSON()")
         place = {"x": round(x - box["width"] / 2), "y": round(y - box["height"] / 2)}
         return {"origin": self.element("stage"), **place}
 
     def point(self, kind: str, *fingers: list[tuple[float, float]]) -> None:
-        """Put down a mouse or fingers on the stage, move each along its places, and lift them."""
+        """Press a mouse or fingers on the stage, move each along its path, and release them."""
         moves = []
         for number, places in enumerate(fingers):
             move = {"type": "pointerMove", "duration": 30}
@@ -99,7 +99,7 @@ class Browser:
         self.call("DELETE", "/actions")
 
     def wheel(self, x: float, y: float, steps: int) -> None:
-        """Turn the wheel over a place of the stage."""
+        """Turn the mouse wheel at a position of the stage."""
         scroll = {"type": "scroll", "deltaX": 0, "deltaY": -100, **self.on_stage(x, y)}
         body = {"actions": [{"type": "wheel", "id": "wheel", "actions": [scroll] * steps}]}
         self.call("POST", "/actions", body)
@@ -115,12 +115,12 @@ class Browser:
 
 @contextlib.contextmanager
 def browsing(folder: Path, size: tuple[int, int] = (1300, 860)):
-    """A browser with an empty profile, ended with its driver."""
+    """Yield a browser with an empty profile, and end it with its driver."""
     missing = [name for name in ("chromium", "chromedriver") if not shutil.which(name)]
     if missing:
         pytest.skip(f"no {' and no '.join(missing)} (Debian packages chromium, chromium-driver)")
     log = folder / "chromedriver.log"
-    with log.open("w") as file:  # the driver takes a free port, and says which
+    with log.open("w") as file:  # the driver chooses a free port and prints it
         command = ["chromedriver", "--port=0", "--allowed-ips=127.0.0.1"]
         driver = subprocess.Popen(command, stdout=file, stderr=file)
     try:

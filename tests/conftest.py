@@ -1,4 +1,4 @@
-"""Fixtures of all tests: the program under test and a way to run it."""
+"""Fixtures of all tests: the program under test and functions that run it."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ import pytest
 
 from whole_runs import ran, within
 
-# A shell that starts the tests in the background has them, and all they start, ignore these.
+# Processes that a shell starts in the background ignore these signals by default.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
@@ -20,7 +20,7 @@ ROOM = 4e9  #: for the files of the tests [bytes]
 
 
 def pytest_configure():
-    """Keep the files of the tests in memory if it has room: calls count, not the disk behind."""
+    """Keep the files of the tests in memory if possible, so that the disk does not matter."""
     memory = Path("/dev/shm")
     if os.access(memory, os.W_OK):
         disk = os.statvfs(memory)
@@ -30,14 +30,14 @@ def pytest_configure():
 
 
 def pytest_terminal_summary(terminalreporter, config):
-    """Say how to repeat the order of the tests, also where pytest is quiet."""
+    """Print how to repeat the order of the tests, also in quiet mode."""
     if seed := config.getoption("randomly_seed", None):
         terminalreporter.write_line(f"the same order again: --randomly-seed={seed}")
 
 
 @pytest.fixture(scope="session")
 def program() -> Path:
-    """The program: what RICOCHET names, else build/ricochet. Missing is a failure, not a skip."""
+    """Return the program that RICOCHET names, else build/ricochet; a missing one is a failure."""
     path = Path(os.environ.get("RICOCHET", ROOT / "build" / "ricochet")).resolve()
     if not os.access(path, os.X_OK):
         pytest.fail(f"no program at {path}: run make first, or set RICOCHET")
@@ -46,7 +46,7 @@ def program() -> Path:
 
 @pytest.fixture
 def ricochet(program, tmp_path) -> Callable[..., subprocess.CompletedProcess]:
-    """`ricochet(*arguments)` runs the program in `tmp_path`; returns its status and output.
+    """Return a function that runs the program in `tmp_path` and returns its status and output.
 
     With `seconds` it is killed when it has used so much processor time.
     """
@@ -59,7 +59,7 @@ def ricochet(program, tmp_path) -> Callable[..., subprocess.CompletedProcess]:
 
 @pytest.fixture
 def started(program, tmp_path):
-    """`started(*arguments)` starts the program in `tmp_path`; whatever still runs is ended."""
+    """Return a function that starts the program in `tmp_path`; running programs are ended."""
     processes = []
 
     def start(*arguments, **options):
@@ -76,7 +76,7 @@ def started(program, tmp_path):
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """`small_disk(kilobytes, mode)` gives a folder on such a disk; needs the rights of root."""
+    """Return a function that makes a folder on a small disk; it requires the rights of root."""
     folder = tmp_path / "disk"
     folder.mkdir()
     mounted = []

@@ -1,4 +1,4 @@
-"""Tables of the validation page: how often error bars hold the truth, and whether p are uniform.
+"""Tables of the validation page: coverage of error bars, and uniformity of p-values.
 
     python tests/coverage_tables.py            writes docs/coverage.json and docs/validation.md
     python tests/coverage_tables.py --seeds 40 --print     a quick look
@@ -148,7 +148,7 @@ def of_transport(run: Run) -> Found:
     return {name: one.members[0][:2] for name, one in found.items()}
 
 
-#: By name: the input, and the quantities of a script.
+#: For each system: the input, and a function that returns the quantities of a script.
 BARS: dict[str, tuple[str, Callable[[Run], Found]]] = {
     "40 disks between sides": (by_collisions("", gas(40), 150, 1), of_rates),
     "40 disks between thermal sides": (by_collisions("", gas(40) + THERMAL, 200, 1), of_rates),
@@ -187,7 +187,7 @@ EXACT = {("40 disks between thermal sides", "kT"): 1.0, ("fields of the same", "
 # --- p-values ---
 
 PISTON = "&side name = 'right' motion = 'piston' mass = 10 force = 40 /"
-#: By name: the input, and the collisions per disk between frames.
+#: For each system: the input, and the collisions per disk between frames.
 P_VALUES: dict[str, tuple[str, float]] = {
     "5 disks between sides": (by_collisions("", gas(5), 120, 5), 5),
     "200 disks between sides, a frame each collision per disk": (
@@ -210,7 +210,7 @@ P_VALUES: dict[str, tuple[str, float]] = {
 
 
 def p_values(apart: float, run: Run) -> Found:
-    """Return KS and chi-square p-values of each species, in place of mean and error."""
+    """Return KS and chi-square p-values of each species instead of mean and error."""
     frames = td.frames_from(run, td.start_of_steady_state(run), apart)
     tests = {name: speed_laws.speed_test([run], [frames], name) for name in run.names}
     return {name: (test.ks_p, test.chi2_p) for name, test in tests.items()}
@@ -220,7 +220,7 @@ def p_values(apart: float, run: Run) -> Found:
 
 
 def measured(program: str, folder: str, job: tuple) -> Found:
-    """Run one seed of a system, and return what it gives."""
+    """Run one seed of a system, and return the measured quantities."""
     kind, name, seed = job
     system, of = BARS[name] if kind == "bars" else P_VALUES[name]
     stem = Path(folder) / f"{kind}_{[*BARS, *P_VALUES].index(name)}_{seed}"
@@ -243,7 +243,7 @@ def coverage(name: str, results: list[Found]) -> list[dict]:
         mean, error = np.array([one.get(quantity, (np.nan, np.nan)) for one in results]).T
         some = np.isfinite(error)
         mean, error = mean[some], error[some]
-        if len(mean) < 10 or not error.any():  # exact, as the kT of a fixed energy
+        if len(mean) < 10 or not error.any():  # exact values, such as kT of a fixed energy
             continue
         truth = EXACT.get((name, quantity), float(mean.mean()))
         three = mean[: len(mean) // 3 * 3].reshape(-1, 3)

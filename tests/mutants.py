@@ -1,4 +1,4 @@
-"""Seeds faults, one at a time, and says which test catches each: before and after tests are cut.
+"""Mutation test: introduce faults one at a time and report which test detects each of them.
 
     python tests/mutants.py [NAME...] [--jobs 2] [--commit HEAD]
     python tests/mutants.py --check
@@ -46,7 +46,7 @@ def git(*arguments: str, folder: Path = ROOT) -> str:
 
 
 def check_out(commit: str) -> Path:
-    """A copy of the project at a commit, as it is there, but with what was built before."""
+    """Make a copy of the project at a commit, with the existing build."""
     tree = SCRATCH / "tree"
     if not tree.exists():
         git("clone", "--quiet", "--shared", "--no-checkout", str(ROOT), str(tree))
@@ -59,7 +59,7 @@ def check_out(commit: str) -> Path:
 
 
 class Mutant(NamedTuple):
-    """A text of a file and its replacement."""
+    """A text in a file and its replacement."""
 
     file: str
     old: str
@@ -67,7 +67,7 @@ class Mutant(NamedTuple):
 
 
 def mutants() -> dict[str, Mutant]:
-    """The mutants of mutants.diff by name."""
+    """Return the mutants of mutants.diff by name."""
     found = {}
     for name, file, change in MUTANT.findall((ROOT / "tests" / "mutants.diff").read_text()):
         lines = change.splitlines()
@@ -77,13 +77,13 @@ def mutants() -> dict[str, Mutant]:
 
 
 def applies(mutant: Mutant, tree: Path) -> bool:
-    """Whether the text that a mutant replaces is there, once."""
+    """Return whether the text that a mutant replaces occurs exactly once."""
     path = tree / mutant.file
     return path.exists() and path.read_text().count(mutant.old) == 1
 
 
 def outcome(tree: Path, mutant: Mutant | None, jobs: int, log: Path) -> str:
-    """Outcome of the tests in a tree with a fault, or without any."""
+    """Return the outcome of the tests in a tree with one fault or without a fault."""
     steps = [*UNIT_TESTS, PROGRAM, PYTEST + "tests"]
     if mutant:
         if not applies(mutant, tree):
@@ -105,7 +105,7 @@ def outcome(tree: Path, mutant: Mutant | None, jobs: int, log: Path) -> str:
 
 
 def main() -> int:
-    """Prints what becomes of each mutant; 1 if one survives."""
+    """Print the outcome of each mutant; return 1 if a mutant survives."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help="of the mutants [all]")
     parser.add_argument("--jobs", type=int, default=2, help="at a time [%(default)s]")

@@ -12,13 +12,13 @@ from whole_runs import FINISHED, write_input
 
 @pytest.fixture
 def rng():
-    """Random numbers, the same each time."""
+    """Return a generator of random numbers with a fixed seed."""
     return np.random.default_rng(8)
 
 
 @pytest.fixture
 def simulated(ricochet, tmp_path):
-    """`simulated(input, *settings)` is the run of a file or of its text."""
+    """Return a function that simulates an input file or the text of an input."""
 
     def run(system, *settings, name="gas"):
         path = system if isinstance(system, Path) else write_input(tmp_path, system)
@@ -32,14 +32,14 @@ def simulated(ricochet, tmp_path):
 
 @pytest.fixture(scope="session")
 def chromium(tmp_path_factory):
-    """A browser for all tests."""
+    """Yield a browser for all tests."""
     with browsing(tmp_path_factory.mktemp("browser")) as one:
         yield one
 
 
 @pytest.fixture
 def browser(chromium):
-    """The browser as it was when it started."""
+    """Return the browser in its initial state."""
     chromium.open("about:blank")
     chromium.resize(1280, 800)
     chromium.complaints()

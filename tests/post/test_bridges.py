@@ -1,4 +1,4 @@
-"""Runs opened by the programs that they are exported for: OVITO, MDAnalysis, readers of CSV."""
+"""Exported runs are opened with OVITO, MDAnalysis and readers of CSV."""
 
 import sys
 from pathlib import Path
@@ -11,7 +11,7 @@ from synthetic_run import ROOT, run_script
 
 
 def reader(module: str):
-    """The module, or a skip that says how to get it."""
+    """Return a module, or skip the test and state how to install the module."""
     return pytest.importorskip(
         module, reason=f"{module} is not installed (requirements.txt, tests/readers.txt)"
     )
@@ -19,7 +19,7 @@ def reader(module: str):
 
 @pytest.fixture
 def run(simulated) -> Run:
-    """Two species in a container whose lower corner is not the origin."""
+    """Return a run of two species in a container whose lower corner is not the origin."""
     words = ("stop.collisions_per_disk=2", "species.light.count=20", "box.boundary=periodic,wall")
     return simulated(ROOT / "input/container.nml", *words)
 
@@ -40,7 +40,7 @@ def test_ovito_opens_the_export_as_a_system_in_two_dimensions(run):
         np.testing.assert_array_equal(np.diag(data.cell[:2, :2]), run.edges)
         np.testing.assert_array_equal(data.cell[:2, 3], run.lower)
         assert data.attributes["Time"] == pytest.approx(run.time[frame], rel=1e-15)
-        one_bit = {"rtol": 4e-16}  # OVITO's reader of numbers may be off by that
+        one_bit = {"rtol": 4e-16}  # error of OVITO's conversion of numbers
         np.testing.assert_allclose(disks.positions[...][:, :2], run.position[frame], **one_bit)
         np.testing.assert_allclose(disks["Velocity"][...][:, :2], run.velocity[frame], **one_bit)
         np.testing.assert_allclose(disks["Radius"][...], run.radius, rtol=1e-7)

@@ -7,7 +7,7 @@ from ricochet import correlations, fields, speeds, thermodynamics
 from ricochet.reading.nature import Refused
 
 LOOSE = "drive.keep_momentum=.false."
-#: In a box of any shape, of any species; a few collisions per disk, before rounding grows.
+#: Boxes and species of several kinds; a few collisions per disk, before rounding errors grow.
 GAS = """&run seed = {seed} / &box upper = 1, {height} boundary = 'periodic', '{y}'
 shear_rate = {shear} /
 &species count = {n} packing_fraction = {eta} temperature = 1 mass = 2 /
@@ -26,7 +26,7 @@ def drawn(rng, **given) -> str:
 
 @pytest.mark.parametrize("case", range(7))
 def test_motion_is_relative_to_a_centre_of_mass_that_noise_moves(simulated, case):
-    """The same kicks less their mean give the same relative motion (Galilei)."""
+    """Kicks without their mean cause the same relative motion (Galilean invariance)."""
     rng = np.random.default_rng(case)
     text = drawn(rng, shear=2.0 * (case == 6))
     held, loose = simulated(text, name="held"), simulated(text, LOOSE, name="loose")

@@ -12,7 +12,7 @@ HEAT = {"light": (1.0, 3.0), "heavy": (2.0, 0.5)}  # kT_x and kT_y
 
 @pytest.fixture
 def uneven(tmp_path, rng):
-    """Two species whose temperatures differ along x and y, with a flow of the heavy one."""
+    """Return a run of two species with different kT_x and kT_y; the heavy species flows."""
     mass = np.repeat([1.0, 5.0], [60, 40])
     heat = np.repeat([HEAT["light"], HEAT["heavy"]], [60, 40], axis=0)
     v = rng.normal(size=(400, 100, 2)) * np.sqrt(heat / mass[:, None])

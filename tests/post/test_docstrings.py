@@ -1,4 +1,4 @@
-"""The examples in the docstrings of the public functions: each is executed."""
+"""Every example in the docstring of a public function is executed."""
 
 import doctest
 import sys
@@ -42,7 +42,7 @@ CRATER = """&species name = 'bed' count = 60 packing_fraction = 0.5 region = 0, 
 
 @pytest.fixture(scope="session")
 def names(request, tmp_path_factory):
-    """The objects that examples may use: `run`, `runs`, `cooling_runs` and `bed_run`."""
+    """Return the objects that examples may use: `run`, `runs`, `cooling_runs`, `bed_run`."""
     patch = pytest.MonkeyPatch()
     patch.setenv("RICOCHET", str(request.getfixturevalue("program")))
     folder = tmp_path_factory.mktemp("examples")
@@ -74,13 +74,13 @@ def names(request, tmp_path_factory):
 
 @pytest.mark.parametrize("module", ["ricochet", *(f"ricochet.{name}" for name in MODULES)])
 def test_the_examples_of_a_module_work(module, names):
-    """In a namespace with NumPy, the module's own names and a few small runs."""
+    """The examples run in a namespace with NumPy, the names of the module and a few small runs."""
     loaded = import_module(module)
     finder, runner = doctest.DocTestFinder(), doctest.DocTestRunner(optionflags=FLAGS)
     told: list[str] = []
     globs = {**vars(loaded), **names}
     found = finder.find(loaded, globs=globs)
-    if module == "ricochet":  # its functions and classes are of other modules
+    if module == "ricochet":  # its functions and classes are defined in other modules
         for name in loaded.__all__:
             found += finder.find(getattr(loaded, name), name, globs=globs)
     for test in found:

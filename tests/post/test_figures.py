@@ -1,4 +1,4 @@
-"""Additions of figures to the measured curves: bands of single runs, panels, explanations."""
+"""Parts of figures besides the measured curves: bands of single runs, panels, explanations."""
 
 from types import SimpleNamespace
 
@@ -18,7 +18,7 @@ from synthetic_run import ROOT, run_script, write_run
 
 @pytest.fixture
 def figures(monkeypatch):
-    """The figures that scripts would have written, one after the other."""
+    """Collect the figures that scripts would write."""
     found = []
     monkeypatch.setattr(script, "save", lambda figure, *_: found.append(figure))
     return found
@@ -28,7 +28,7 @@ def figures(monkeypatch):
 
 
 def mixture(path, energies, tau=20.0, cooled=0.0):
-    """A run of light and heavy disks with these energies (T, N) of single disks."""
+    """Return a run of light and heavy disks with the energies (T, N) of single disks."""
     frames, count = energies.shape
     species = np.repeat([1, 2], [count // 3, count - count // 3])
     mass = np.array([1.0, 4.0])[species - 1]
@@ -47,7 +47,7 @@ def mixture(path, energies, tau=20.0, cooled=0.0):
 
 @pytest.mark.parametrize("kept", [True, False])
 def test_the_expected_scatter_of_one_run_is_that_of_exponential_energies(tmp_path, rng, kept):
-    """Of a fixed sum where the energy is kept: 4000 gases of 3 to 60 disks."""
+    """The sum is fixed if the energy is conserved; 4000 gases of 3 to 60 disks are compared."""
     count = int(rng.integers(3, 60))
     draws = rng.exponential(size=(4000, count))
     if kept:
@@ -67,7 +67,7 @@ def test_the_expected_scatter_of_one_run_is_that_of_exponential_energies(tmp_pat
 
 
 def test_cooling_has_a_linear_panel_for_each_restitution(tmp_path, rng, figures):
-    """Three averages in units of the input, with the band of single runs, even of one run."""
+    """Each panel shows three means in units of the input with the band of single runs."""
     paths = []
     for k, cooled in enumerate((0.0, 0.1)):
         draws = 3 * rng.exponential(size=(5, 30))
@@ -96,7 +96,7 @@ def test_cooling_has_a_linear_panel_for_each_restitution(tmp_path, rng, figures)
 
 
 def test_the_total_energy_has_a_linear_panel_for_each_time_step(tmp_path, rng, figures):
-    """Of each method the first run; steps that only round say that they do."""
+    """A panel shows the first run of each method, and a note explains changes by rounding."""
     paths, totals, time = [], [], np.linspace(0, 8, 41)
     for k, dt in enumerate((0.0, 0.1, 0.2, 0.2)):
         total = 7.0 + 1e-15 * rng.normal(size=41)
@@ -128,7 +128,7 @@ def test_the_total_energy_has_a_linear_panel_for_each_time_step(tmp_path, rng, f
 
 
 def test_a_bed_that_is_large_enough_keeps_the_crater_from_the_box(simulated, rng):
-    """Of random projectiles: free in a bed of the estimated size, not in one of half of it."""
+    """Craters of random projectiles are free in a bed of the estimated size, not in half of it."""
     for _ in range(3):
         mass, xi = rng.uniform(4, 12), rng.uniform(0.3, 0.7)
         size = crater.enough_disks(mass, xi, 0.1)
@@ -148,7 +148,7 @@ def test_a_bed_that_is_large_enough_keeps_the_crater_from_the_box(simulated, rng
 
 
 def test_the_reason_of_the_start_names_what_drifts(tmp_path, rng):
-    """Each quantity in turn relaxes for longer than speeds remember, all else is steady."""
+    """Each quantity in turn relaxes more slowly than speeds, while all others are steady."""
     time, names = np.arange(2001.0), ("a", "b")
     found = {
         f"{k}/{e}_energy": 1 + 0.01 * rng.normal(size=2001)
@@ -173,7 +173,7 @@ def test_the_reason_of_the_start_names_what_drifts(tmp_path, rng):
 
 
 def maxwellian(path, rng, mass=2.0, kt=3.0, count=400, frames=41):
-    """A gas in equilibrium at a temperature that is not 1/2, one collision per disk a frame."""
+    """Write a gas in equilibrium at kT = 3/2, with one collision per disk between frames."""
     mass = np.broadcast_to(mass, count)
     v = rng.normal(size=(frames, count, 2)) * np.sqrt(kt / mass)[:, None]
     v *= np.sqrt(kt * 2 * count / np.sum(mass[:, None] * v**2, axis=(1, 2)))[:, None, None]
@@ -182,7 +182,7 @@ def maxwellian(path, rng, mass=2.0, kt=3.0, count=400, frames=41):
 
 
 def test_speeds_are_drawn_in_units_of_the_input_on_request(tmp_path, rng, figures, capsys):
-    """Maxwell's curve has its maximum at sqrt(kT / m) and the area 1, and so has the histogram."""
+    """Maxwell's curve has its maximum at sqrt(kT / m); curve and histogram have the area 1."""
     path, out = maxwellian(tmp_path / "gas.h5", rng), tmp_path / "a.png"
     assert run_script("speeds", path, "-o", out, "--unscaled", "--units", "length=m,time=s") == 0
     for axes in figures[0].axes[:3]:
@@ -198,7 +198,7 @@ def test_speeds_are_drawn_in_units_of_the_input_on_request(tmp_path, rng, figure
 
 
 def test_the_coefficient_of_speeds_is_explained_beside_its_band(tmp_path, rng, figures):
-    """The legend has the colours of the band and of the curve."""
+    """The legend shows the colours of the band and of the curve."""
     path = maxwellian(tmp_path / "gas.h5", rng)
     assert run_script("speeds", path, "-o", tmp_path / "a.png") == 0
     way = figures[0].axes[3]
@@ -212,7 +212,7 @@ def test_the_coefficient_of_speeds_is_explained_beside_its_band(tmp_path, rng, f
 
 
 def test_disks_have_their_true_size_unless_they_would_be_lost(tmp_path, rng):
-    """They are never drawn smaller, and enlarged to at most 0.12 of their mean distance."""
+    """Disks are never drawn smaller, and enlarged to at most 0.12 of their mean distance."""
     for _ in range(20):
         count, radius = int(rng.integers(1, 400)), 10 ** rng.uniform(-5, -1)
         x = rng.uniform(0, 1, (1, count, 2))
@@ -248,7 +248,7 @@ def test_arrows_have_a_scale_and_a_second_species_an_outline(tmp_path, rng, figu
 
 
 def test_spins_have_a_colour(tmp_path, rng, figures, capsys, simulated):
-    """On a scale with 0 in the middle; of disks that cannot rotate there is none."""
+    """The scale has 0 in its middle; disks that cannot rotate have no spin to draw."""
     rough = "&contact tangential_restitution = 0 /"
     run = simulated(f"&species count = 9 radius = 0.05 temperature = 1 /{rough}&stop time = 1 /")
     assert run_script("snapshot", run.path, "--colour", "spin", "-o", tmp_path / "a.png") == 0
@@ -265,7 +265,7 @@ def test_spins_have_a_colour(tmp_path, rng, figures, capsys, simulated):
 
 @pytest.mark.parametrize("periodic", [(False, False), (True, False), (False, True), (True, True)])
 def test_a_stream_function_is_found_from_its_flux(rng, periodic):
-    """Of random modes that suit the sides, with a flux through the box along periodic axes."""
+    """Random modes that satisfy the boundary conditions, with a flux along periodic axes."""
     edges = rng.uniform(0.5, 3, 2)
     ends = [np.linspace(0, edge, int(rng.integers(30, 45)) + 1) for edge in edges]
     through = rng.normal(size=2) * periodic
@@ -288,7 +288,7 @@ def test_a_stream_function_is_found_from_its_flux(rng, periodic):
 
 
 def test_arrows_are_as_long_as_the_largest_flow_beyond_its_error(tmp_path, rng):
-    """A roll of 5 % of the thermal speed, with noise: the roll is dark, and sets the scale."""
+    """A noisy roll of 5 % of the thermal speed is drawn dark, and sets the scale of the arrows."""
     x = rng.uniform(0, 1, (1, 4, 2))
     run, cells = read_run(write_run(tmp_path / "a.h5", x, 0 * x)), (10, 8)
     u = 0.01 * rng.normal(size=(2, 80))
@@ -311,11 +311,11 @@ def test_arrows_are_as_long_as_the_largest_flow_beyond_its_error(tmp_path, rng):
 
 
 def test_the_collisions_that_one_pair_of_runs_misses_have_an_error(rng):
-    """It contains the truth in two of three pairs of runs with correlated rates."""
+    """The error bar contains the true value in two of three pairs of runs with correlated rates."""
     inside, true = 0, 0.1
     for _ in range(300):
         noise = rng.normal(size=(2, 420))
-        for k in range(1, 420):  # correlated over some five samples
+        for k in range(1, 420):  # correlated over about five samples
             noise[:, k] = 0.8 * noise[:, k - 1] + 0.6 * noise[:, k]
         rates = [
             statistics.correlated_mean(mean * (5 + one[20:]))

@@ -1,4 +1,4 @@
-"""A run that goes on, shown in the browsers of this computer: `player.py --live`."""
+"""Unfinished runs in browsers on this computer: `player.py --live`."""
 
 import signal
 import socket
@@ -19,7 +19,7 @@ LONG = """&run threads = 1 /
 &stop collisions = 1000000000 /
 &output frames_every_collisions = 50000 /
 """
-#: The player waits for pages that have asked lately, however slow they are.
+#: The player waits for pages with recent requests, however slow they are.
 SHOW = """import sys; sys.path[:0] = [sys.argv.pop(1)]; sys.argv[0] = "player.py"
 from ricochet import live, script; live.PATIENCE = 1e9
 import player; script.launch(player.main)"""
@@ -27,7 +27,7 @@ import player; script.launch(player.main)"""
 
 @pytest.fixture
 def live(started, tmp_path):
-    """A run that goes on, but stands still at present; the player that shows it; its address."""
+    """Yield a suspended run, the player that shows it, and the player's address."""
     write_input(tmp_path, LONG)
     run = started("gas.nml", "-o", "gas.h5")
     part = tmp_path / "gas.h5.part"
@@ -41,7 +41,7 @@ def live(started, tmp_path):
 
 
 def opened(browser, address):
-    """The page with its film."""
+    """Return the browser with the page and its film."""
     browser.open(address)
     wait_for(lambda: browser.run("return live.stamp !== ''"))
     return browser
@@ -57,7 +57,7 @@ def test_the_film_keeps_up_with_the_run_until_one_goes_elsewhere(live, browser):
     run.send_signal(signal.SIGCONT)
     wait_for(lambda: browser.run("return last()") > first)
     taken = browser.run("const t = moment.time; return (last() - t) / paceNow()")
-    assert 0.1 < taken <= 10  # the time since the answer before
+    assert 0.1 < taken <= 10  # time since the previous answer
     browser.run(
         """let now = performance.now() + 1e6;
         for (let k = 0; k <= 1000; k++) draw(now += 10);"""
@@ -89,7 +89,7 @@ def test_the_show_stops_when_asked_and_the_run_goes_on(live, sign):
 @pytest.mark.parametrize("how", ["has ended", "has stopped", "was killed or has crashed"])
 @pytest.mark.parametrize("seen", [True, False])
 def test_the_show_ends_with_the_run_and_says_so(live, browser, tmp_path, capsys, how, seen):
-    """A page keeps the film; a run that stands still goes on, the lock of a killed one is gone."""
+    """A page keeps the film; a suspended run counts as running, a killed run has no lock."""
     run, show, address = live
     part, left = tmp_path / "gas.h5.part", tmp_path / "gas.h5"
     if seen:
@@ -125,7 +125,7 @@ def test_the_show_ends_with_the_run_and_says_so(live, browser, tmp_path, capsys,
 
 
 def test_requests_under_another_name_are_refused(live):
-    """Without a word; so is what is no request."""
+    """Invalid requests are refused in the same way, without an answer."""
     _, show, address = live
     server = int(address.split(":")[2][:-1])
 

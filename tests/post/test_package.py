@@ -1,4 +1,4 @@
-"""The package itself: its modules under short names, and what importing it costs."""
+"""The package: short names of its modules, and the cost of importing it."""
 
 import ast
 import importlib
@@ -18,7 +18,7 @@ INIT = Path(ricochet.__file__)
 
 @pytest.mark.parametrize("name", modules())
 def test_a_short_name_is_the_module_itself(name):
-    """As an attribute, in `import`, and in `from ... import`."""
+    """The short name works as an attribute, in `import`, and in `from ... import`."""
     whole = importlib.import_module(modules()[name])
     assert getattr(ricochet, name) is whole
     assert importlib.import_module(f"ricochet.{name}") is whole
@@ -29,14 +29,14 @@ def test_a_short_name_is_the_module_itself(name):
 
 
 def test_no_module_has_the_name_of_another_or_of_a_function():
-    """Else a short name would be ambiguous."""
+    """Otherwise a short name would be ambiguous."""
     paths = [path for path in INIT.parent.glob("*/*.py") if path.stem != "__init__"]
     assert sorted(path.stem for path in paths) == sorted(modules())
     assert not modules().keys() & {*ricochet.__all__}
 
 
 def test_type_checkers_see_the_modules_that_are_there():
-    """They do not execute `__getattr__`: the list of imports in `__init__.py` is for them."""
+    """Type checkers do not execute `__getattr__`; they read the imports in `__init__.py`."""
     found = {
         name.asname: f"ricochet.{node.module}.{name.name}"
         for node in ast.walk(ast.parse(INIT.read_text()))
@@ -55,7 +55,7 @@ def test_a_name_that_is_not_there_is_an_error():
 
 
 def test_the_version_is_the_same_everywhere(program):
-    """Of the package, which pip reads, of the program and of the citation."""
+    """The versions compared are those of the package, of the program and of the citation."""
     root = INIT.parents[2]
     version = ricochet.__version__
     assert f"ricochet {version}" in ran(program, "--version").stdout
@@ -66,7 +66,7 @@ def test_the_version_is_the_same_everywhere(program):
 
 
 def test_inputs_are_found_by_name(tmp_path, monkeypatch):
-    """Wherever Python works; another name is answered with the one that it is like."""
+    """The working folder does not matter; unknown names are answered with a similar one."""
     monkeypatch.chdir(tmp_path)
     assert ricochet.example("gas") == ricochet.example("gas.nml")
     with ricochet.Simulation(ricochet.example("gas")) as gas:

@@ -1,4 +1,4 @@
-"""Paths between frames against the same run with many more frames."""
+"""Paths between frames, compared with the same run with many more frames."""
 
 from itertools import pairwise
 
@@ -36,7 +36,7 @@ SYSTEMS = {
 
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_the_event_log_gives_the_true_paths(simulated, system):
-    """One trajectory with few frames and an event log, and with many frames."""
+    """A trajectory with few frames and an event log is compared with one with many frames."""
     text = SYSTEMS[system] + DISKS + "&stop time = 1 /\n"
     run = simulated(text, LOG, "output.frames_every_time=0.25")
     dense = simulated(text, "output.frames_every_time=0.01", name="dense")
@@ -59,7 +59,7 @@ def test_the_event_log_gives_the_true_paths(simulated, system):
 
 
 def flown(run, place, velocity, t):
-    """(T, 2) places of a disk after these times."""
+    """Return the positions (T, 2) of a disk after these times."""
     return place + t[:, None] * velocity + 0.5 * t[:, None] ** 2 * run.gravity
 
 

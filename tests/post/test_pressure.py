@@ -1,4 +1,4 @@
-"""Pressure between two times, and the area that it is divided by."""
+"""Pressure between two times, and the accessible area."""
 
 import numpy as np
 import pytest
@@ -27,14 +27,14 @@ INPUTS = {
 
 @pytest.fixture
 def simulated(program, tmp_path, monkeypatch):
-    """Runs a gas with some more input."""
+    """Run a gas with additional input."""
     monkeypatch.setenv("RICOCHET", str(program))
     return lambda more: ricochet.run(GAS + OFTEN + more, output=tmp_path / "gas.h5")
 
 
 @pytest.mark.parametrize("kind", INPUTS)
 def test_the_area_is_that_of_the_pressure_in_the_file(simulated, kind):
-    """The program divides K + W / 2t by it, at each sample."""
+    """At each sample the program divides K + W / 2t by this area."""
     run = simulated(INPUTS[kind])
     time, pressure = run.observable("virial_pressure")
     virial = run.observable("virial").value
@@ -47,7 +47,7 @@ def test_the_area_is_that_of_the_pressure_in_the_file(simulated, kind):
 
 
 def test_the_pressure_of_a_whole_run_is_the_last_one_in_the_file(simulated):
-    """Where nothing changes the kinetic energy."""
+    """The two are equal if the kinetic energy is constant."""
     run = simulated(INPUTS["obstacle"])
     assert run.pressure(0, 2) == pytest.approx(
         run.observable("virial_pressure").value[-1], rel=1e-12
@@ -56,7 +56,7 @@ def test_the_pressure_of_a_whole_run_is_the_last_one_in_the_file(simulated):
 
 @pytest.mark.parametrize("kind", ["walls", "heated", "sheared", "container"])
 def test_the_trace_of_the_tensor_is_twice_the_pressure(simulated, kind):
-    """Over any part of a run; parts of equal length average to the whole."""
+    """This applies to any part of a run; parts of equal length average to the whole."""
     run = simulated(INPUTS[kind])
     for start, end in ((0, 2), (0.5, 1.25), (0.51, 1.2)):
         tensor = run.pressure_tensor(start, end)
@@ -69,7 +69,7 @@ def test_the_trace_of_the_tensor_is_twice_the_pressure(simulated, kind):
 
 
 def test_the_means_are_over_time(tmp_path):
-    """By trapezoids, of samples that are not equally far apart, in a box that shrinks."""
+    """The trapezoidal rule is applied to unequally spaced samples in a shrinking box."""
     still = np.zeros((3, 4, 2))
     steady = {"motion": "constant_velocity", "velocity": 0.25, "start_time": 0.0, "end_time": 2.0}
     run = written(

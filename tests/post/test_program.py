@@ -1,4 +1,4 @@
-"""The program started from Python: `ricochet.run`."""
+"""The program, run from Python with `ricochet.run`."""
 
 import copy
 import gc
@@ -21,7 +21,7 @@ from synthetic_run import ROOT
 from whole_runs import STOPPED, USAGE, differences, environment, is_asleep, ran, wait_for
 
 THIRD = 0.1 / 3
-#: All kinds of values: repeated groups, texts with quotes, pairs, logicals, arrays; as of numpy.
+#: All kinds of values: repeated groups, texts with quotes, pairs, logicals, arrays of NumPy.
 GROUPS = {
     "run": {"title": np.str_("it's a test"), "seed": np.array(5)},
     "box": {"lower": np.array([-1, 0], np.int8), "boundary": ["periodic", "wall"]},
@@ -43,7 +43,7 @@ TEXT = f"""&run title = 'it''s a test' seed = 5 /
 
 @pytest.fixture(autouse=True)
 def its_program(program, monkeypatch, tmp_path):
-    """The program under test, in a folder of its own."""
+    """Set the program under test, and use a new folder."""
     monkeypatch.setenv("RICOCHET", str(program))
     monkeypatch.chdir(tmp_path)
 
@@ -59,7 +59,7 @@ def test_a_dictionary_is_the_same_run_as_the_file(tmp_path, ricochet):
         np.testing.assert_array_equal(of_file.position[-1], run.position[-1])
     with pytest.raises(ValueError, match="from 1 to 1024, not 0"):
         package.run("gas.nml", threads=0)
-    told = {"parameters/input", "parameters/overrides"}  # the same words, otherwise written
+    told = {"parameters/input", "parameters/overrides"}  # the same values in another notation
     assert {name.strip("/") for name in differences("a.h5", "b.h5")} <= told
 
 
@@ -180,7 +180,7 @@ def test_worker_processes_leave_no_temporary_folders(temporary):
 
 
 class Notebook(io.StringIO):
-    """A terminal whose user interrupts Python as soon as the progress of a run is shown."""
+    """A terminal whose user interrupts Python as soon as progress is shown."""
 
     def isatty(self) -> bool:
         return True
@@ -193,7 +193,7 @@ class Notebook(io.StringIO):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch, number):
-    """As a notebook interrupts Python alone; the program ends with Python, however that ends."""
+    """A notebook interrupts Python only; the program ends whenever Python ends."""
     (tmp_path / "gas.nml").write_text(TEXT)
     code = "import ricochet; ricochet.run('gas.nml', {'stop.collisions': 10**12}, 'long.h5')"
     paths = environment(PYTHONPATH=ROOT / "post")
@@ -240,7 +240,7 @@ def test_what_is_no_input_is_refused(groups, words):
 
 @pytest.mark.parametrize("begin", [package.run, package.Simulation])
 def test_overrides_may_be_nested_and_are_named_in_messages(begin):
-    """A mapping stands for the common beginning of names; a mistake is answered without options."""
+    """A mapping stands for the common beginning of names; messages contain no options."""
     flat = {"contact.restitution": 0.8, "species.light.mass": 2, "run.seed": 7}
     nested = {"contact": {"restitution": 0.8}, "species": {"light": {"mass": 2}}, "run.seed": 7}
     one, other = begin(GROUPS, flat), begin(GROUPS, nested)
@@ -263,7 +263,7 @@ def test_file_names_may_begin_with_a_dash(tmp_path):
 
 
 def test_a_missing_program_is_named(monkeypatch, tmp_path):
-    """Where RICOCHET says; outside of a clone on the path."""
+    """The message names RICOCHET's path or, outside of a clone, the search path."""
     monkeypatch.setenv("RICOCHET", "nowhere")
     with pytest.raises(ProgramError, match="no program ricochet at nowhere: run make"):
         package.run(GROUPS)

@@ -1,4 +1,4 @@
-"""The reader of output files, and what scripts answer to files and words that they cannot use."""
+"""The reader of output files, and the answers of scripts to unusable files and arguments."""
 
 import csv
 import os
@@ -22,7 +22,7 @@ from whole_runs import executable, frames_in, ran, wait_for, write_input
 
 
 def tiny(path, frames=1, count=1, **more):
-    """A run of disks at rest."""
+    """Write a run of disks at rest."""
     x = np.zeros((frames, count, 2))
     return write_run(path, x, x, **more)
 
@@ -32,7 +32,7 @@ def tiny(path, frames=1, count=1, **more):
 
 @pytest.fixture
 def small(tmp_path):
-    """Three frames of two disks that move apart."""
+    """Return three frames of two disks that move apart."""
     x = np.array([[[0.2, 0.5], [0.7, 0.5]], [[0.1, 0.5], [0.8, 0.5]], [[0.0, 0.5], [0.9, 0.5]]])
     return write_run(tmp_path / "small.h5", x, 0 * x, collisions=[[0, 0], [1, 0], [3, 2]])
 
@@ -49,7 +49,7 @@ def test_constants_are_those_of_the_input_and_energies_those_of_the_observables(
 
 
 def test_frames_and_observables_are_values_in_expressions(small):
-    """Of any operator and function, from the left and from the right, beside arrays."""
+    """This applies to operators and functions, on either side, together with arrays."""
     run = read_run(small)
     time, value = energy = run.observable("all/kinetic_energy")
     for values, array in ((run.position, run.position[:]), (energy, value)):
@@ -114,7 +114,7 @@ def frames_seen_by_another_program(path):
 def test_a_run_in_progress_is_read_up_to_its_last_committed_frame(tmp_path):
     path = tiny(tmp_path / "run.h5.part", 5, 2, committed=2)
     assert len(read_run(path).position[:]) == 2
-    with h5py.File(path, "r+", locking=True) as writer:  # as the program holds it
+    with h5py.File(path, "r+", locking=True) as writer:  # as the program locks the file
         assert frames_seen_by_another_program(path) == 2
         for count, words in ((0, "holds no frame yet"), (6, "holds 5 of 6 samples")):
             writer["particles/disks/committed"][...] = count
@@ -185,7 +185,7 @@ def test_a_run_knows_how_disks_turn_and_what_happens_at_walls(simulated):
 
 
 def bad_files(folder) -> dict[str, str]:
-    """Files that cannot be used, each with words of the message that says why."""
+    """Return unusable files, each with words of the expected message."""
     data = tiny(folder / "good.h5", 4, 50).read_bytes()
     (folder / "short.h5").write_bytes(data[: len(data) // 2])
     (folder / "empty.h5").touch()
@@ -233,7 +233,7 @@ def test_a_file_that_the_same_process_has_open_is_not_called_damaged(tmp_path, m
 
 @pytest.fixture
 def unfinished(ricochet, tmp_path) -> Path:
-    """The output of a run that its wall clock stopped."""
+    """Return the output of a run that was stopped by the limit of its wall time."""
     write_input(tmp_path, MIXTURE)
     run = ricochet("gas.nml", "-o", "gas.h5", "--set", "stop.wall_clock=1e-9")
     assert run.returncode == STOPPED
@@ -242,7 +242,7 @@ def unfinished(ricochet, tmp_path) -> Path:
 
 @pytest.mark.parametrize("cuts", [12, pytest.param(300, marks=pytest.mark.check)])
 def test_a_file_cut_anywhere_is_refused(unfinished, ricochet, tmp_path, cuts):
-    """A finished one, and one that was being written."""
+    """The file is that of a finished run or of an unfinished run."""
     assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
     for whole in (unfinished, tmp_path / "whole.h5"):
         data, path = whole.read_bytes(), tmp_path / "cut.h5"
@@ -281,7 +281,7 @@ GENERIC = ("speeds", "snapshot", "animate", "energy", "trajectory", "export", "p
 SETTLED = ("correlations", "equation_of_state", "rates", "melting", "transport")
 SOON = ("--equilibration", "1", "--min-separation", "1")
 FROM_HEIGHT = {"gravity": SOON[:2], "driven": ("--show", "height")}
-#: Simulations: inputs, and the scripts that draw them, with their options.
+#: Inputs, and the scripts (with options) that draw their runs.
 RUNNING = [
     ([MIXTURE.split("&contact")[0] + SHORT], dict.fromkeys(GENERIC, ()) | {"mixture": SOON}),
     ([FALLING + SHORT], FROM_HEIGHT | {"equipartition": (), "fields": ()}),
@@ -299,7 +299,7 @@ ENDINGS = {"animate": "gif", "export": "xyz", "player": "html"}
 
 @pytest.mark.parametrize("system", range(len(RUNNING)))
 def test_running_simulations_are_drawn(started, tmp_path, system, capsys):
-    """The simulation is held up while the scripts look at its file, and has not finished."""
+    """The simulation is suspended while the scripts read its file, and has not finished."""
     texts, scripts = RUNNING[system]
     parts = []
     for k, text in enumerate(texts):
@@ -327,7 +327,7 @@ def test_running_simulations_are_drawn(started, tmp_path, system, capsys):
 
 
 def test_every_script_draws_a_running_simulation():
-    """All but `cost` and `scaling`, which want times of whole runs, and `coverage`: ten runs."""
+    """`cost` and `scaling`, which require complete runs, and `coverage` are excepted."""
     drawn = {script for _, scripts in RUNNING for script in scripts}
     assert drawn == {*SCRIPTS} - {"cost", "coverage", "scaling"}
 
@@ -343,8 +343,8 @@ def test_every_script_draws_a_running_simulation():
     ],
 )
 def test_a_run_that_met_no_stop_rule_says_so(tmp_path, monkeypatch, capsys, name, note, said):
-    """In print, and in red on the figure."""
-    kinds = {"species": [1, 1, 2], "names": ("a", "b")} if note else {}  # whose legend lies there
+    """The warning is printed and drawn in red on the figure."""
+    kinds = {"species": [1, 1, 2], "names": ("a", "b")} if note else {}  # with a legend there
     run = tiny(tmp_path / name, 4, 3, provenance={"git_commit": "abc", "note": note}, **kinds)
     texts = []
 
@@ -369,7 +369,7 @@ def test_a_file_with_the_names_of_an_earlier_version_is_refused_in_one_line(tmp_
 
 
 def test_of_an_ensemble_the_finished_members_are_taken_and_the_others_counted(tmp_path, capsys):
-    """Where all its files are given, also those without one; a warning comes once."""
+    """Members without files are counted if all files are given; the warning is printed once."""
     note = {"git_commit": "abc", "note": "cooled to nothing"}
     runs = [tiny(tmp_path / f"{k}.h5", 4 + k, 3, provenance=note) for k in range(3)]
     (tmp_path / "9.h5.part").touch()
@@ -389,7 +389,7 @@ def test_of_an_ensemble_the_finished_members_are_taken_and_the_others_counted(tm
 
 # --- where results go ---
 
-#: Scripts that write a result each in their own way, the option, the ending of its name.
+#: Scripts that write results in different ways, with the option and the ending of the name.
 WRITERS = [
     ("snapshot", "-o", "png"),
     ("cooling", "--csv", "csv"),
@@ -400,7 +400,7 @@ WRITERS = [
 
 
 def write_with(script, option, run, result):
-    """Let a script write a result in its own way."""
+    """Run a script that writes a result."""
     few = ["--count", "1"] if script == "animate" else []
     return run_script(script, run, option, result, *few)
 
@@ -419,7 +419,7 @@ def test_a_full_disk_is_one_line(
 def test_results_are_written_into_files_of_ones_own(
     tmp_path, monkeypatch, capsys, script, option, ending
 ):
-    """Not through links, not into a FIFO or a run; a file with two names keeps the other."""
+    """Links, FIFOs and runs are not written to; other hard links of a file keep their content."""
     monkeypatch.chdir(tmp_path)
     names = ("collisions", "all/kinetic_energy", "disk/kinetic_energy")
     run = tiny(Path("run.h5"), 4, 3, observables={name: np.arange(1.0, 5.0) for name in names})
@@ -503,7 +503,7 @@ def test_a_script_works_from_any_folder_and_without_a_display(small, tmp_path):
 
 
 def test_after_set_up_python_finds_the_package_from_any_folder(tmp_path):
-    """In a copy of what set-up reads, with a `.venv` that lacks no other package."""
+    """The test uses a copy of the files that set-up reads and a complete `.venv`."""
     package = "post/ricochet/__init__.py"
     for name in (".ci/set-up", "requirements.txt", "tests/readers.txt", package):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Means, errors and tests in post/ on samples made by laws: error bars are as often right."""
+"""Means, errors and tests of post/ for samples of known distributions: coverage is correct."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def test_maxwell_sample_is_accepted_and_a_wrong_temperature_rejected(rng):
 
 @pytest.mark.parametrize("periodic", [False, True])
 def test_finite_n_law_is_that_of_disks_sharing_an_energy(rng, periodic):
-    """And in a periodic box without the motion of all; copies of a value count once."""
+    """In a periodic box the centre of mass is at rest; copies of a value are counted once."""
     v = rng.normal(size=(40000, 5, 2))
     v -= periodic * v.mean(axis=1, keepdims=True)
     k = np.sum(v**2, axis=2)
@@ -54,7 +54,7 @@ def test_excess_kurtosis_and_its_noise(rng):
 
 @pytest.mark.parametrize("copies", [1, 4])
 def test_errors_of_a_histogram_are_its_scatter(rng, copies):
-    """Of independent values, and of values of which each counts as four."""
+    """The values are independent, or groups of four are equal."""
     bins = np.linspace(0, 1, 6)
     draws = np.repeat(rng.beta(2, 3, (4000, 100)), copies, axis=1)
     heights = [statistics.binned(values, bins, independent=100) for values in draws]
@@ -66,7 +66,7 @@ def test_errors_of_a_histogram_are_its_scatter(rng, copies):
 
 @pytest.mark.parametrize("members", [2, 3, 4, 30])
 def test_68_of_100_estimates_hold_the_mean_however_few_the_members(rng, members):
-    """And of many the error is the standard error; of one there is none."""
+    """For many values the error is the standard error; a single value has no error."""
     mean, error = statistics.estimate(rng.normal(3, 2, (20000, members)), axis=1)
     assert np.mean(np.abs(mean - 3) < error) == pytest.approx(0.6827, abs=0.015)
     assert np.sqrt(np.mean(error**2)) > 2 / np.sqrt(members)
@@ -144,7 +144,7 @@ def test_68_of_100_intervals_hold_the_mean_of_a_series_that_remembers(rng, memor
 
 
 def test_what_samples_make_up_for_is_no_error(rng):
-    """As of a wall, whose disks give it what they have: a sum that stays bounded."""
+    """The sum of the series is bounded, as for disks that exchange energy with a wall."""
     series = np.diff(rng.normal(size=(400, 641))) + 0.1 * rng.normal(size=(400, 640))
     means = [statistics.correlated_mean(one) for one in series]
     held = np.mean([abs(one.mean) < one.error for one in means])
@@ -162,7 +162,7 @@ def test_equilibrium_begins_where_a_drift_has_died_out(rng):
 def test_what_speaks_against_an_error_is_said(rng):
     calm = [statistics.correlated_mean(rng.normal(size=640)) for _ in range(10)]
     assert statistics.diagnostics("Z", calm) == []
-    slope = np.linspace(0, 0.5, 640)  # hardly seen in one run, but they all agree
+    slope = np.linspace(0, 0.5, 640)  # insignificant in a single run, but equal in all runs
     drifting = [statistics.correlated_mean(rng.normal(size=640) + slope) for _ in range(10)]
     assert "Z: still drifts" in statistics.diagnostics("Z", drifting)[0]
     apart = [one._replace(mean=one.mean + k) for k, one in enumerate(calm)]
