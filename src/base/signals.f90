@@ -1,5 +1,6 @@
 !> Signals that stop a run or request a checkpoint. The signal handler and the variables that it sets are in `system_calls.c`.
-!>  While the files of a run are open, a sudden end could lose data. During this time a stop signal is only recorded, and the main
+!>
+!> While the files of a run are open, a sudden end could lose data. During this time a stop signal is only recorded, and the main
 !> loop responds to it by writing a checkpoint. If the signal arrives after the main loop, the file is completed nevertheless, and
 !> the run is finished.
 module signals

@@ -1,6 +1,7 @@
 !> Event-driven dynamics: exact trajectories from event to event. Each disk stores one event, the earliest of its predicted events.
 !> When this event is due, the disks involved collide, and their next events are predicted.
-!>  An event becomes stale when its partner collides with another disk first. Stale events are not searched for. A stale event is
+!>
+!> An event becomes stale when its partner collides with another disk first. Stale events are not searched for. A stale event is
 !> recognised by the collision counter of the partner when the event is due. It is then not executed, and the next event of the disk
 !> is predicted.
 module event_driven

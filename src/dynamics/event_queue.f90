@@ -1,5 +1,6 @@
 !> The event queue: a calendar combined with a heap (G. Paul, J. Comput. Phys. 221, 615 (2007)).
-!>  Events of the current time window are in a short sorted list. If this list becomes full, its events are moved to the heap, and
+!>
+!> Events of the current time window are in a short sorted list. If this list becomes full, its events are moved to the heap, and
 !> the heap is used until the end of the window. Events of later windows are in the calendar, or in the heap if their bucket is
 !> full. Single entries are never searched or removed. An entry is valid only if it still equals the event that its disk stores.
 !> Without the calendar all events are in the heap.

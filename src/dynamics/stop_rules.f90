@@ -1,5 +1,6 @@
 !> Determines when a run ends: when one of the stop rules in the input is met, or when rounding errors dominate.
-!>  In a periodic box inelastic disks cool until all of them move with the common velocity that results from rounding errors. The
+!>
+!> In a periodic box inelastic disks cool until all of them move with the common velocity that results from rounding errors. The
 !> temperature loses its precision long before this state, and the run ends when it does. The test is made at the start of each
 !> epoch, so that the end of the run depends on the trajectory alone. The energy is compared with the energy at the time when
 !> velocities were last set, because this sets the scale of the rounding errors.

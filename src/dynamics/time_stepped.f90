@@ -1,7 +1,8 @@
 !> Time-stepped dynamics: exact free flight over a fixed step; then each disk beyond a wall is reflected, and each pair of disks
 !> that overlap and approach each other collides once. A contact is detected up to one step late, and a contact that begins and ends
 !> within a step is not detected. The method serves for comparisons with event-driven dynamics.
-!>  As in event-driven dynamics, the stored state of a disk changes only when this disk collides, so that rounding errors do not
+!>
+!> As in event-driven dynamics, the stored state of a disk changes only when this disk collides, so that rounding errors do not
 !> accumulate from step to step.
 module time_stepped
   use images, only: images_t

@@ -1,7 +1,8 @@
 !> A track: series to which samples are added together, for frames, observables, or events. A counter in the file contains the
 !> number of complete samples. Because the counter is written after the values have been flushed, readers and resumed runs can rely
 !> on it.
-!>  A sample is an array of reals that contains the values of all series, one series after another. Integers are exact up to 2**53.
+!>
+!> A sample is an array of reals that contains the values of all series, one series after another. Integers are exact up to 2**53.
 !> Small samples are buffered, because one HDF5 call costs as much time as writing a hundred kilobytes.
 module sample_track
   use kinds, only: int64, real64

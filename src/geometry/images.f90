@@ -1,6 +1,7 @@
 !> Periodic images of the box: their displacements and velocities. The search, the placement of disks, obstacles and collisions use
 !> this module.
-!>  In a sheared box (Lees and Edwards, J. Phys. C 5, 1921 (1972)) the image above the box moves along x. The position of an image
+!>
+!> In a sheared box (Lees and Edwards, J. Phys. C 5, 1921 (1972)) the image above the box moves along x. The position of an image
 !> depends on the time alone: it follows from its displacement at the epoch and its velocity. The separation of two disks through an
 !> image is therefore a function of their states and of the time.
 module images

@@ -1,5 +1,6 @@
 !> Straight walls between two points, impenetrable from both sides. Disks also collide with their ends.
-!>  A disk touches the wall when its centre reaches the stadium around it: two straight sides at the distance of the radius, and two
+!>
+!> A disk touches the wall when its centre reaches the stadium around it: two straight sides at the distance of the radius, and two
 !> half circles around the ends. The stadium is convex. The centre of a disk can therefore reach a straight side only from outside.
 !> If rounding causes a contact with a straight side to be missed, the disk touches a half circle at the same time.
 module segments

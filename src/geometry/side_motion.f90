@@ -1,6 +1,7 @@
 !> Motion of a side of the box, and the time when it touches a disk in free flight. All quantities are components along the inner
 !> normal of the side.
-!>  While the acceleration of a disk relative to the side has a constant sign, the gap between them is a convex or concave function
+!>
+!> While the acceleration of a disk relative to the side has a constant sign, the gap between them is a convex or concave function
 !> of time, whose first zero can be bracketed. A period of the motion consists of a few such intervals. No contact can therefore be
 !> missed, even if the side and the disk stay close together for a long time.
 module side_motion

@@ -1,7 +1,8 @@
 !> Output of a run: determines when samples and checkpoints are written, and manages the output file. During the run the name of
 !> this file is OUT.h5.part, and a lock file prevents other runs from writing to it. A file with the name OUT.h5 belongs to a
 !> finished run.
-!>  The layout of a file never changes. If the number of samples is known at the start, the file has space for exactly these
+!>
+!> The layout of a file never changes. If the number of samples is known at the start, the file has space for exactly these
 !> samples. Otherwise a new file replaces the file, by an atomic renaming, whenever the space is used up and at the end of the run.
 module output
   use kinds, only: int64, real64

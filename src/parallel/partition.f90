@@ -129,7 +129,8 @@ contains
 
   !> Executes successive windows in all domains, until a window is invalid, a limit is reached, or the caller has waited long
   !> enough. A window ends early when a count reaches its limit. `good` is .true. if all windows are valid.
-  !>  The threads synchronise twice in each window: before the domains are compared, and before the states that the comparison uses
+  !>
+  !> The threads synchronise twice in each window: before the domains are compared, and before the states that the comparison uses
   !> are changed.
   subroutine run_windows(self, sim, limits, most, t, windows, good)
     class(partition_t), intent(inout) :: self

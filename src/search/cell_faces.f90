@@ -1,5 +1,6 @@
 !> The faces of the cells of a grid, and the times when disks leave their cells. The sides of the box are faces as well.
-!>  Neighbouring cells overlap as far as possible. The overlap is limited by the condition that disks two cells apart cannot touch.
+!>
+!> Neighbouring cells overlap as far as possible. The overlap is limited by the condition that disks two cells apart cannot touch.
 !> A disk in the overlap may be assigned to either cell, and it is assigned to the cell that it leaves last. With wide cells this
 !> halves the number of crossings of faces.
 module cell_faces

@@ -36,7 +36,8 @@ module neighbour_search
 contains
 
   !> Finds the earliest contact of a disk with the candidates, if it precedes the earliest event known so far.
-  !>  The time is a pure function of the states of the two disks: both are advanced to the later of their clocks, and each term
+  !>
+  !> The time is a pure function of the states of the two disks: both are advanced to the later of their clocks, and each term
   !> keeps its value, or changes its sign, if the disks are exchanged. The result is therefore bit-identical for both disks and for
   !> any time of the prediction. The order of simultaneous contacts is defined by `wins`. A contact time before `now` results from
   !> rounding: after a perfectly inelastic collision two disks stay in contact to the last bits, and a shift of one disk by a period
@@ -46,7 +47,8 @@ contains
   !> The root of |dx + dv s| = sigma is c/(sqrt(disc) - b), which is free of cancellation near contact. The discriminant sigma**2
   !> dv**2 - (dx x dv)**2 is free of cancellation for distant grazing pairs. Disks that touch, or overlap by rounding, and approach
   !> collide now.
-  !>  One combined test excludes most candidates. It fails if the root is not real, if the root is not earlier than the earliest
+  !>
+  !> One combined test excludes most candidates. It fails if the root is not real, if the root is not earlier than the earliest
   !> contact found so far, or if the root is not earlier than the event of the candidate. (In the last case the next event of the
   !> candidate is predicted after its own event, and that prediction tests the disk.) A root before t requires c < -2 b (t - late),
   !> which is tested with a margin above rounding errors.

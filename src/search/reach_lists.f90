@@ -1,5 +1,6 @@
 !> Lists the objects other than small disks that reach into each cell: obstacles, and a few big disks among many small disks.
-!>  The width of the cells is chosen for the small disks. A big disk is listed in each cell from which a small disk could touch it
+!>
+!> The width of the cells is chosen for the small disks. A big disk is listed in each cell from which a small disk could touch it
 !> while it stays within a margin around its listed position. The search for a small disk therefore finds big disks in the list of
 !> its own cell, and the search for a big disk tests the cells along its boundary. The cost for a disk depends only on the sizes of
 !> disks near it.

@@ -1,5 +1,6 @@
 !> Placement of all disks.
-!>  Species with fixed positions ('explicit', 'file', 'grid', 'lattice') are placed first, in the order of the input. 'random'
+!>
+!> Species with fixed positions ('explicit', 'file', 'grid', 'lattice') are placed first, in the order of the input. 'random'
 !> species are placed next, the largest disks first, and 'dense' and 'grown' species last. 'dense' and 'grown' species with the same
 !> region grow together, and the disks that have been placed before are obstacles for them.
 module placement
