@@ -70,8 +70,8 @@ contains
   !> Starts the engine of a new simulation and returns its handle; after an error the simulation is deallocated.
   function begin(session, threads, error) result(handle)
     type(session_t), pointer, intent(inout) :: session
-    integer(c_int), intent(in) :: threads             !! number of threads; 0 for the value in the input or, if the input contains
-                                                      !! none, one
+    !> Number of threads; 0 for the value in the input or, if the input contains none, one.
+    integer(c_int), intent(in) :: threads
     type(error_t), allocatable, intent(in) :: error
     type(c_ptr) :: handle
     character(len=:), allocatable :: warning

@@ -15,8 +15,8 @@ module library_events
   implicit none
   private
 
-  integer(int64), parameter :: longest_look = 2000000 !! largest number of events, and of kicks of a disk, for which future
-                                                      !! collisions are searched
+  !> Largest number of events, and of kicks of a disk, for which future collisions are searched.
+  integer(int64), parameter :: longest_look = 2000000
 
 contains
 

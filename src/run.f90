@@ -29,8 +29,8 @@ module run
   public :: perform_run
 
   integer, parameter :: most_unwritten = 4096              !! capacity of the event log [collisions]
-  integer(int64), parameter :: much = 250000000             !! size of the output above which the program prints it at the start
-                                                            !! [bytes]
+  !> Size of the output above which the program prints it at the start [bytes]
+  integer(int64), parameter :: much = 250000000
 
   type :: run_t
     type(command_t) :: command
@@ -43,8 +43,8 @@ module run
     type(progress_line_t) :: line
     real(real64) :: started = 0.0_real64                   !! time when the program started, by the clock `seconds` [s]
     real(real64) :: rate = 0.0_real64                      !! collisions per processor time in this part of the run [1/s]
-    integer(int64) :: serial_events = 0  !! number of events in this part of the run that the serial engine of a parallel run
-                                         !! executed
+    !> Number of events in this part of the run that the serial engine of a parallel run executed.
+    integer(int64) :: serial_events = 0
   end type run_t
 
 contains

@@ -126,8 +126,8 @@ contains
   !> Starts the threads of a run, which exist until it ends. A run that uses the serial engine has one thread.
   subroutine start_threads(settings, warning)
     type(settings_t), intent(inout) :: settings
-    character(len=:), allocatable, intent(out) :: warning  !! warning about settings that are probably unintended; empty if there is
-                                                           !! nothing to report
+    !> Warning about settings that are probably unintended; empty if there is nothing to report.
+    character(len=:), allocatable, intent(out) :: warning
     character(len=:), allocatable :: name
     integer :: cores
     type(parallel_events_t) :: usual
@@ -154,8 +154,8 @@ contains
 
   !> Determines the number of threads from the input or the environment. The default is one thread.
   subroutine ask(threads, name)
-    integer, intent(inout) :: threads                      !! in: number of threads in the input, or 0 if it is not given; out:
-                                                           !! number of threads to use
+    !> in: number of threads in the input, or 0 if it is not given; out: number of threads to use.
+    integer, intent(inout) :: threads
     character(len=:), allocatable, intent(out) :: name
     character(len=16) :: value
     integer :: status

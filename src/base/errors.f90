@@ -10,8 +10,8 @@ module errors
   integer, parameter :: exit_finished = 0   !! the run reached its stop rule
   integer, parameter :: exit_usage = 2      !! wrong usage, invalid input, or a checkpoint that belongs to another run
   integer, parameter :: exit_files = 3      !! a file cannot be read or written, the disk is full, or the file is in use
-  integer, parameter :: exit_broken = 4     !! the simulation broke off: events no longer advance the time, disks overlap, or a
-                                            !! number is NaN
+  !> The simulation broke off: events no longer advance the time, disks overlap, or a number is NaN.
+  integer, parameter :: exit_broken = 4
   integer, parameter :: exit_stopped = 75   !! stopped by a signal or by the wall-clock limit; a checkpoint was written
 
   !> A failure: its message and the exit status of the program.

@@ -11,8 +11,8 @@ contains
   pure subroutine sort_by_count(key, n_keys, first, place)
     integer(int32), intent(in) :: key(:)                  !! (n) key of each item, from 1 to n_keys
     integer(int32), intent(in) :: n_keys
-    integer(int32), allocatable, intent(out) :: first(:)  !! (n_keys+1) position of the first item of each key; the last element is
-                                                          !! n+1
+    !> (n_keys+1) position of the first item of each key; the last element is n+1.
+    integer(int32), allocatable, intent(out) :: first(:)
     integer(int32), intent(out) :: place(:)               !! (n) position of each item in the sorted order
     integer(int32), allocatable :: next(:)                ! (n_keys+1) position of the next item of each key
     integer(int32) :: k

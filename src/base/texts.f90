@@ -321,8 +321,8 @@ contains
     do while (first <= len(text))
       last = first - 1 + index(text(first:)//eol, eol)
       line%text = text(first:last - 1)
-      lines = [lines, line]                           ! a constructor text_t(...) would leak memory with gfortran 12: see
-                                                      ! `command_line: take_option`
+      ! A constructor text_t(...) would leak memory with gfortran 12: see `command_line: take_option`.
+      lines = [lines, line]
       first = last + 1
     end do
   end subroutine lines_of

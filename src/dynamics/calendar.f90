@@ -15,8 +15,8 @@ module calendar
   !> event. With more events per window, buckets are full more often and further events are stored in the heap.
   real(real64), parameter :: events_per_window = 4.0_real64
   integer(int32), parameter :: few_disks = 5000    !! up to this number of disks nearly all events fit into buckets
-  integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]    !! number of windows after the current one in which each stage of
-                                                                  !! prefetching lists disks
+  !> Number of windows after the current one in which each stage of prefetching lists disks.
+  integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]
   integer(int32), parameter :: stages = size(windows_ahead)
   integer(int32), parameter :: most_coming = windows_ahead(1)*bucket_capacity
     !! largest number of disks listed for prefetching at once
@@ -28,8 +28,8 @@ module calendar
   end type bucket_t
 
   integer(int32), parameter :: log_chunk = 7
-  integer(int32), parameter :: chunk = shiftl(1_int32, log_chunk)  !! number of entries in a chunk of a list, which occupies 1 KiB;
-                                                                   !! the first entry is a link
+  !> Number of entries in a chunk of a list, which occupies 1 KiB; the first entry is a link.
+  integer(int32), parameter :: chunk = shiftl(1_int32, log_chunk)
   integer(int32), parameter :: none = -1
 
   !> A disk and the window of its event. In the first entry of a chunk, `disk` is the number of the next chunk of the list.
@@ -44,8 +44,8 @@ module calendar
     !> circular buffer as well. A span contains half as many windows as there are buckets. A list may also contain events of later
     !> spans with the same index in the circular buffer.
     integer(int32), allocatable :: list_end(:)
-    type(filed_t), allocatable :: filed(:)         !! (0:) all lists, in chunks, each of which is linked to the chunk of its list
-                                                   !! that was filled before
+    !> (0:) all lists, in chunks, each of which is linked to the chunk of its list that was filled before.
+    type(filed_t), allocatable :: filed(:)
     integer(int32) :: n_chunks = 0                 !! number of chunks that have been used
     integer(int32) :: vacant = none                !! head of the list of free chunks
     integer(int32) :: last_bucket = 0              !! a power of two minus 1, used as a bit mask for window numbers
@@ -142,8 +142,8 @@ contains
   !> Appends a chunk to the list that ends before `place`.
   subroutine add_chunk(self, place)
     class(calendar_t), intent(inout) :: self
-    integer(int32), intent(inout) :: place         !! in: position after the last entry of the list; out: position of the first
-                                                   !! entry in the new chunk
+    !> in: position after the last entry of the list; out: position of the first entry in the new chunk.
+    integer(int32), intent(inout) :: place
     type(filed_t), allocatable :: more(:)
     integer(int32) :: c
 

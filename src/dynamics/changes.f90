@@ -24,8 +24,8 @@ contains
     type(system_t), intent(in) :: system
     character(len=:), allocatable, intent(out) :: problem    !! reason why the replacement is impossible; empty if it succeeded
     type(simulation_t) :: other
-    real(real64) :: before, here(2, 2), there(2, 2), v  ! energy [energy], lower and upper sides [length], velocity of a side
-                                                        ! [length/time]
+    ! Energy [energy], lower and upper sides [length], velocity of a side [length/time]
+    real(real64) :: before, here(2, 2), there(2, 2), v
     integer :: k
 
     problem = ""

@@ -15,8 +15,8 @@ module epochs
   !> Number of collisions per disk in an epoch. The origin of time moves at the end of the epoch, so that times keep their
   !> precision.
   integer(int64), parameter :: epoch_length = 24
-  integer, parameter :: significant_bits = 20  !! significant bits of the length of an epoch; with so few bits, sums of lengths are
-                                               !! exact
+  !> Significant bits of the length of an epoch; with so few bits, sums of lengths are exact.
+  integer, parameter :: significant_bits = 20
   !> A collapse is reported after this number of events, and at least this number per disk, that do not advance the time.
   integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
   real(real64), parameter :: shortest = 2.0_real64**(-20)  !! shortest epoch in units of `negligible_time`
@@ -48,8 +48,8 @@ contains
     sim%events_then = sim%tally%events
   contains
 
-    !> Events of a disk per length of its path in a gas: collisions with other disks, from the equation of state of Henderson (Mol.
-    !> Phys. 30, 971 (1975)), and with walls.
+    !> Number of events of a disk per length of its path in a gas: collisions with other disks, from the equation of state of
+    !> Henderson (Mol. Phys. 30, 971 (1975)), and with walls.
     pure function events_per_path() result(rate)
       real(real64) :: rate                           !! [1/length]
       real(real64) :: packing

@@ -27,15 +27,15 @@ module event_driven
   private
   public :: event_driven_t
 
-  integer(int64), parameter :: events_to_look = 20000  !! number of events between two checks of the number of collisions against
-                                                       !! its limit
-  integer(int32), parameter :: disks_in_cache = 20000    !! largest number of disks that fit into a second-level cache; prefetching
-                                                         !! saves time for more disks
+  !> Number of events between two checks of the number of collisions against its limit.
+  integer(int64), parameter :: events_to_look = 20000
+  !> Largest number of disks that fit into a second-level cache; prefetching saves time for more disks.
+  integer(int32), parameter :: disks_in_cache = 20000
   integer(int64), parameter :: events_ahead = 8    !! number of events between two prefetches
 
   type, extends(evolution_t) :: event_driven_t
-    class(cell_grid_t), allocatable :: search      !! polymorphic, so that its rarely used procedures are not inlined into the hot
-                                                   !! path
+    !> Polymorphic, so that its rarely used procedures are not inlined into the hot path.
+    class(cell_grid_t), allocatable :: search
     type(event_queue_t) :: queue
     logical :: windowed = .true.                   !! the queue uses its calendar, not only the heap
     logical :: general = .false.                   !! collisions need the general procedure
@@ -149,8 +149,8 @@ contains
         call follow_piston(self, sim)
         cycle
       end if
-      if (is_stale()) then                         ! a stale event depends on the order of predictions, and the returned event must
-                                                   ! not
+      ! A stale event depends on the order of predictions, and the returned event must not.
+      if (is_stale()) then
         call predict(self, sim, event%disk)
         cycle
       end if

@@ -9,14 +9,14 @@ module event_heap
   private
   public :: event_heap_t, need_order, precedes
 
-  integer(int32), parameter :: arity = 4  !! children per node; compared with a binary heap, the depth is halved and no more cache
-                                          !! lines are accessed per level
+  !> Children per node; compared with a binary heap, the depth is halved and no more cache lines are accessed per level.
+  integer(int32), parameter :: arity = 4
 
   type :: event_heap_t
     integer(int32) :: n = 0                      !! number of events
     type(event_t), allocatable, private :: entry(:)        !! (n) events in heap order
-    integer(int32), allocatable, private :: slot(:)        !! (disks) position in `entry` of the event of each disk; 0 if it has no
-                                                           !! event in the heap
+    !> (disks) position in `entry` of the event of each disk; 0 if it has no event in the heap.
+    integer(int32), allocatable, private :: slot(:)
   contains
     procedure :: initialise
     procedure :: update

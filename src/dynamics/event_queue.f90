@@ -22,11 +22,11 @@ module event_queue
     private
     type(calendar_t) :: calendar
     type(event_heap_t) :: heap
-    type(event_t) :: near(0:near_capacity)  !! (0:n_near) sorted list of events, the latest first; element 0 is a sentinel that is
-                                            !! never due
+    !> (0:n_near) sorted list of events, the latest first; element 0 is a sentinel that is never due.
+    type(event_t) :: near(0:near_capacity)
     integer(int32) :: n_near = 0
-    logical :: near_is_open = .false.              !! events of the current window are added to the sorted list; otherwise to the
-                                                   !! heap
+    !> Events of the current window are added to the sorted list; otherwise to the heap.
+    logical :: near_is_open = .false.
     logical :: windowed = .true.                   !! the calendar is in use, not only the heap
     integer(int32) :: window = 0                   !! index of the current window since the epoch
     integer(int32) :: n_disks = 0
@@ -68,8 +68,8 @@ contains
     self%near(0)%time = huge(now)
     call self%heap%initialise(self%n_disks)
     tag%window = window_none
-    self%width = max(window_width(), 1.0e-9_real64*now, 1/never)   ! the lower bound ensures that window numbers fit into 32-bit
-                                                                   ! integers
+    ! The lower bound ensures that window numbers fit into 32-bit integers.
+    self%width = max(window_width(), 1.0e-9_real64*now, 1/never)
     self%windowed = windowed .and. self%width < never
     self%near_is_open = self%windowed
     self%n_taken = 0

@@ -16,8 +16,8 @@ module evolution
     integer(int64) :: events = huge(0_int64)
     real(real64) :: dissipated = huge(0.0_real64)        !! dissipated energy [energy]
     logical :: at_rest = .false.                         !! all disks are at rest
-    integer(int64) :: iterations = huge(0_int64)         !! number of iterations of the event loop after which the caller can make
-                                                         !! other checks
+    !> Number of iterations of the event loop after which the caller can make other checks.
+    integer(int64) :: iterations = huge(0_int64)
     real(real64) :: sampled = 0.0_real64                 !! time of the latest sample, before which the run does not end
   contains
     procedure :: reached

@@ -29,10 +29,10 @@ module histories
     integer(int32), allocatable :: history_of(:)   !! (slots) index of the history of each disk; 0 if it has no history
     integer(int32) :: own_low(2) = 0, own_high(2) = 0      !! first and last column and row of the domain
     integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! range of columns and rows that are not in the patch of another domain
-    integer(int32) :: safe_low(2) = 0, safe_high(2) = 0    !! range of columns and rows in which all neighbouring cells are in the
-                                                           !! patch
-    integer(int8), allocatable :: reached(:, :)    !! (0:,0:) 1 if an own disk that has left the domain was in this cell or in one
-                                                   !! of the eight cells around it
+    !> Range of columns and rows in which all neighbouring cells are in the patch.
+    integer(int32) :: safe_low(2) = 0, safe_high(2) = 0
+    !> (0:,0:) 1 if an own disk that has left the domain was in this cell or in one of the eight cells around it.
+    integer(int8), allocatable :: reached(:, :)
     logical :: left_patch = .false.                !! a disk that the domain owns has reached the edge of the patch
   contains
     procedure :: record_collision

@@ -37,8 +37,8 @@ contains
   !> Permutes the disks in place, without a second copy of them. Most of them are already near their new position.
   subroutine move_in_order(sim, order)
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(inout) :: order(:)     !! in: index of the disk that belongs at each position; out: the identity
-                                                  !! permutation
+    !> in: index of the disk that belongs at each position; out: the identity permutation.
+    integer(int32), intent(inout) :: order(:)
     type(whole_disk_t) :: held
     integer(int32) :: start, to, from
 

@@ -29,8 +29,8 @@ module time_stepped
 
   type, extends(evolution_t) :: time_stepped_t
     real(real64) :: dt = 0.0_real64                 !! [time]
-    logical :: every_pair = .false.                 !! all pairs are tested in every step, and not only the pairs in the Verlet
-                                                    !! lists
+    !> All pairs are tested in every step, and not only the pairs in the Verlet lists.
+    logical :: every_pair = .false.
     type(verlet_list_t), private :: near
     ! The coordinates are stored separately from the disks, so that loops can be vectorised.
     real(real64), allocatable, private :: x(:, :)    !! (disks,2) positions in this step [length]

@@ -15,8 +15,8 @@ module verlet_list
   public :: verlet_list_t
 
   integer, parameter :: steps_per_list = 16                !! intended number of steps for which a list is valid
-  real(real64), parameter :: pairs_per_disk = 4.0_real64   !! intended largest number of pairs per disk in a list, at the mean
-                                                           !! density
+  !> Intended largest number of pairs per disk in a list, at the mean density.
+  real(real64), parameter :: pairs_per_disk = 4.0_real64
   real(real64), parameter :: least_skin = 0.2_real64       !! smallest skin [mean diameter]
   real(real64), parameter :: cells_per_disk = 4.0_real64   !! largest number of bins per disk
 

@@ -117,8 +117,8 @@ contains
     if (status >= 0) call h5dget_space_f(dataset, space, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
     call h5sget_simple_extent_npoints_f(space, n, closed)
-    if (closed < 0) n = 0                          ! for a dataset without values HDF5 reports a failure here and for the storage
-                                                   ! size
+    ! For a dataset without values HDF5 reports a failure here and for the storage size.
+    if (closed < 0) n = 0
     if (status >= 0) call h5sget_simple_extent_dims_f(space, shape, most, status)
     call h5sclose_f(space, closed)
     if (status >= 0) call h5dget_type_f(dataset, type, status)
@@ -178,8 +178,8 @@ contains
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(int64), intent(in) :: first           !! first index along the last dimension, which starts at 1
-    integer(int64), intent(in) :: counts(:)  !! number of values along each dimension; only the last dimension may be transferred in
-                                             !! part
+    !> Number of values along each dimension; only the last dimension may be transferred in part.
+    integer(int64), intent(in) :: counts(:)
     integer(hid_t), intent(in) :: type            !! HDF5 type in memory
     type(c_ptr), intent(in) :: address
     logical, intent(in) :: writing

@@ -12,8 +12,7 @@ module run_files
   ! Endings of the names of these files
   character(len=*), parameter, public :: &
     unfinished = ".part", &                       !! ending of the output while the run writes it
-    unfinished_new = ".part_new", &               !! ending of a new file of this kind until it contains all data that are written
-                                                  !! only once
+    unfinished_new = ".part_new", &               !! ending of a new unfinished output until its constant data are written
     lock = ".lock"                                !! ending of the lock file that prevents other runs from writing to this output
   character(len=9), parameter :: endings(*) = [character(len=9) :: "", unfinished, unfinished_new, lock]
 

@@ -21,8 +21,8 @@ module sample_track
   integer(int64), parameter :: growth = 4               !! factor by which the capacity increases when the file is full
 
   type :: track_t
-    type(series_t), allocatable :: series(:)            !! the series; step and time are the first two if the other series share
-                                                        !! them
+    !> The series; step and time are the first two if the other series share them.
+    type(series_t), allocatable :: series(:)
     character(len=:), allocatable :: counter            !! path of the counter dataset
     integer(int64) :: planned = 0                       !! number of samples of the whole run; 0 if it is unknown
     integer(int64) :: capacity = 0                      !! number of samples that fit into the file

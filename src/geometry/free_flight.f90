@@ -10,10 +10,10 @@ module free_flight
   !> Speeds below this value are treated as zero, because times would overflow. [length/time]
   real(real64), parameter :: slowest = 1/never
 
-  !> Relative margin above all rounding errors, for a test that may only err in one direction.
+  !> Relative margin that exceeds all rounding errors. It is used in a test whose result may be wrong in one direction only.
   real(real64), parameter :: spare = 1.0e-6_real64
-  integer, parameter :: most_halvings = 3   !! largest number of times that an interval is halved to obtain a bound on the distance
-                                            !! in each part
+  !> Largest number of times that an interval is halved to obtain a bound on the distance in each part.
+  integer, parameter :: most_halvings = 3
 
 contains
 

@@ -7,7 +7,7 @@ module shapes
   private
   public :: shape_t, magnitude, spare
 
-  !> Relative margin, larger than all rounding errors, for tests that may err in one direction only.
+  !> Relative margin that exceeds all rounding errors. It is used in tests whose result may be wrong in one direction only.
   real(real64), parameter :: spare = 1.0e-6_real64
 
   !> The outline of an obstacle. Points are given relative to its middle.

@@ -14,13 +14,13 @@ module side_motion
   !> Names of the motions in the input. A motion is represented by its position in this list.
   character(len=*), parameter :: motions = "still sine parabolic sawtooth constant_velocity piston"
   integer, parameter, public :: still = 1, sine = 2, parabolic = 3, sawtooth = 4, constant_velocity = 5, piston = 6
-  real(real64), parameter :: small_angle = 0.5_real64       !! angle below which a series is used, because differences would suffer
-                                                            !! from cancellation [radian]
+  !> Angle below which a series is used, because differences would suffer from cancellation [radian]
+  real(real64), parameter :: small_angle = 0.5_real64
   !> A time interval, as a fraction of a period. An acceleration that acts for a shorter time does not change the gap within its
   !> precision.
   real(real64), parameter :: negligible = 1.0e-10_real64
-  integer, parameter :: intervals_in_reach = 6  !! number of successive intervals that together exceed a period, even if some of
-                                                !! them are negligible
+  !> Number of successive intervals that together exceed a period, even if some of them are negligible.
+  integer, parameter :: intervals_in_reach = 6
 
   !> The state of a piston, which changes in its collisions.
   type :: side_state_t
@@ -32,12 +32,13 @@ module side_motion
   type :: side_motion_t
     integer :: kind = still                          !! position in `motions`
     real(real64) :: offset = 0.0_real64              !! displacement inwards at which the motion starts [length]
-    real(real64) :: amplitude = 0.0_real64  !! amplitude; for a motion at constant velocity, the offset plus the length of the path;
-                                            !! for a piston, the width of the box [length]
+    !> Amplitude; for a motion at constant velocity, the offset plus the length of the path; for a piston, the width of the box
+    !> [length]
+    real(real64) :: amplitude = 0.0_real64
     real(real64) :: period = 1.0_real64              !! [time]
     real(real64) :: phase = 0.0_real64               !! phase at t = 0, in units of the period
-    real(real64) :: prescribed_velocity = 0.0_real64  !! velocity inwards of a sawtooth or of a motion at constant velocity
-                                                      !! [length/time]
+    !> Velocity inwards of a sawtooth or of a motion at constant velocity [length/time]
+    real(real64) :: prescribed_velocity = 0.0_real64
     real(real64) :: start_time = 0.0_real64          !! start of a motion at constant velocity [time]
     real(real64) :: end_time = 0.0_real64            !! end of a motion at constant velocity [time]
     ! For a piston, which is moved by disks and by a force:

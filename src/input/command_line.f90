@@ -14,8 +14,8 @@ module command_line
   public :: command_t, read_command_line, parse_arguments, answer, help_text
 
   type :: command_t
-    character(len=:), allocatable :: question  !! question to be answered: help, version, print-defaults, print-variables or
-                                               !! explain; empty for a run
+    !> Question to be answered: help, version, print-defaults, print-variables or explain; empty for a run.
+    character(len=:), allocatable :: question
     character(len=:), allocatable :: topic         !! variable or word of --explain
     character(len=:), allocatable :: input         !! path of the input file
     character(len=:), allocatable :: output        !! path of the output file

@@ -52,7 +52,7 @@ contains
 
   contains
 
-    !> Title, seed and numerical method.
+    !> Sets title, seed and numerical method.
     subroutine take_run(group)
       type(group_t), intent(in) :: group
 
@@ -69,7 +69,7 @@ contains
       end associate
     end subroutine take_run
 
-    !> Box without its obstacles.
+    !> Sets up the box without its obstacles.
     subroutine take_box(group)
       type(group_t), intent(in) :: group
       integer :: axis
@@ -88,7 +88,7 @@ contains
       end associate
     end subroutine take_box
 
-    !> Coefficients of restitution by pair of species, and the default law of walls.
+    !> Sets the coefficients of restitution for each pair of species, and the default contact law of walls.
     subroutine take_contact(group, n)
       type(group_t), intent(inout) :: group
       integer, intent(in) :: n                            !! number of species
@@ -124,7 +124,7 @@ contains
       end associate
     end subroutine take_contact
 
-    !> Kind and strength of the driving, and the driven species.
+    !> Sets the kind and the strength of the driving, and the driven species.
     subroutine take_drive(group)
       type(group_t), intent(in) :: group
       character(len=:), allocatable :: wanted
@@ -146,7 +146,7 @@ contains
       end associate
     end subroutine take_drive
 
-    !> Rules that end the run.
+    !> Sets the stop rules.
     subroutine take_stop(group)
       type(group_t), intent(in) :: group
 
@@ -163,7 +163,7 @@ contains
       end associate
     end subroutine take_stop
 
-    !> Contents of the output and its sampling schedules.
+    !> Sets the contents of the output and the sampling schedules.
     subroutine take_output(group)
       type(group_t), intent(in) :: group
       integer :: k
@@ -184,7 +184,7 @@ contains
       end associate
     end subroutine take_output
 
-    !> Sampling schedule of frames or observables.
+    !> Sets the sampling schedule of frames or observables.
     subroutine take_sampling(group, what, sampling)
       type(group_t), intent(in) :: group
       character(len=*), intent(in) :: what                !! one of `sampled`

@@ -59,7 +59,7 @@ contains
 
   contains
 
-    !> Initial positions of the disks.
+    !> Sets the method and the parameters of the initial positions.
     subroutine take_placement(group, s)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(inout) :: s
@@ -109,7 +109,8 @@ contains
       end associate
     end subroutine take_pairs
 
-    !> Number of disks, given or implied by the grid or the list of positions. Disks of a starting file are counted later.
+    !> Number of disks, which is given or follows from the grid or the list of positions. The disks in a starting file are counted
+    !> later.
     subroutine take_count(group, s)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(inout) :: s
@@ -135,7 +136,7 @@ contains
       end if
     end subroutine take_count
 
-    !> Initial velocities of the disks.
+    !> Sets the method and the parameters of the initial velocities.
     subroutine take_velocities(group, s)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(inout) :: s
@@ -155,7 +156,7 @@ contains
       end associate
     end subroutine take_velocities
 
-    !> Masses and radii, multiplied along the chain of `relative_to`.
+    !> Sets masses and radii. Factors are multiplied along the chain of `relative_to`.
     subroutine resolve_sizes()
       real(real64), dimension(size(species)) :: mass, radius
       character(len=:), allocatable :: wanted

@@ -12,8 +12,8 @@ module namelist_input
   private
   public :: read_groups
 
-  integer, parameter :: most_instances = 5000, most_repeats = 10000000  !! largest number of groups with the same name; largest n in
-                                                                        !! n*value
+  !> Largest number of groups with the same name; largest n in n*value.
+  integer, parameter :: most_instances = 5000, most_repeats = 10000000
 
 contains
 
@@ -27,14 +27,14 @@ contains
     type(value_t) :: defaults(size(table))
     type(group_t), allocatable :: found(:)                          ! groups in the order of the text
     integer :: n, i, j, k                                           ! n: number of groups found
-    character(len=:), allocatable :: source                         ! the text that is read at present: a default, the input, or an
-                                                                    ! override
+    ! The text that is read at present: a default, the input, or an override.
+    character(len=:), allocatable :: source
     type(token_t), allocatable :: token(:)                          ! tokens of the source
     integer :: at                                                   ! index of the next token
     character(len=:), allocatable :: own                            ! name of the group that is read at present, for messages
     integer :: group  ! index of the group to which assignments belong; 0 if the name of the group is unknown
-    integer :: opened                                               ! first line of the group that is read at present; 0 between
-                                                                    ! groups
+    ! First line of the group that is read at present; 0 between groups.
+    integer :: opened
     logical :: too_many                                             ! there are too many groups with the same name
     logical :: quote_open  ! a quote in this group is not closed, so that the / may be part of a text
 
@@ -92,8 +92,8 @@ contains
     !> Adds a group with the defaults of the table.
     subroutine add_group(name, line, number)
       character(len=*), intent(in) :: name
-      integer, intent(in) :: line, number                 !! line: first line of the group; number: index among the groups of this
-                                                          !! name
+      !> line: first line of the group; number: index among the groups of this name.
+      integer, intent(in) :: line, number
       integer, allocatable :: rows(:)
       integer :: v
 

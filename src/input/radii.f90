@@ -11,8 +11,8 @@ module radii
   integer, parameter :: purpose = 7                         !! number that identifies the random streams of this module
   real(real64), parameter :: part = 9.0_real64/11           !! largest deviation of a radius from the mean, relative to the mean
   real(real64), parameter :: powers = 0.5_real64*log(10.0_real64)   !! largest deviation of the logarithm of a radius from its mean
-  real(real64), parameter :: deviations = 3                 !! smallest allowed distance of the limits from the mean, in standard
-                                                            !! deviations
+  !> Smallest allowed distance of the limits from the mean, in standard deviations.
+  real(real64), parameter :: deviations = 3
 
 contains
 

@@ -14,8 +14,8 @@ module settings
   private
   public :: run_input_t, settings_t, run_settings_t, sampling_t, species_settings_t, output_settings_t, disks_in_file_t
 
-  integer, parameter :: many_disks = 500000           !! smallest number of disks for which domains that fit into the cache save
-                                                      !! time on one core
+  !> Smallest number of disks for which domains that fit into the cache save time on one core.
+  integer, parameter :: many_disks = 500000
 
   type :: run_settings_t
     character(len=:), allocatable :: title
@@ -24,8 +24,8 @@ module settings
     real(real64) :: dt                                !! time step of 'steps' [time]
     character(len=:), allocatable :: search           !! 'cells', 'pairs' or 'rescan'
     character(len=:), allocatable :: queue            !! 'calendar' or 'heap'
-    integer :: threads                                !! number of threads; in: 0 for the value of the environment; later the number
-                                                      !! that is used
+    !> Number of threads; in: 0 for the value of the environment; later the number that is used.
+    integer :: threads
     integer :: threads_asked = 1                      !! number of threads that was requested
   end type run_settings_t
 
@@ -39,14 +39,14 @@ module settings
 
   !> A species and its initial state.
   type, extends(species_t) :: species_settings_t
-    real(real64) :: radius = 0.0_real64               !! radius of each disk, or the largest radius if radii are drawn or from a
-                                                      !! file [length]
+    !> Radius of each disk, or the largest radius if radii are drawn or from a file [length]
+    real(real64) :: radius = 0.0_real64
     real(real64) :: mean_radius = 1.0_real64          !! mean of the radius distribution [length]
-    real(real64) :: polydispersity = 0.0_real64        !! standard deviation of the radii divided by their mean; 0 if all radii are
-                                                       !! equal
+    !> Standard deviation of the radii divided by their mean; 0 if all radii are equal.
+    real(real64) :: polydispersity = 0.0_real64
     character(len=:), allocatable :: distribution     !! 'uniform', 'gaussian', 'lognormal'
-    logical :: mass_by_area = .false.                 !! masses are proportional to areas; `mass` is then the mass of a disk with
-                                                      !! the mean radius
+    !> Masses are proportional to areas; `mass` is then the mass of a disk with the mean radius.
+    logical :: mass_by_area = .false.
     logical :: mass_in_file = .false.                 !! masses are read from the file, if the file contains masses
     logical :: radius_in_file = .false.               !! radii are read from the file
     logical :: spin_in_file = .false.                 !! angular velocities are read from the file
@@ -60,14 +60,14 @@ module settings
     type(disks_in_file_t) :: in_file
     real(real64), allocatable :: position(:, :)       !! (2,count) given positions for 'explicit' [length]; otherwise shape (2,0)
     character(len=:), allocatable :: velocities       !! 'rest', 'equal_speed', 'uniform', 'maxwell', 'explicit', 'file'
-    real(real64) :: speed                             !! speed for 'equal_speed', and largest velocity component for 'uniform'
-                                                      !! [length/time]
+    !> Speed for 'equal_speed', and largest velocity component for 'uniform' [length/time]
+    real(real64) :: speed
     real(real64) :: temperature                       !! kT for 'maxwell' [energy]
     real(real64) :: exact_temperature = -1.0_real64   !! kT to which velocities are scaled; negative if it is not given [energy]
     real(real64), allocatable :: velocity(:, :)       !! (2,count), or (2,1) for all disks, for 'explicit'; otherwise (2,0)
     real(real64) :: angular_velocity = 0.0_real64     !! angular velocity of all disks [1/time]
-    real(real64) :: rotational_temperature = -1.0_real64  !! kT of rotation, the mean of I omega**2; negative if it is not given
-                                                          !! [energy]
+    !> kT of rotation, the mean of I omega**2; negative if it is not given [energy]
+    real(real64) :: rotational_temperature = -1.0_real64
   end type species_settings_t
 
   !> Quantities by which samples are scheduled, in the form used in the names of variables.
@@ -87,8 +87,8 @@ module settings
 
   type :: output_settings_t
     type(sampling_t) :: sampling(2)                   !! schedule for each of `sampled`
-    character(len=text_length), allocatable :: frame_columns(:)  !! columns of frames in addition to positions; not allocated for
-                                                                 !! all columns
+    !> Columns of frames in addition to positions; not allocated for all columns.
+    character(len=text_length), allocatable :: frame_columns(:)
     logical :: single_precision                       !! frames are stored in single precision
     logical :: event_log
     logical :: virial_tensor                          !! the virial tensor is accumulated for smooth disks as well
@@ -114,8 +114,8 @@ module settings
     character(len=:), allocatable :: text                !! contents of the input file
     type(text_t), allocatable :: overrides(:)            !! GROUP.VARIABLE=VALUE of each --set
     real(real64) :: saved_at = -1.0_real64  !! time at which a simulation in memory was saved; negative if it was not saved [time]
-    character(len=:), allocatable :: changes             !! changes during the run, with a line `TIME VARIABLE=VALUE` for each
-                                                         !! change
+    !> Changes during the run, with a line `TIME VARIABLE=VALUE` for each change.
+    character(len=:), allocatable :: changes
     type(group_t), allocatable :: groups(:)    !! groups with all values that the run uses
     type(settings_t) :: settings                         !! the same values as typed data
   end type run_input_t

@@ -84,10 +84,10 @@ contains
   !> them.
   subroutine recall_overrides(output, overrides, error)
     character(len=*), intent(in) :: output                       !! path of the output
-    type(text_t), allocatable, intent(inout) :: overrides(:)  !! in: GROUP.VARIABLE=VALUE of the present command line; out: these
-                                                              !! and the overrides from the file
-    type(error_t), allocatable, intent(out) :: error          !! set if another version wrote the output, or if the input in the
-                                                              !! output is damaged
+    !> in: GROUP.VARIABLE=VALUE of the present command line; out: these and the overrides from the file.
+    type(text_t), allocatable, intent(inout) :: overrides(:)
+    !> Set if another version wrote the output, or if the input in the output is damaged.
+    type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
     type(text_t) :: override
     type(text_t), allocatable :: given(:)
@@ -438,8 +438,8 @@ contains
     end if
     call exchange_disks()
     do k = 1, size(progress%schedule)
-      associate (schedule => progress%schedule(k))  ! the input contains the intervals, from which the times of the next samples
-                                                    ! follow
+      ! The input contains the intervals, from which the times of the next samples follow.
+      associate (schedule => progress%schedule(k))
                                                   ! numbers
         call record%exchange(file, schedule%count)
         call record%exchange(file, schedule%last_events)
@@ -491,13 +491,13 @@ contains
         call exchange_short(tag%id)
         call record%exchange(file, tag%collisions)
         call exchange_short(tag%last_partner)
-        if (sim%features%own_sizes) call record%exchange(file, disk%radius)  ! without individual radii, the radii follow from the
-                                                                             ! input
+        ! Without individual radii, the radii follow from the input.
+        if (sim%features%own_sizes) call record%exchange(file, disk%radius)
       end associate
       settled = merge(1, 0, sim%events_done)
       do k = 1, merge(1, 0, sim%features%rotation) + merge(2, 0, sim%features%orientation)
-        call record%exchange(file, settled)  ! padding words, so that the length of the record differs between runs with and without
-                                             ! rotation and orientation
+        ! Padding words, so that the length of the record differs between runs with and without rotation and orientation.
+        call record%exchange(file, settled)
       end do
       if (allocated(sim%extra)) call record%pass(file, c_loc(sim%extra(1)), size(sim%extra)*storage_size(sim%extra)/64)
       if (.not. sim%features%own_sizes) return

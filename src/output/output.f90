@@ -32,8 +32,8 @@ module output
 
   real(real64), parameter :: longest_wait = 0.05_real64  !! longest time that a sample waits in a buffer while the run is active [s]
   integer, parameter :: events = 3              !! index of the track of the event log, which follows `frames` and `values`
-  integer, parameter :: kept = 1, anew = 2, dropped = 3  !! treatment of checkpoints in a new file: copied from the old file,
-                                                         !! written for the present state, or omitted
+  !> Treatment of checkpoints in a new file: copied from the old file, written for the present state, or omitted.
+  integer, parameter :: kept = 1, anew = 2, dropped = 3
 
   type :: output_t
     type(progress_t) :: progress
@@ -84,8 +84,8 @@ contains
       if (problem /= "") call fail(error, exit_files, path//": "//problem)
     end if
     if (.not. allocated(error)) call check_places(path, error)
-    if (.not. allocated(error)) call remove_file(path//unfinished_new)      ! this file may be the incomplete file of a run that was
-                                                                            ! killed
+    ! This file may be the incomplete file of a run that was killed.
+    if (.not. allocated(error)) call remove_file(path//unfinished_new)
     self%replaced = identity_of(path)
     if (is_file(path) .and. all(self%replaced == 0) .and. .not. allocated(error)) &
       call fail(error, exit_files, path//": cannot be examined: "//last_problem())
@@ -96,8 +96,8 @@ contains
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(inout) :: sim
-    logical, intent(in) :: force                  !! allows the run to replace an unfinished output now and a finished output at its
-                                                  !! end
+    !> Allows the run to replace an unfinished output now and a finished output at its end.
+    logical, intent(in) :: force
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: planned
     integer :: k

@@ -21,8 +21,8 @@ module run_description
   private
   public :: describe_end, describe_run, describes
 
-  integer, parameter :: longest_attribute = 1000      !! largest number of values in an attribute, because HDF5 limits attributes to
-                                                      !! 64 kB
+  !> Largest number of values in an attribute, because HDF5 limits attributes to 64 kB.
+  integer, parameter :: longest_attribute = 1000
   integer, parameter :: longest_note = 500            !! length of the text that states why the run ended
 
 contains
@@ -235,8 +235,8 @@ contains
       associate (row => table(groups(1)%values(k)%row))
         path = parameters_group//trim(row%group)//"/"
         second = trim(row%choices(index(trim(row%choices), " ", back=.true.) + 1:))
-        if (row%name == "file") cycle                       ! not stored here, because the obstacles themselves are stored: see
-                                                            ! `describe_rows`
+        ! Not stored here, because the obstacles themselves are stored: see `describe_rows`.
+        if (row%name == "file") cycle
         if (row%kind == "text") then
           do g = 1, n
             texts(g) = groups(g)%text_of(trim(row%name))
@@ -289,8 +289,8 @@ contains
     type(hdf5_file_t), intent(inout) :: file
     integer, intent(in) :: threads                    !! number of threads in the last part of the run
     real(real64), intent(in) :: wall_seconds          !! wall time of the whole run, summed over its parts [s]
-    real(real64), intent(in) :: rate(2)  !! in the last part of the run: collisions per processor time [1/s], and number of events
-                                         !! executed by the serial engine
+    !> in the last part of the run: collisions per processor time [1/s], and number of events executed by the serial engine.
+    real(real64), intent(in) :: rate(2)
     character(len=*), intent(in) :: note              !! reason of the end, if no stop rule was met
     character(len=longest_note) :: padded
 

@@ -66,8 +66,8 @@ contains
 
     too_far = .false.
     do i = 1, merge(sim%n_disks(), 0, any(sim%box%periodic))
-      too_far = too_far .or. any(abs(sim%extra(i)%image) >= largest_exact)      ! one period less than the limit, because a frame
-                                                                                ! may add one
+      ! One period less than the limit, because a frame may add one.
+      too_far = too_far .or. any(abs(sim%extra(i)%image) >= largest_exact)
     end do
     if (sim%tally%events > int(largest_exact, int64) .or. too_far) &
       call fail(error, exit_broken, "more than 2**53 collisions or periods: the output cannot count further")

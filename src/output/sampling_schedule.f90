@@ -16,8 +16,8 @@ module sampling_schedule
   integer, parameter :: units_lost = 4  !! times that differ by at most this number of units in the last place are treated as equal
 
   type :: schedule_t
-    real(real64) :: every(3) = never  !! intervals of time, of collisions and of events; the intervals of collisions and events need
-                                      !! not be integers
+    !> Intervals of time, of collisions and of events; the intervals of collisions and events need not be integers.
+    real(real64) :: every(3) = never
     type(sampling_t) :: chosen                    !! the sampling rules of the input, for the given times
     integer(int64) :: count = 0                   !! number of samples taken; the first sample is due at the start
     real(real64) :: next(3) = never               !! time, collisions and events at which the next samples are due

@@ -20,18 +20,19 @@ module domains
   public :: advance_domain, correction_t, domain_t, forever, list_copies, load, merge_logs, next_time, slot_of_copy, write_back
 
   real(real64), parameter :: forever = 2.0e150_real64      !! later than any event
-  real(real64), parameter :: longest_window = 5.0_real64  !! longest wall time for a window of one domain, after which the window is
-                                                          !! given up [s]
-  integer(int64), parameter :: iterations_between_checks = 100000  !! number of iterations between two checks of signals and of the
-                                                                   !! clock
-  integer(int32), parameter :: spare = 32, spare_at_least = 200  !! number of vacant slots (array elements without a disk) for disks
-                                                                 !! that enter: a fraction 1/spare of the disks, plus spare_at_least
+  !> Longest wall time for a window of one domain, after which the window is given up [s]
+  real(real64), parameter :: longest_window = 5.0_real64
+  !> Number of iterations between two checks of signals and of the clock.
+  integer(int64), parameter :: iterations_between_checks = 100000
+  !> Number of vacant slots (array elements without a disk) for disks that enter: a fraction 1/spare of the disks, plus
+  !> spare_at_least.
+  integer(int32), parameter :: spare = 32, spare_at_least = 200
 
   !> Correction: the true state of a disk whose copy in this domain is wrong or missing, or has to be removed.
   type, extends(whole_disk_t) :: correction_t
     integer(int32) :: global_index = 0             !! index of the disk in the whole simulation
-    integer(int32) :: cell(2) = 0                  !! column and row relative to the patch of this domain; the cell may be outside
-                                                   !! the patch
+    !> Column and row relative to the patch of this domain; the cell may be outside the patch.
+    integer(int32) :: cell(2) = 0
     integer(int32) :: slot = 0                     !! index of the copy in this domain; 0 if there is no copy
   end type correction_t
 
@@ -40,8 +41,9 @@ module domains
     integer(int32) :: halo = 0                     !! width of the halo in cells
     integer(int32), allocatable :: neighbour(:)    !! domains that own disks in this domain's patch
     type(patch_t) :: patch
-    type(simulation_t) :: sim  !! the disks that the domain owns, and copies; some array elements (slots) are vacant. The origin of
-                               !! time is that of the whole simulation
+    !> The disks that the domain owns, and copies; some array elements (slots) are vacant. The origin of time is that of the whole
+    !> simulation.
+    type(simulation_t) :: sim
     type(event_driven_t) :: engine
     !> (slots) Index of each disk in the whole simulation. The elements of vacant slots form a linked list of these slots.
     integer(int32), allocatable :: global_index(:)

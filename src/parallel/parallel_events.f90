@@ -31,14 +31,14 @@ module parallel_events
   integer, parameter :: no_engine = 0, serial_engine = 1, all_domains = 2
 
   type, extends(evolution_t) :: parallel_events_t
-    type(event_driven_t) :: serial                 !! initial state of the serial engine; a copy of it is used when the serial
-                                                   !! engine is needed
+    !> Initial state of the serial engine; a copy of it is used when the serial engine is needed.
+    type(event_driven_t) :: serial
     type(partition_t) :: parts
-    integer(int32) :: least_disks = 1250  !! smallest number of disks in a domain; it is doubled in a periodic box, in which each
-                                          !! slab is bounded by twice as many cuts
+    !> Smallest number of disks in a domain; it is doubled in a periodic box, in which each slab is bounded by twice as many cuts.
+    integer(int32) :: least_disks = 1250
     integer(int32) :: most_disks = 62000           !! largest number of disks in a domain that fits into the cache
-    real(real64) :: least_cores = 1.25_real64  !! average number of active cores below which the serial engine is faster than
-                                               !! several threads
+    !> Average number of active cores below which the serial engine is faster than several threads.
+    real(real64) :: least_cores = 1.25_real64
     integer(int64) :: windows_done = 0, windows_failed = 0
     ! The serial engine exists only while there are no domains, to save memory.
     type(event_driven_t), allocatable, private :: engine   !! the serial engine in use

@@ -18,11 +18,11 @@ module partition
   private
   public :: partition_t
 
-  real(real64), parameter :: longest_call = 1.0_real64         !! wall-clock time after which the caller can check signals and
-                                                               !! clocks [s]
+  !> Wall-clock time after which the caller can check signals and clocks [s]
+  real(real64), parameter :: longest_call = 1.0_real64
   real(real64), parameter :: averaging_time = 0.1_real64       !! averaging time for the number of active cores [s]
-  real(real64), parameter :: few_events = 20.0_real64  !! remaining number of events before a limit below which the domains advance
-                                                       !! one event at a time
+  !> Remaining number of events before a limit below which the domains advance one event at a time.
+  real(real64), parameter :: few_events = 20.0_real64
 
   !> The next step of all threads. One thread determines this step while the other threads wait.
   type :: plan_t
@@ -43,8 +43,8 @@ module partition
     integer(int32) :: wanted = 1                   !! number of domains
     real(real64) :: window = 0.5_real64            !! length of a window [collisions per disk]
     integer(int32) :: halo = 6                     !! width of the halo around a domain [cells]
-    real(real64) :: overload = 4.0_real64  !! limit of the iterations of one engine in a step, relative to the number of iterations
-                                           !! expected in all domains
+    !> Limit of the iterations of one engine in a step, relative to the number of iterations expected in all domains.
+    real(real64) :: overload = 4.0_real64
     type(patch_t) :: whole                         !! all cells of the box, which are constant during a run
     type(domain_cuts_t) :: cuts
     type(domain_t), allocatable :: domain(:)
@@ -196,8 +196,8 @@ contains
       real(real64) :: length
 
       length = self%window*self%shortening*sim%n_disks()/(2*self%event_rate)
-      if (self%wanted > self%threads) length = 2*length      ! longer windows, because each window loads each domain into the cache
-                                                             ! once
+      ! Longer windows, because each window loads each domain into the cache once.
+      if (self%wanted > self%threads) length = 2*length
       plan%windows = plan%windows + 1
       plan%t_begin = plan%t
       plan%t_end = plan%t + length

@@ -45,8 +45,8 @@ contains
     else
       sim%disk(i)%v = wall_rebound(law, v - normal_velocity, normal, elastic)
       if (any(abs(normal_velocity) > 0)) then
-        sim%disk(i)%v = sim%disk(i)%v + normal_velocity  ! rounding is monotonic, so that the rounded velocity of the disk is not
-                                                         ! less than that of the side
+        ! Rounding is monotonic, so that the rounded velocity of the disk is not less than that of the side.
+        sim%disk(i)%v = sim%disk(i)%v + normal_velocity
         if (law%restitution < 1 .and. .not. elastic) call end_bouncing(sim%disk(i)%v, v, normal_velocity, normal)
       end if
       ! This does not apply to time-stepped dynamics.
@@ -63,8 +63,8 @@ contains
   !> otherwise be infinite. The disk then moves with the side.
   pure subroutine end_bouncing(v, before, normal_velocity, normal)
     real(real64), intent(inout) :: v(2)          !! velocity of the disk after the collision [length/time]
-    real(real64), intent(in) :: before(2), normal_velocity(2)  !! velocity of the disk before the collision, velocity of the side
-                                                               !! [length/time]
+    !> Velocity of the disk before the collision, velocity of the side [length/time]
+    real(real64), intent(in) :: before(2), normal_velocity(2)
     real(real64), intent(in) :: normal(2)        !! unit vector inwards
     real(real64) :: left
 

@@ -295,8 +295,8 @@ contains
   pure subroutine next_obstacle(box, disk, last, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    integer(int32), intent(in) :: last          !! code of the obstacle with which the disk collided last, if the disk has had no
-                                                !! later event
+    !> Code of the obstacle with which the disk collided last, if the disk has had no later event.
+    integer(int32), intent(in) :: last
     integer(int32), intent(in) :: list(:)       !! codes of the obstacles to be tested, in descending order
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
@@ -317,8 +317,8 @@ contains
   pure subroutine find_image_contact(box, disk, last, obstacle, shift, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    integer(int32), intent(in) :: last          !! code of the obstacle with which the disk collided last, if the disk has had no
-                                                !! later event
+    !> Code of the obstacle with which the disk collided last, if the disk has had no later event.
+    integer(int32), intent(in) :: last
     integer(int32), intent(in) :: obstacle      !! code of the obstacle
     real(real64), intent(in) :: shift(2)        !! shift from the obstacle to its image [length]
     real(real64), intent(inout) :: t

@@ -11,8 +11,8 @@ module box_sides
   private
   public :: bounds, separate_from_sides, next_side, side_time
 
-  real(real64), parameter :: rounding = 16*epsilon(1.0_real64)  !! rounding error of the gap to a moving side, relative to the
-                                                                !! coordinates
+  !> Rounding error of the gap to a moving side, relative to the coordinates.
+  real(real64), parameter :: rounding = 16*epsilon(1.0_real64)
 
 contains
 

@@ -45,8 +45,8 @@ module disks
 
   !> Data of a disk that exist only in some simulations: see `simulation_state: has_extra`.
   type :: extra_t
-    real(real64) :: image(2) = 0.0_real64       !! number of periods by which the disk has moved along each axis, an integer; the
-                                                !! unwrapped position is x + image*edges
+    !> Number of periods by which the disk has moved along each axis, an integer; the unwrapped position is x + image*edges.
+    real(real64) :: image(2) = 0.0_real64
     real(real64) :: last_contact = 0.0_real64   !! time of the last contact, since the epoch, for the TC model [time]
     real(real64) :: spin = 0.0_real64           !! angular velocity [1/time]
     real(real64) :: angle = 0.0_real64          !! orientation at `clock`, unwrapped [radian]

@@ -13,8 +13,8 @@ module drive
   type :: drive_t
     integer :: kind = no_kicks                       !! position in `drive_kinds`
     real(real64) :: interval = never                 !! time between kicks [time]
-    real(real64) :: strength = 0.0_real64  !! noise strength: growth rate of the variance of each velocity component
-                                           !! [velocity**2/time]
+    !> Noise strength: growth rate of the variance of each velocity component [velocity**2/time]
+    real(real64) :: strength = 0.0_real64
     logical :: keep_momentum = .false.               !! the noise conserves the total momentum; .false. for other kinds
     real(real64) :: fraction = 1.0_real64            !! fraction of the disks that a kick of 'andersen' affects, on average
     real(real64) :: temperature = 0.0_real64         !! kT of the velocities drawn by 'andersen', 'brownian' and 'active' [energy]

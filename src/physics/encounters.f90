@@ -24,8 +24,8 @@ module encounters
   integer(int32), parameter :: most_visible = most_repeats - 3
   real(real64), parameter :: rounded = 1.0e-12_real64, slowest = 1.0e-120_real64
 
-  real(real64), parameter :: far_heavier = 2.0_real64**20  !! ratio of masses above which the velocity change of the heavy disk
-                                                           !! loses digits
+  !> Ratio of masses above which the velocity change of the heavy disk loses digits.
+  real(real64), parameter :: far_heavier = 2.0_real64**20
 
 contains
 
@@ -118,12 +118,12 @@ contains
       mass_j = sim%own_mass(j)
     end if
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
-    sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx  ! a division, because rounding errors of a stored reciprocal mass would always
-                                                   ! have the same sign
+    ! A division, because rounding errors of a stored reciprocal mass would always have the same sign.
+    sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     dv = sim%disk(j)%v - sim%disk(i)%v
-    if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call remove_residual_approach(sim, i, j)  ! because of rounding the two disks still approach
-                                                                                 ! each other
+    ! Because of rounding the two disks still approach each other.
+    if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call remove_residual_approach(sim, i, j)
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(j)%collisions = sim%tag(j)%collisions + 1
     sim%tag(i)%last_partner = sim%tag(j)%id

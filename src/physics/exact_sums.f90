@@ -11,16 +11,16 @@ module exact_sums
   real(real64), parameter :: most_units = 2.0_real64**digits_of_bound
   real(real64), parameter :: rare_unit = 2.0_real64**digits_of_rare
   integer, parameter :: digits_of_most = 125
-  integer(int128), parameter :: most = 2_int128**digits_of_most    !! limit of the two integers of a sum; beyond this limit the sum
-                                                                   !! is NaN
+  !> Limit of the two integers of a sum; beyond this limit the sum is NaN.
+  integer(int128), parameter :: most = 2_int128**digits_of_most
 
   !> A fixed-point sum. A term may exceed the bound that was passed to `choose_unit`; its addition then takes slightly longer. 2**35
   !> terms of any size below 2**90 units cannot overflow; multiples of 2**90 units in larger terms are counted separately.
   type :: exact_sum_t
     integer(int128) :: units = 0
     integer(int128) :: rare = 0                          !! multiples of 2**90 units
-    real(real64) :: per_one = 0.0_real64                 !! reciprocal of the unit, a power of two; 0 if the unit has not been
-                                                         !! chosen yet
+    !> Reciprocal of the unit, a power of two; 0 if the unit has not been chosen yet.
+    real(real64) :: per_one = 0.0_real64
   contains
     procedure :: choose_unit
     procedure :: add

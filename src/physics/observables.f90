@@ -32,8 +32,8 @@ module observables
   !> Indices of sums over the disks of a species, or over all disks.
   integer, parameter :: disks = 1, mass = 2, speed = 3, momentum = 4       !! momentum has two components
   integer, parameter :: kinetic = 6, potential = 7, rotational = 8         !! energies
-  integer, parameter :: own_kinetic = 9, own_momentum = 10  !! kinetic energy and momentum relative to the velocity profile of a
-                                                            !! sheared box; the momentum has two components
+  !> Kinetic energy and momentum relative to the velocity profile of a sheared box; the momentum has two components.
+  integer, parameter :: own_kinetic = 9, own_momentum = 10
   integer, parameter :: flux = 12               !! five components, see `tally: kinetic_flux`; also relative to the velocity profile
   integer, parameter :: tensor(*) = flux + [0, 1, 1, 2]                    !! components xx, xy, yx, yy of the momentum flux
   !> Total energy and the rounding error of its sum, precise enough for an energy balance. Zero unless `is_driven`.

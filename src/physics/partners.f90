@@ -16,8 +16,8 @@ module partners
   !> The code is reduced by 1 if the disk leaves this region through its right or upper edge.
   integer(int32), parameter :: looks_again = first_crossing - n_sides
   integer(int32), parameter :: nothing = -huge(1_int32)
-  integer(int32), parameter :: most_repeats = 11           !! largest length of a series of simultaneous collisions that can be
-                                                           !! stored
+  !> Largest length of a series of simultaneous collisions that can be stored.
+  integer(int32), parameter :: most_repeats = 11
   integer(int32), parameter :: per_repeat = 2_int32**27    !! larger than any id of a disk
   character(len=6), parameter :: side_name(n_sides) = ["left  ", "right ", "bottom", "top   "]
 

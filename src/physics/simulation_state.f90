@@ -54,8 +54,8 @@ module simulation_state
     integer(int64) :: changes = 0                 !! number of changes to forces, laws or velocities since the start of the run
     type(tally_t) :: tally                        !! counters and sums since the start of the run
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
-    real(real64) :: reference_energy = 0.0_real64  !! kinetic energy at the time when the velocities were last set, at the start or
-                                                   !! by a change
+    !> Kinetic energy at the time when the velocities were last set, at the start or by a change.
+    real(real64) :: reference_energy = 0.0_real64
     real(real64) :: typical_speed2 = 0.0_real64   !! largest mean square speed at the start and after changes [(length/time)**2]
   contains
     procedure :: time

@@ -40,8 +40,8 @@ module tally
   type :: tally_t
     integer(int64) :: events = 0                   !! number of events
     integer(int64) :: collisions = 0               !! number of collisions of disks
-    integer(int64) :: simultaneous = 0             !! number of simultaneous inelastic collisions, see `encounters:
-                                                   !! count_simultaneous_collision`
+    !> Number of simultaneous inelastic collisions, see `encounters: count_simultaneous_collision`.
+    integer(int64) :: simultaneous = 0
     real(real64) :: collapse = never               !! time of the first collapse, since the start of the run [time]
     type(exact_sum_t) :: sum(size(sums))
     integer(int64), allocatable :: surface_collisions(:)  !! (surfaces) number of collisions with each surface

@@ -46,8 +46,8 @@ module cell_faces
   !> A line parallel to an axis that limits a cell: a face of a column or row of cells, or a side of the box.
   type :: line_t
     real(real64) :: place = 0.0_real64             !! position of the face or side [length]
-    real(real64) :: inset = 0.0_real64             !! distance from the line at which the event of a disk occurs, in radii: 0 for a
-                                                   !! face, 1 for a side
+    !> Distance from the line at which the event of a disk occurs, in radii: 0 for a face, 1 for a side.
+    real(real64) :: inset = 0.0_real64
     integer(int32) :: code = 0                     !! code of the event: a side, or a crossing
     logical :: struck = .false.                    !! a moving side may touch disks of this cell
   end type line_t
@@ -61,8 +61,8 @@ module cell_faces
     ! A piston can reach any part of the box. Until it has moved by the width of a cell, however, it can touch only the disks in a
     ! strip, which consists of adjacent columns or rows of cells.
     real(real64) :: due = never                    !! time when the first piston leaves its strip, since the epoch [time]
-    real(real64) :: centre(n_sides) = 0.0_real64  !! centre of the strip of each piston, as displacement inwards from the side
-                                                  !! [length]
+    !> Centre of the strip of each piston, as displacement inwards from the side [length]
+    real(real64) :: centre(n_sides) = 0.0_real64
     real(real64) :: beyond(2, 2) = 0.0_real64      !! (axis, lower or upper) largest distance of disks beyond the sides [length]
     type(line_t), allocatable :: column(:, :)      !! (0:1,columns) left and right faces
     type(line_t), allocatable :: row(:, :)         !! (0:1,rows) lower and upper faces
@@ -90,8 +90,8 @@ contains
     patch%n = n
     patch%reach = reach
     patch%lower = box%lower
-    patch%width = box%edges()/n*(1 + 4*epsilon(reach))     ! the factor ensures that rounding does not place the last face inside
-                                                           ! the box
+    ! The factor ensures that rounding does not place the last face inside the box.
+    patch%width = box%edges()/n*(1 + 4*epsilon(reach))
     call patch%find_sides(box%periodic)
   end function all_cells
 
@@ -460,8 +460,7 @@ contains
       t_other = falling_time(line(1 - up), axis, box, disk, now)
       up = chosen(up, 1 - up, t_other < t)
       t = min(t, t_other)
-    else                                           ! the face ahead or, if gravity reverses the motion before the disk reaches that
-                                                   ! face, the face behind
+    else                                           ! the face ahead, or the face behind if gravity reverses the motion
       x = flight(disk%x(axis), disk%v(axis), g, now - disk%clock)
       v = flight_velocity(disk%v(axis), g, now - disk%clock)
       up = merge(1, 0, v > -g*resolution(now))

@@ -1,5 +1,6 @@
-!> Search by cells (linked-cell method). The box is divided into cells at least one diameter wide. Before a disk leaves its cell,
-!> which is an event, it can only touch disks in its own cell and the eight cells around it. Wide cells overlap (see `cell_faces`).
+!> Searches for collision partners by cells (linked-cell method). The box is divided into cells at least one diameter wide. Before a
+!> disk leaves its cell, which is an event, it can only touch disks in its own cell and the eight cells around it. Wide cells
+!> overlap (see `cell_faces`).
 module cell_grid
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t, next_obstacle
@@ -43,7 +44,7 @@ module cell_grid
     procedure :: cross
     procedure :: insert
     procedure :: take_out
-    procedure :: predict_with_care                 ! bound, so that it is not inlined into the hot path
+    procedure :: predict_with_care                 ! bound to the type, so that it is not inlined
     procedure :: read_ahead
     procedure, private :: cross_with_care
     procedure, private :: follow_big

@@ -206,8 +206,8 @@ contains
 
     do row = near%cell - cells%stride, near%cell + cells%stride, cells%stride
       do c = row - 1, row + 1
-        j = cells%chain(c)                         ! the first disk of the linked list is also in a slot, unless `gather` omitted
-                                                   ! this disk
+        ! The first disk of the linked list is also in a slot, unless `gather` omitted this disk.
+        j = cells%chain(c)
         if (j > 0 .and. c /= near%cell) j = cells%next(j)
         do while (j > 0)
           if (near%n == list_capacity) call test_list(sim, known, near)

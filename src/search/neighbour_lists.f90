@@ -1,10 +1,10 @@
 !> Neighbour lists: for each disk the disks that it can touch while both stay in their neighbourhoods.
 !>
 !> A neighbourhood is a square around the position at which the disk was listed, clipped at the faces of its cell and at the sides
-!> of the box. Two disks are in each other's lists if they can touch somewhere in their neighbourhoods. Leaving a neighbourhood is
-!> an event: the disk then searches the nine cells around it and gets a new neighbourhood and a new list. A prediction therefore
-!> tests only a few neighbours, however many disks the cells contain (Donev, Torquato and Stillinger, J. Comput. Phys. 202, 737
-!> (2005)).
+!> of the box. Two disks are in each other's lists if they can touch somewhere in their neighbourhoods. An event occurs when a disk
+!> leaves its neighbourhood: the nine cells around the disk are then searched, and the disk receives a new neighbourhood and a new
+!> list. A prediction therefore tests only a few neighbours, however many disks the cells contain (Donev, Torquato and Stillinger,
+!> J. Comput. Phys. 202, 737 (2005)).
 !>
 !> Lists are a cache. A full list counts as incomplete until its disk is listed again; until then the disk searches the cells.
 module neighbour_lists
@@ -21,12 +21,12 @@ module neighbour_lists
   public :: neighbour_lists_t
 
   integer(int32), parameter :: unlisted = -2, incomplete = -1    !! values in place of the number of entries
-  integer(int32), parameter :: always_copied = 15  !! number of entries that are copied from every list, so that no branch depends
-                                                   !! on the actual number
-  integer(int32), parameter :: image_unit = 2**27                !! factor of the image in an entry; it exceeds every number of
-                                                                 !! disks
-  integer(int32), parameter :: most_listed = image_unit/4  !! largest number of disks with neighbour lists: 32-bit integers can then
-                                                           !! number all entries
+  !> Number of entries that are copied from every list, so that no branch depends on the actual number.
+  integer(int32), parameter :: always_copied = 15
+  !> Factor of the image in an entry; it exceeds every number of disks.
+  integer(int32), parameter :: image_unit = 2**27
+  !> Largest number of disks with neighbour lists: 32-bit integers can then number all entries.
+  integer(int32), parameter :: most_listed = image_unit/4
 
   !> The region in which the centre of a disk stays until it is listed again.
   type :: neighbourhood_t
@@ -37,8 +37,8 @@ module neighbour_lists
 
   type :: neighbour_lists_t
     logical :: used = .false.
-    real(real64) :: least_candidates = candidates_that_pay   !! smallest mean number of disks in nine cells for which lists save
-                                                             !! time, in the dilute limit
+    !> Smallest mean number of disks in nine cells for which lists save time, in the dilute limit.
+    real(real64) :: least_candidates = candidates_that_pay
     integer(int32) :: capacity = 16                !! capacity of the list of a small disk; larger disks have more neighbours
     real(real64) :: mean_radius = 0.0_real64       !! [length]
     real(real64) :: margin = 0.0_real64            !! half the width of the neighbourhood of a disk with the mean radius [length]
@@ -49,12 +49,12 @@ module neighbour_lists
     !> (4,disks) x and y of the centre relative to `origin`, radius plus `rounding`, and half the width of the unclipped square
     !> [length]
     real(real32), allocatable :: extent(:, :)
-    integer(int32), allocatable :: first(:)  !! (disks+1) position of the list of each disk, which begins with the number of its
-                                             !! entries
-    integer(int32), allocatable :: entry(:)        !! (0:) all lists: each entry is the index of a disk, which starts at 0, plus
-                                                   !! image_unit times the index of the image
-    integer(int32), allocatable :: back(:)         !! (0:) for each entry, the position at which the list of the other disk contains
-                                                   !! the disk that owns this list
+    !> (disks+1) position of the list of each disk, which begins with the number of its entries.
+    integer(int32), allocatable :: first(:)
+    !> (0:) all lists: each entry is the index of a disk, which starts at 0, plus image_unit times the index of the image.
+    integer(int32), allocatable :: entry(:)
+    !> (0:) for each entry, the position at which the list of the other disk contains the disk that owns this list.
+    integer(int32), allocatable :: back(:)
   contains
     procedure :: prepare
     procedure, private :: make_room
@@ -325,8 +325,8 @@ contains
     last = self%entry(at + n)
     self%entry(at + place) = last
     self%back(at + place) = self%back(at + n)
-    self%back(self%first(iand(last, image_unit - 1) + 1) + self%back(at + n)) = place    ! the value is not used if that list is
-                                                                                         ! incomplete
+    ! The value is not used if that list is incomplete.
+    self%back(self%first(iand(last, image_unit - 1) + 1) + self%back(at + n)) = place
     self%entry(at) = n - 1
   end subroutine remove
 

@@ -11,8 +11,8 @@ module obstacle_cells
   !> An obstacle in the list of a cell.
   type :: entry_t
     integer(int32) :: obstacle = 0                  !! index in the box
-    integer(int32) :: next = 0                      !! next entry in the same list, for an obstacle with a larger index; 0 at the
-                                                    !! end of the list
+    !> Next entry in the same list, for an obstacle with a larger index; 0 at the end of the list.
+    integer(int32) :: next = 0
   end type entry_t
 
   type :: obstacle_cells_t
@@ -59,7 +59,7 @@ contains
     end do
   end subroutine serve
 
-  !> First entry of the list for a point; 0 if no obstacle is near it.
+  !> First entry of the list for a point; 0 if no obstacle is near the point.
   pure function first_near(self, p) result(e)
     class(obstacle_cells_t), intent(in) :: self
     real(real64), intent(in) :: p(2)                !! [length]
@@ -98,8 +98,8 @@ contains
     !> Adds the obstacle to the lists in a block of cells. The block is halved recursively until it is a single cell, or until the
     !> outline does not cross the block. In the latter case the disks are excluded from all points of the block or from none.
     recursive subroutine enter_block(low, high)
-      integer(int32), intent(in) :: low(2), high(2) !! first and last column and row, which start at 0 and may be beyond periodic
-                                                    !! sides
+      !> First and last column and row, which start at 0 and may be beyond periodic sides.
+      integer(int32), intent(in) :: low(2), high(2)
       real(real64) :: d(2), half(2)
       integer(int32) :: last(2), first(2), axis, i, j
 

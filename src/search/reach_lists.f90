@@ -41,13 +41,13 @@ module reach_lists
   type :: reach_lists_t
     type(big_disk_t), allocatable :: big(:)
     real(real64) :: margin = 0.0_real64          !! margin around the listed positions of big disks [length]
-    integer(int32), allocatable :: first(:, :)  !! (columns,rows) first entry of each cell; 0 if its list is empty. Not allocated if
-                                                !! there are neither obstacles nor big disks
+    !> (columns,rows) first entry of each cell; 0 if its list is empty. Not allocated if there are neither obstacles nor big disks.
+    integer(int32), allocatable :: first(:, :)
     type(entry_t), allocatable :: entry(:)
     integer(int32), private :: vacant = 0        !! head of the list of free entries
     type(patch_t), private :: patch              !! cells for which obstacles are listed
-    real(real64), private :: span(2, 2) = 0.0_real64     !! lower left and upper right corner of the rectangle of all these cells
-                                                         !! [length]
+    !> Lower left and upper right corner of the rectangle of all these cells [length]
+    real(real64), private :: span(2, 2) = 0.0_real64
   contains
     procedure :: serves
     procedure :: renew

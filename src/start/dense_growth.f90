@@ -22,16 +22,16 @@ module dense_growth
   public :: grow_disks, smallest_scale
 
   real(real64), parameter :: loose = 0.4_real64         !! packing fraction at which the disks are inserted
-  real(real64), parameter :: lead = 1.02_real64  !! largest ratio of relative sizes of two disks during growth; the relative size is
-                                                 !! the size divided by the full size
+  !> Largest ratio of relative sizes of two disks during growth; the relative size is the size divided by the full size.
+  real(real64), parameter :: lead = 1.02_real64
   real(real64), parameter :: caution = 0.9_real64       !! fraction of the gap by which a disk grows in a step
   real(real64), parameter :: smallest_scale = 1.0e-3_real64       !! smallest initial size, relative to the full size
-  integer, parameter :: approaches = 6                  !! number of growth steps at given positions; each step reduces the gap to a
-                                                        !! tenth
+  !> Number of growth steps at given positions; each step reduces the gap to a tenth.
+  integer, parameter :: approaches = 6
   integer, parameter :: run_length = 2                  !! collisions per disk between growth steps
   integer, parameter :: mixing_length = 10              !! collisions per disk at full size
-  integer, parameter :: jumps_per_check = 50            !! number of growth steps in which the difference to the full size must
-                                                        !! decrease by a tenth
+  !> Number of growth steps in which the difference to the full size must decrease by a tenth.
+  integer, parameter :: jumps_per_check = 50
 
 contains
 
@@ -42,8 +42,8 @@ contains
     real(real64), intent(in) :: full(:)                 !! (n) radii to be reached, in the order of species [length]
     type(random_stream_t), intent(inout) :: stream
     class(status_line_t), intent(inout) :: line         !! status line that shows the progress
-    real(real64), allocatable, intent(inout) :: x(:, :) !! (2,n) positions in the order of species; in: initial positions, or shape
-                                                        !! (2,0) for random ones; out: final positions [length]
+    !> (2,n) positions in the order of species; in: initial positions, or shape (2,0) for random ones; out: final positions [length]
+    real(real64), allocatable, intent(inout) :: x(:, :)
     type(error_t), allocatable, intent(out) :: error
     type(simulation_t) :: sim                           ! elastic disks
     type(event_driven_t), allocatable :: evolution
@@ -129,8 +129,8 @@ contains
       wanted = 0
       do k = 1, size(species)
         associate (own => full(disks_before(species, k) + 1:disks_before(species, k + 1)))
-          wanted = wanted + own(1)**2*sum((own/own(1))**2)      ! written such that the result is exactly the number of disks if all
-                                                                ! radii are equal
+          ! Written such that the result is exactly the number of disks if all radii are equal.
+          wanted = wanted + own(1)**2*sum((own/own(1))**2)
         end associate
       end do
       wanted = pi*wanted/product(sim%box%edges())

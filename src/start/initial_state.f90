@@ -16,8 +16,8 @@ module initial_state
   private
   public :: check_speeds, create_simulation, describe_system
 
-  real(real64), parameter :: most = 1.0e130_real64          !! largest number that may be squared later; the largest real is about
-                                                            !! 1e308
+  !> Largest number that may be squared later; the largest real is about 1e308.
+  real(real64), parameter :: most = 1.0e130_real64
   real(real64), parameter :: widest = 1.0e30_real64*(1 + 1.0e-12_real64)   !! largest ratio of masses
 
 contains
@@ -44,8 +44,8 @@ contains
     call problems%report(input%path, error, input%overrides)
   end subroutine create_simulation
 
-  !> Refuses a simulation in which a product of lengths, speeds and masses that enters the prediction or execution of collisions
-  !> would overflow or underflow, because collisions would then be missed.
+  !> Reports an error if a product of lengths, speeds and masses in the prediction or execution of collisions could overflow or
+  !> underflow. The simulation would then miss collisions.
   subroutine check_speeds(sim, problems)
     type(simulation_t), intent(in) :: sim
     type(problem_list_t), intent(inout) :: problems

@@ -33,8 +33,8 @@ contains
   subroutine complete_settings(settings, groups, problems, complete)
     type(settings_t), intent(inout) :: settings
     type(group_t), intent(inout) :: groups(:)
-    type(problem_list_t), intent(inout) :: problems           !! problems of the input; problems of unreadable files and a lack of
-                                                              !! memory are added
+    !> Problems of the input; problems of unreadable files and a lack of memory are added.
+    type(problem_list_t), intent(inout) :: problems
     logical, intent(out) :: complete                          !! .false. if there are too many disks, or if the box is invalid
     integer :: s(2), k, before
 

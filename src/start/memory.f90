@@ -21,10 +21,10 @@ module memory
   real(real64), parameter :: extra = 40, own_size = 8        !! image indices, contact time and rotation of a disk; individual mass
   real(real64), parameter :: sampled = 8.8_real64            !! one number in a frame
   real(real64), parameter :: listed = 264                    !! neighbour list
-  real(real64), parameter :: kicked = 16, stepped = 100      !! random numbers for the driving; Verlet lists of time-stepped
-                                                             !! dynamics
-  real(real64), parameter :: divided(2) = [143, 205]         !! additional memory with domains: in a box with walls, in a periodic
-                                                             !! box
+  !> Random numbers for the driving; Verlet lists of time-stepped dynamics.
+  real(real64), parameter :: kicked = 16, stepped = 100
+  !> Additional memory with domains: in a box with walls, in a periodic box.
+  real(real64), parameter :: divided(2) = [143, 205]
   real(real64), parameter :: listed_twice = 80               !! additional memory with domains and neighbour lists
   ! Total memory during the placement of disks: at given positions, at random positions, at positions from a file, and by
   ! compression.

@@ -37,8 +37,8 @@ module packing
     type(images_t), private :: images               !! images of the box
     type(placed_t), allocatable :: disk(:)          !! (n)
     type(layer_t), allocatable :: layer(:)          !! (number of species)
-    type(obstacle_cells_t) :: near                  !! lists of obstacles for each cell, valid up to the largest radius of the
-                                                    !! species for which `open_species` was called
+    !> Lists of obstacles for each cell, valid up to the largest radius of the species for which `open_species` was called.
+    type(obstacle_cells_t) :: near
   contains
     procedure :: open_species
     procedure :: add
@@ -73,8 +73,8 @@ contains
     integer(int32), intent(in) :: s
     real(real64), intent(in) :: radius              !! largest radius of the disks of the species [length]
     integer, intent(in) :: count                    !! number of disks to be placed
-    real(real64), intent(in) :: lower(2), upper(2)  !! corners of a rectangle that contains the centres of all disks of the species
-                                                    !! [length]
+    !> Corners of a rectangle that contains the centres of all disks of the species [length]
+    real(real64), intent(in) :: lower(2), upper(2)
     real(real64) :: side, extent(2), few
     integer :: n(2)
 
@@ -119,8 +119,8 @@ contains
   pure subroutine find_blocker(self, centre, half, radius, blocker)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: centre(2), half(2)  !! [length]
-    real(real64), intent(in) :: radius              !! radius, at most the largest radius of the species for which `open_species`
-                                                    !! was called [length]
+    !> Radius, at most the largest radius of the species for which `open_species` was called [length]
+    real(real64), intent(in) :: radius
     integer(int32), intent(out) :: blocker
     real(real64) :: rho
     integer(int32) :: e

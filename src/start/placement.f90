@@ -32,10 +32,10 @@ module placement
   public :: place_disks
 
   integer, parameter :: stream_number = 1                   !! identifies the random streams of this module
-  integer(int32), parameter :: many_trials = 500000         !! limit of the number of disks that all attempts of 'random' place
-                                                            !! together
-  integer(int32), parameter :: few = 5                      !! additional tolerance, in numbers of disks, which matters for few
-                                                            !! disks
+  !> Limit of the number of disks that all attempts of 'random' place together.
+  integer(int32), parameter :: many_trials = 500000
+  !> Additional tolerance, in numbers of disks, which matters for few disks.
+  integer(int32), parameter :: few = 5
   real(real64), parameter :: nearly = 1.25_real64  !! largest factor by which another attempt is assumed to place more disks
   real(real64), parameter :: denser = 1.5_real64  !! smallest factor by which 'dense' packings are denser than 'random' packings
   integer, parameter :: most_reports = 5                    !! largest number of reports of one kind for one species
@@ -44,13 +44,13 @@ contains
 
   !> Sets the positions and radii of all disks. Also sets the velocities of the disks if a file contains velocities.
   subroutine place_disks(species, groups, seed, line, sim, problems)
-    type(species_settings_t), intent(inout) :: species(:)   !! the species; the procedure deallocates their tables of disks that
-                                                            !! were read from files
+    !> The species; the procedure deallocates their tables of disks that were read from files.
+    type(species_settings_t), intent(inout) :: species(:)
     type(group_t), intent(in) :: groups(:)                  !! groups of the species
     integer(int64), intent(in) :: seed
     class(status_line_t), intent(inout) :: line             !! shows the progress
-    type(simulation_t), intent(inout) :: sim                !! in: simulation with its box, and with the disks in the order of the
-                                                            !! input
+    !> in: simulation with its box, and with the disks in the order of the input.
+    type(simulation_t), intent(inout) :: sim
     type(problem_list_t), intent(inout) :: problems
     type(packing_t) :: packing
     type(random_stream_t) :: stream
@@ -227,8 +227,8 @@ contains
     !> positions from a file.
     subroutine place_densely(members)
       integer, intent(in) :: members(:)                     !! indices of the species
-      type(packing_t) :: small                              ! copy of the packing to which the small disks at the start of the
-                                                            ! growth are added
+      ! Copy of the packing to which the small disks at the start of the growth are added.
+      type(packing_t) :: small
       real(real64), allocatable :: places(:, :), full(:)    ! positions and full radii of the disks of all given species [length]
       type(error_t), allocatable :: error
       logical :: grown

@@ -32,8 +32,8 @@ contains
     character(len=:), allocatable :: text, problem
     real(real64), allocatable :: table(:, :)                ! (column_names,n) values of the disks
     integer, allocatable :: lines(:)                        ! (n) line number of each disk
-    integer, allocatable :: column(:)  ! index in `known_names` of each column of the file; empty before the first line has been
-                                       ! read
+    ! Index in `known_names` of each column of the file; empty before the first line has been read.
+    integer, allocatable :: column(:)
     integer :: first(longest_line), last(longest_line)      ! position of each word in the line
     integer(int64) :: begin, past                           ! beginning and end of a line in the text
     integer :: number, n, n_words

@@ -28,8 +28,8 @@ module starting_disks
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: name                    !! name of the species
       type(disks_in_file_t), intent(inout) :: disks
-      type(box_t), intent(in), optional :: box                !! box to which the positions are scaled; without this argument they
-                                                              !! are not scaled
+      !> Box to which the positions are scaled; without this argument they are not scaled.
+      type(box_t), intent(in), optional :: box
     end subroutine read_last_frame
   end interface
 

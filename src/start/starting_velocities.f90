@@ -83,11 +83,10 @@ contains
           end do
         case ("explicit")
           do i = first, last
-            disk(i)%v = species%velocity(:, min(i - first + 1, size(species%velocity, 2)))  ! a single given velocity applies to all
-                                                                                            ! disks
+            ! A single given velocity applies to all disks.
+            disk(i)%v = species%velocity(:, min(i - first + 1, size(species%velocity, 2)))
           end do
-        case default                                        ! 'rest', or 'file': in the latter case the velocities have been set
-                                                            ! together with the positions
+        case default                                        ! 'rest', or 'file' for velocities that are already set
         end select
       end associate
     end subroutine draw_velocities

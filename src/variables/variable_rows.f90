@@ -48,12 +48,12 @@ module variable_rows
     character(len=help_length) :: help       !! help text in full sentences, of which the first names the quantity
     type(range_t) :: range = anything        !! range of numbers
     character(len=16) :: unit = ""
-    character(len=100) :: choices = ""       !! allowed texts, separated by blanks; empty if any text is allowed. The module
-                                             !! `choices` contains their meanings
-    character(len=60) :: goes_with = ""      !! name of a choice variable, then its values for which the present variable has an
-                                             !! effect
-    character(len=80) :: excludes = ""       !! variables of the same group that must not be given together with the present
-                                             !! variable
+    !> Allowed texts, separated by blanks; empty if any text is allowed. The module `choices` contains their meanings.
+    character(len=100) :: choices = ""
+    !> Name of a choice variable, then its values for which the present variable has an effect.
+    character(len=60) :: goes_with = ""
+    !> Variables of the same group that must not be given together with the present variable.
+    character(len=80) :: excludes = ""
     character(len=9) :: may_change = never   !! when the value may differ from the value at the start
     character(len=100) :: otherwise = ""     !! the default in words, if the default is not a constant
   end type variable_t
