@@ -1,6 +1,5 @@
-!> Searches for collision partners by cells (linked-cell method). The box is divided into cells at least one diameter wide. Before a
-!> disk leaves its cell, which is an event, it can only touch disks in its own cell and the eight cells around it. Wide cells
-!> overlap (see `cell_faces`).
+!> Cell search (linked-cell method). The box is divided into cells at least one diameter wide. Before a disk leaves its cell, which
+!> is an event, it can only touch disks in its own cell and the eight cells around it. Wide cells overlap (see `cell_faces`).
 module cell_grid
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t, next_obstacle
