@@ -4,6 +4,7 @@ import copy
 import gc
 import io
 import multiprocessing
+import pickle
 import re
 import signal
 import subprocess
@@ -253,6 +254,36 @@ def test_overrides_may_be_nested_and_are_named_in_messages(begin):
         with pytest.raises(ProgramError) as refused:
             begin(GROUPS, wrong)
         assert refused.value.message.startswith(words) and "--set" not in refused.value.message
+
+
+@pytest.mark.parametrize("velocity", [None, (1, 2), [(k, -k) for k in range(3)]])
+def test_disks_may_have_radii_and_masses_of_their_own(tmp_path, temporary, velocity):
+    """The starting file stands beside the output, so that a run can be resumed."""
+    own = {"radius": np.array([0.01, 0.02, 0.03]), "mass": [1, 2, 0.1], "name": "odd"}
+    own["position"] = [(0.2, 0.2), (0.5, 0.5), (0.8, 0.8)]
+    own |= {"speed": 1} if velocity is None else {"velocity": velocity}
+    system = {"species": [{"count": 2, "radius": 0.01, "speed": 1}, own], "stop": {"collisions": 2}}
+    run = package.run(system, output=tmp_path / "out.h5")
+    other, box = package.run(system), package.Simulation(system)
+    for found in (run, other, box, pickle.loads(pickle.dumps(box))):
+        assert found.radius[2:].tolist() == [0.01, 0.02, 0.03]
+        assert found.mass[2:].tolist() == [1, 2, 0.1]
+    place = np.array([other.position[0], run.position[0]])
+    assert np.array_equal(place, [box.position] * 2) and place[0, 2:].tolist() == [
+        *map(list, own["position"])
+    ]
+    if velocity is not None:
+        assert np.array_equal(box.velocity[2:], np.broadcast_to(velocity, (3, 2)))
+    assert (tmp_path / "out.h5.start-odd.txt").is_file()
+    more = {"stop.collisions": 4}
+    assert (
+        package.run(system, more, tmp_path / "out.h5", resume=True).observable("collisions")[-1]
+        == 4
+    )
+    with pytest.raises(TypeError, match=r"species.mass: .* need a position"):
+        package.run({"species": {"count": 3, "mass": [1, 2, 3], "radius": 0.1}})
+    with pytest.raises(ValueError, match="mass: of 2 disks, not of 3"):
+        package.run({"species": own | {"mass": [1, 2]}})
 
 
 def test_file_names_may_begin_with_a_dash(tmp_path):

@@ -91,7 +91,8 @@ def sweep(
     [10, 20]
     """
     pandas_module()  # a missing package is reported before the runs
-    text, folder = read_input(system), Path(folder)
+    folder = Path(folder)
+    text = read_input(system, folder / "input")
     members = [
         settings
         for part in ([values] if isinstance(values, Mapping) else values)

@@ -10,9 +10,9 @@ from .engine import c_text
 from .program import ProgramError, unseen
 
 
-def read_input(system: str | Path | Mapping[str, Any]) -> str:
+def read_input(system: str | Path | Mapping[str, Any], place: Path | None = None) -> str:
     """Return the text of an input of any kind."""
-    if (text := unseen(system)) is not None:
+    if (text := unseen(system, place)) is not None:
         return text
     try:
         return Path(cast(str, system)).read_text(encoding="utf-8", errors="surrogateescape")

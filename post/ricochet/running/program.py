@@ -21,6 +21,7 @@ from tqdm import tqdm
 from ..commands import HERE
 from ..reading.files import RunError, TemporaryFolder, did_you_mean
 from ..reading.reader import Run, open_run
+from .starting import with_start
 
 STOPPED = 75
 PROGRESS = "\033[?7l"  # start of each update of the program's progress line on a terminal
@@ -62,7 +63,8 @@ def run(
     ----------
     system : str, Path or mapping
         an input file, its text, or a dictionary of its groups, as in `{"species": {"count": 9,
-        "radius": 0.1}}`, with a list of dictionaries for a repeated group
+        "radius": 0.1}}`, with a list of dictionaries for a repeated group; radius, mass,
+        angular_velocity and orientation of a species may be arrays, with a value for each position
     overrides : mapping of str to object, optional
         values of variables, as in `{"species.gas.mass": 2}` or `{"contact": {"restitution": 0.9}}`;
         None stands for the default of a variable
@@ -96,12 +98,13 @@ def run(
     program = find_program()
     folder = TemporaryFolder()
     work = folder.path
-    groups = namelist(system) if isinstance(system, Mapping) else None
-    if (text := unseen(system)) is not None:
-        system = work / "input.nml"
-        system.write_text(text, encoding="utf-8")
     temporary = output is None
     output = work / "run.h5" if output is None else Path(output)
+    text = unseen(system, output)
+    groups = text if isinstance(system, Mapping) else None
+    if text is not None:
+        system = work / "input.nml"
+        system.write_text(text, encoding="utf-8")
     cores = {"run.threads": threads} if whole_threads(threads) else {}
     pairs = settings_of({} if overrides is None else overrides) + settings_of(cores)
     words = [word for pair in pairs for word in ("--set", pair)]
@@ -178,8 +181,9 @@ def find_program() -> str:
     build = [f"in {root / 'build'}"] if (root / "Makefile").is_file() else []  # else installed
     where = f"at {wish}" if wish else " or ".join([*build, "on PATH"])
     make = "run make" if build else "run make install in a clone of Ricochet"
-    raise ProgramError(f"no program ricochet {where}: {make}, or set RICOCHET to the path of the "
-        "program", 3)
+    raise ProgramError(
+        f"no program ricochet {where}: {make}, or set RICOCHET to the path of the program", 3
+    )
 
 
 def watched(command: list[str], progress: bool = True) -> tuple[int, list[str]]:
@@ -246,26 +250,33 @@ def lines_from(terminal: int) -> Iterator[str]:
 # --- the input ---
 
 
-def unseen(system: str | Path | Mapping[str, Any]) -> str | None:
-    """Return the text of an input that is not a file, or None for a file."""
+def unseen(system: str | Path | Mapping[str, Any], place: Path | None = None) -> str | None:
+    """Return the text of an input that is not a file, or None for a file.
+
+    Starting files of arrays are written beside `place`; without it into a folder of this process.
+    """
     if isinstance(system, Mapping):
-        return namelist(system)
+        return namelist(system, place)
     if not isinstance(system, str | os.PathLike):
         kind = type(system).__name__
-        raise TypeError("an input is a file, its text, or a dictionary of groups, not "
-            f"{kind}")
+        raise TypeError(f"an input is a file, its text, or a dictionary of groups, not {kind}")
     return system if isinstance(system, str) and ("&" in system or "\n" in system) else None
 
 
-def namelist(groups: Mapping[str, Any]) -> str:
-    """Return groups of variables as the text of an input file, which the program checks."""
+def namelist(groups: Mapping[str, Any], place: Path | None = None) -> str:
+    """Return groups of variables as the text of an input file, which the program checks.
+
+    Values for each disk are written to starting files beside `place`.
+    """
     text = []
     for name, content in groups.items():
-        for group in content if isinstance(content, list | tuple) else [content]:
-            if not isinstance(group, Mapping):
-                kind = type(group).__name__
-                raise TypeError(f"{name}: a group must be a dictionary or a list of dictionaries, "
-                    f"not {kind}")
+        for own in content if isinstance(content, list | tuple) else [content]:
+            if not isinstance(own, Mapping):
+                kind = type(own).__name__
+                raise TypeError(
+                    f"{name}: a group must be a dictionary or a list of dictionaries, not {kind}"
+                )
+            group = with_start(own, place) if name == "species" else own
             lines = [
                 f"  {variable} = {value_text(f'{name}.{variable}', value)}\n"
                 for variable, value in group.items()

@@ -1,17 +1,54 @@
 """Starting files: arrays of disks in the text format that `species.file` reads."""
 
+import functools
+import itertools
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..reading.files import destination
+from ..reading.files import TemporaryFolder, destination
 
 SPECIES = re.compile(r"[1-9]\d*|[A-Za-z][A-Za-z0-9_-]{0,39}")  # as read by the program
 
 #: Columns whose name in the text is shorter.
 TURNING = {"angular_velocity": "omega", "orientation": "angle"}
+
+#: Variables of a species that may have a value for each disk, beside position and velocity.
+PER_DISK = ("radius", "mass", "angular_velocity", "orientation")
+NUMBERS = itertools.count(1)
+
+
+def with_start(group: Mapping[str, Any], place: Path | None) -> Mapping[str, Any]:
+    """Return a species whose values for each disk, if there are any, are in a starting file.
+
+    The name of the file begins with `place`; without it the file exists until this process ends.
+    """
+    columns = {name: group[name] for name in PER_DISK if np.size(group.get(name, 0)) > 1}
+    if not columns:
+        return group
+    if "position" not in group:
+        raise TypeError(f"species.{min(columns)}: values for each disk need a position for each")
+    position = np.reshape(np.asarray(group["position"], dtype=float), (-1, 2))
+    rest = {name: group[name] for name in group.keys() - columns.keys() - {"position", "velocity"}}
+    if "velocity" in group:
+        velocity = np.reshape(np.asarray(group["velocity"], dtype=float), (-1, 2))
+        columns["velocity"] = np.broadcast_to(velocity, position.shape)
+        rest["velocities"] = "file"
+    name = f"start-{group.get('name', 'disks')}.txt"
+    path = place.with_name(f"{place.name}.{name}") if place else kept() / f"{next(NUMBERS)}.{name}"
+    return rest | {"file": str(write_start(path.absolute(), position, **columns))}
+
+
+@functools.cache
+def kept() -> Path:
+    """Return a folder that is removed when this process ends."""
+    folder = TemporaryFolder()
+    folder.keep()
+    return folder.path
 
 
 def write_start(
