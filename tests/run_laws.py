@@ -1,4 +1,4 @@
-"""Laws that hold for every run, whatever its input: judged from all that its file says.
+"""Laws that hold for every run and input, tested with the content of the output file.
 
 `found` is what `whole_runs.contents` gives. Each law says how far a run is from it, in parts of
 what rounding leaves: below 1 it holds.
@@ -9,17 +9,17 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-BALANCE = 1e-12  #: of the energy, what was lost, and what was given
-MOMENTUM = 1e-12  #: of the sum over all disks of m |v|
-GAP = 1e-9  #: of the contact distance
-PLACE = 1e-12  #: of the largest coordinate, to which places are known
+BALANCE = 1e-12  #: relative to the energy, the losses and the energy supplied
+MOMENTUM = 1e-12  #: relative to the sum of m |v| over all disks
+GAP = 1e-9  #: relative to the contact distance
+PLACE = 1e-12  #: rounding error of positions relative to the largest coordinate
 SIDES = ("left", "right", "bottom", "top")
 
 Found = dict[str, np.ndarray]
 
 
 def laws_broken(found: Found) -> Iterator[str]:
-    """Each law that does not hold, with by how much."""
+    """Return each law that is violated, with the size of the violation."""
     laws = {
         "energy": imbalance(found) / BALANCE,
         "momentum": momentum_drift(found) / MOMENTUM,
@@ -33,18 +33,18 @@ def laws_broken(found: Found) -> Iterator[str]:
 
 
 def series(found: Found, name: str) -> np.ndarray:
-    """All samples of an observable; none if there is no such thing."""
+    """Return all samples of an observable; empty if the file does not contain it."""
     return found.get(f"/observables/{name}/value", np.empty(0))
 
 
 def of_box(found: Found) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Lower corner, edges, and which axes are periodic."""
+    """Return lower corner, edges, and whether axes are periodic."""
     box = "/particles/disks/box"
     return found[f"{box}/lower"], found[f"{box}/edges"], found[f"{box}@boundary"] == b"periodic"
 
 
 def imbalance(found: Found) -> float:
-    """How far the energy is from what was given and lost, in parts of the greatest of them.
+    """Return the error of the energy balance relative to its largest term.
 
     Terms that cancel count in full: kinetic and potential energy, kicks of noise whose momentum is
     taken back, and the kT that a thermal wall gives at one hit and may take back at the next.
@@ -63,7 +63,7 @@ def imbalance(found: Found) -> float:
 
 
 def momentum_drift(found: Found) -> float:
-    """Largest change of a component of the momentum over the sum of m |v|, where it is kept."""
+    """Return the largest change of a conserved momentum, relative to the sum of m |v|."""
     drive = found["/parameters/drive@kind"] != b"none"
     kept = of_box(found)[2].all() and not found.get("/parameters/box@shear_rate")
     if not kept or "/parameters/wall/name" in found or "/parameters/obstacle/name" in found:
@@ -79,7 +79,7 @@ def momentum_drift(found: Found) -> float:
 
 
 def depth(found: Found) -> float:
-    """How deep disks lie in each other and in walls in any frame; 0 where steps let them."""
+    """Return the largest overlap of disks and walls; 0 if time steps allow overlaps."""
     if found["/parameters/run@dynamics"] == b"steps":
         return 0.0
     places = found["/particles/disks/position/value"]
@@ -93,7 +93,7 @@ def depth(found: Found) -> float:
 
 
 def pair_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
-    """Gaps of close pairs, each found from its larger disk, and their contact distances."""
+    """Return the gaps of close pairs, each found from its larger disk, and contact distances."""
     lower, edges, periodic = of_box(found)
     radius = found["/particles/disks/radius"]
     rows = [(0.0, 0.0)]
@@ -119,7 +119,7 @@ def pair_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
 
 
 def wall_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
-    """Gaps of all disks to each wall, and their radii."""
+    """Return the gaps of all disks to each wall, and their radii."""
     lower, edges, periodic = of_box(found)
     radius = found["/particles/disks/radius"]
     for k, name in enumerate(SIDES):
@@ -144,7 +144,7 @@ def wall_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
 
 
 def rows_of(found: Found, kind: str, *names: str) -> tuple[list, np.ndarray]:
-    """Some values of all circles or straight walls, and the number of the group of each, from 0.
+    """Return values of all circles or straight walls, and the group number (from 0) of each.
 
     They stand in a table of their own where a group has more than one.
     """
@@ -156,7 +156,7 @@ def rows_of(found: Found, kind: str, *names: str) -> tuple[list, np.ndarray]:
 
 
 def shift_of(found: Found, side: str, time: float) -> float:
-    """How far a side is inwards of its place."""
+    """Return the inward displacement of a side from its mean position."""
     kind, amplitude, period, phase = (
         found.get(f"/parameters/side/{side}@{name}", 0)
         for name in ("motion", "amplitude", "period", "phase")
@@ -187,7 +187,7 @@ def shift_of(found: Found, side: str, time: float) -> float:
 
 
 def log_error(found: Found) -> float:
-    """How far the log is from what is counted and summed: for each disk, and for each wall."""
+    """Return the differences of the log from counts and sums for each disk and each wall."""
     if "/events/j" not in found:
         return 0.0
     i, j = found["/events/i"], found["/events/j"]
@@ -217,7 +217,7 @@ def log_error(found: Found) -> float:
 
 
 def observable_error(found: Found) -> float:
-    """How far the observables of the last state are from what its frame says."""
+    """Return the differences of the final observables from values computed with the last frame."""
     v, mass = found["/particles/disks/velocity/value"][-1], found["/particles/disks/mass"]
     if v.dtype != np.float64:
         return 0.0

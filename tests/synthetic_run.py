@@ -1,4 +1,4 @@
-"""Writes small HDF5 files in the layout of a Ricochet run, for tests of the post-processing."""
+"""Write small HDF5 files in the layout of a Ricochet run for tests of the post-processing."""
 
 import csv
 import importlib
@@ -21,7 +21,7 @@ SCRIPTS = sorted(
 
 
 def text(value: str) -> np.bytes_:
-    """A fixed-length string, as the program writes them."""
+    """Return a fixed-length string in the format of the program."""
     return np.bytes_(value.encode())
 
 
@@ -86,7 +86,7 @@ def write_run(
 
 
 def written(path, position, velocity, **options):
-    """The same, read back."""
+    """Write a run and read it."""
     return read_run(write_run(path, position, velocity, **options))
 
 
@@ -98,7 +98,7 @@ def add_element(group, name, time, value):
 
 
 def write_observables(file, time, observables):
-    """All observables share one clock."""
+    """Write observables that share their sample times."""
     group = file.create_group("observables")
     for name, value in {"dissipated_energy": np.zeros(len(time)), **observables}.items():
         add_element(group, name, time, np.asarray(value))
@@ -127,7 +127,7 @@ def write_parameters(file, parameters, names, species, obstacles, walls):
 
 
 def maxwell_velocities(rng, frames, count, temperature=1.0, mass=1.0):
-    """(frames, count, 2) velocities of an ideal gas."""
+    """Return velocities (frames, count, 2) of an ideal gas."""
     return rng.normal(0.0, np.sqrt(temperature / np.mean(mass)), (frames, count, 2))
 
 
@@ -147,7 +147,7 @@ def run_script(name, *arguments):
 
 
 def drawn(folder, script, *arguments):
-    """Let a script draw and write its table; the rows of this."""
+    """Run a script that draws and writes its table; return the rows of the table."""
     figure, table = folder / f"{script}.png", folder / f"{script}.csv"
     assert run_script(script, *arguments, "-o", figure, "--csv", table) == 0
     assert figure.stat().st_size > 10000

@@ -1,4 +1,4 @@
-"""Pressure, rates, cooling, transport and fields: the estimators of post/ on gases.
+"""Estimators of pressure, rates, cooling, transport coefficients and fields, tested on gases.
 
 Runs that are made, whose answer is known, and small runs of the program, on which the scripts draw.
 """
@@ -47,7 +47,7 @@ PERIODIC = (True, True)
 
 
 def steady(path, periodic, speed=1.0, radius=0.01, **parameters):
-    """100 disks with kT = 2 speed^2; all sums grow linearly in time."""
+    """Write a run of 100 disks with kT = 2 speed^2; cumulative observables grow linearly."""
     time = np.arange(201.0)
     v = speed * np.tile([[2.0, 0.0], [-2.0, 0.0]], (1, 50, 1)).repeat(2, axis=0)
     observables = {
@@ -80,7 +80,7 @@ def test_three_pressures_of_a_steady_run(tmp_path):
 
 @pytest.mark.parametrize("periodic", [(False, False), (True, False), PERIODIC])
 def test_kt_is_of_the_momenta_that_are_free(tmp_path, rng, periodic):
-    """A few disks share what the conserved motion of them all does not have."""
+    """The conserved motion of the centre of mass reduces the thermal energy of few disks."""
     kept, mass, heat = np.array(periodic), np.array([9.0, 1.0, 1.0, 1.0]), 3.0
     v = rng.normal(size=(20000, 4, 2)) / np.sqrt(mass)[:, None]
     v -= kept * np.average(v, axis=1, weights=mass, keepdims=True)
@@ -96,7 +96,7 @@ def test_kt_is_of_the_momenta_that_are_free(tmp_path, rng, periodic):
     stopped = written(tmp_path / "stopped.h5", 0 * v[:1], v[:1], mass=mass, **inside)
     expected = stopped.kinetic_energy(0).mean()
     assert td.kt_at_start(stopped) == pytest.approx(expected), "an obstacle takes all"
-    if periodic == (True, False):  # walls that slow down what is along them take it, too
+    if periodic == (True, False):  # walls with friction also change the momentum along them
         slower = np.stack([v[0] + np.array([1.0, 0.0]), v[1]])
         parts |= {"periodic": periodic, "parameters": {"contact": {"restitution": 0.9}}}
         run = written(tmp_path / "slower.h5", 0 * slower, slower, **parts)
@@ -111,7 +111,7 @@ def test_disks_that_may_slip_may_lose_energy():
 
 
 def test_error_bars_are_counted_that_hold_the_truth(tmp_path, rng):
-    """Of twelve gases whose pressure scatters without a memory, as the naive errors have it."""
+    """The pressure of twelve gases is uncorrelated in time, as the naive errors assume."""
     runs = []
     for k in range(12):
         v, time = np.full((2, 100, 2), 1.0 + k / 1e6), np.arange(401.0)
@@ -127,7 +127,7 @@ def test_error_bars_are_counted_that_hold_the_truth(tmp_path, rng):
 
 
 def test_melting_has_a_curve_for_each_number_of_disks(tmp_path):
-    """The pressure of 4 eta / pi Z."""
+    """P* is 4 eta Z / pi."""
     run = steady(tmp_path / "equal.h5", PERIODIC)
     (row,), _ = melting.table([run], None)
     kt = td.kt_at_start(run)
@@ -138,7 +138,7 @@ def test_melting_has_a_curve_for_each_number_of_disks(tmp_path):
 
 # --- gases of mixed features ---
 
-#: With the variables of each.
+#: Kinds of driving, with the variables of each.
 KICKS = {
     "brownian": "temperature = {}",
     "andersen": "temperature = {} fraction = 0.3",
@@ -148,19 +148,19 @@ KICKS = {
 
 
 class DrawnGas(NamedTuple):
-    """A gas that is heated, kicked, rough, ... as it comes, and what is known of it."""
+    """A gas with random features (heated, driven, rough, ...), and its known properties."""
 
     text: str
-    plain: str  # the same disks with one mass, smooth and elastic, left alone: of the same Z
-    settles: bool  # comes to equilibrium
-    fluid: bool  # and has one pressure everywhere
+    plain: str  # equal masses, smooth, elastic and undriven, with the same Z
+    settles: bool  # whether it reaches equilibrium
+    fluid: bool  # whether its pressure is uniform
     rough: bool
     kept: np.ndarray  # (2,) axes along which the momentum is kept, if nothing heats
     kt: float | None  # of what heats
 
 
 def drawn_gas(rng) -> DrawnGas:
-    """Two species, a box of any kind, and whatever else goes with it."""
+    """Return a gas of two species in a random kind of box, with random features."""
     maybe = lambda share: bool(rng.random() < share)  # noqa: E731
     sides, count = rng.choice(["wall", "periodic"], 2), rng.integers(12, 30, 2)
     radius, mass = np.array([1.0, rng.choice([1.0, 1.5])]), rng.choice([1.0, 3.0, 10.0], 2)
@@ -218,7 +218,7 @@ def drawn_gas(rng) -> DrawnGas:
 
 @pytest.mark.parametrize("systems", [12, pytest.param(400, marks=pytest.mark.check)])
 def test_kt_and_z_of_any_gas_are_right_or_refused(simulated, systems):
-    """The kT is that of walls or kicks, or the energy says it; Z that of the disks left alone."""
+    """The kT is that of walls or driving, or follows from the energy; Z is that of the undriven gas."""
     found = []
     for k in range(systems):
         known = drawn_gas(np.random.default_rng([int(os.environ.get("SEED", "1")), k]))
@@ -227,7 +227,7 @@ def test_kt_and_z_of_any_gas_are_right_or_refused(simulated, systems):
             with nullcontext() if holds else pytest.raises(Refused, match=str(run.path)):
                 law(run)
         kt = known.kt
-        if known.fluid and kt is None:  # the energy is shared by all momenta, and by all spins
+        if known.fluid and kt is None:  # all momenta and all spins share the energy
             still = known.kept * (run.mass @ run.velocity[0])
             energy = run.kinetic_energy(0).sum() - np.sum(still**2) / (2 * run.mass.sum())
             kt = energy / (run.n_disks * (1 + known.rough / 2) - known.kept.sum() / 2)
@@ -245,7 +245,7 @@ def test_kt_and_z_of_any_gas_are_right_or_refused(simulated, systems):
 
 
 def test_kicked_disks_have_the_diffusion_of_their_displacements_alone(simulated, monkeypatch):
-    """Free for a time h they go D = kT h / 2 m; velocities at kicks would say twice that."""
+    """With free flights of the time h, D is kT h / 2 m; velocities would yield 2 D."""
     run = simulated(
         """&box boundary = 'periodic', 'periodic' /
         &species count = 100 packing_fraction = 0.0005 temperature = 2 mass = 2 /
@@ -263,7 +263,7 @@ def test_kicked_disks_have_the_diffusion_of_their_displacements_alone(simulated,
 
 
 def test_free_paths_weigh_each_flight_once_however_often_frames_meet_it(tmp_path):
-    """A disk that flies 1, 1, 4, 1, 1, 4, ... time units between hits; another one without hits."""
+    """One disk has free times 1, 1, 4, 1, 1, 4, ...; another one does not collide."""
     hits = np.cumsum(np.tile([1.0, 1.0, 4.0], 40))
     time = np.linspace(0.05, hits[-1] - 0.05, 2400)
     v = np.tile([[0.5, 0.0], [1.0, 0.0]], (len(time), 1, 1))
@@ -277,7 +277,7 @@ def test_free_paths_weigh_each_flight_once_however_often_frames_meet_it(tmp_path
 
 
 def test_free_paths_scatter_as_their_errors_say(monkeypatch, rng):
-    """Of runs, and of one run in blocks: paths without memory, 4000 to a run."""
+    """Errors from several runs and from blocks of one run, with 4000 independent paths per run."""
     monkeypatch.setattr(
         rates, "free_paths", lambda run, skip: (rng.exponential(2.0, 4000), np.ones(4000))
     )
@@ -302,7 +302,7 @@ RUNS = (
 
 @pytest.fixture
 def bulk(simulated):
-    """Small gases at two packing fractions, and one that cools."""
+    """Simulate small gases at two packing fractions and a cooling gas."""
     settings = ["species.disks.count=100", "stop.collisions_per_disk=60"]
     settings += ["output.frames_every_time=0.02", "output.observables_every_collisions=25"]
     settings += ["output.event_log=true"]
@@ -346,7 +346,7 @@ def test_rates_of_a_gas_agree_with_each_other(bulk, tmp_path):
 
 
 def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp_path, capsys):
-    """And no diffusion, no pressure, no equation of state."""
+    """Diffusion coefficient, pressure and equation of state are not defined."""
     rows = drawn(tmp_path, "correlations", bulk[2])
     assert "no steady state without flow: time correlations" in capsys.readouterr().err
     assert {row["what"] for row in rows} == {"psi6_local", "psi6_global", "a2", "g", "g6", "S"}
@@ -356,7 +356,7 @@ def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp
     assert not any(name.startswith("pressure") for name in rows)
     eta, diameter = td.packing(run), 2 * run.radius[0]
     density = (run.n_disks - 1) / np.prod(run.edges)
-    contact = (hd.simulated(eta) - 1) / (2 * eta)  # a path does not know how fast it is flown
+    contact = (hd.simulated(eta) - 1) / (2 * eta)  # paths do not depend on the speed
     enskog = 1 / (2 * np.sqrt(2) * density * diameter * contact)
     assert float(rows["mean_free_path"]) == pytest.approx(enskog, rel=0.1)
     found, rate, *_ = cool.haff([cool.energy_left(run)], 0.9)
@@ -369,7 +369,7 @@ def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp
 
 
 def test_the_first_rate_is_counted_where_no_equation_of_state_is_known(bulk, simulated, tmp_path):
-    """Of equal disks both ways agree; a gas of two sizes cools by the same laws."""
+    """Both methods agree for equal disks; a gas of two sizes cools by the same laws."""
     run = read_run(bulk[2])
     assert cool.counted_rate(run) == pytest.approx(cool.first_rate(run), rel=0.1)
     two = simulated(
@@ -388,7 +388,7 @@ def test_the_first_rate_is_counted_where_no_equation_of_state_is_known(bulk, sim
 
 @pytest.mark.parametrize("law", ["power", "viscoelastic"])
 def test_soft_disks_cool_by_a_law_of_their_own(simulated, tmp_path, law):
-    """In the end as t^(-5/3); all above g0 by Haff's law."""
+    """K decreases as t^(-5/3) at late times; if all speeds exceed g0, it follows Haff's law."""
     hard = hd.haff_soft(Restitution(0.7, law, 1e-9), 1.0)
     np.testing.assert_allclose(hard[2][:99], hd.haff_by_time(hard[0][:99], 0.7), rtol=1e-3)
     soft = hd.haff_soft(Restitution(0.7, law, 10.0), 1.0)
@@ -428,7 +428,7 @@ HAFF = "smooth disks that only cool"
     ],
 )
 def test_runs_that_a_law_is_not_for_are_refused(tmp_path, capsys, script, unlike, words):
-    """A gas that cools in a periodic box, and what is different about it."""
+    """The runs differ in one feature from a gas that cools in a periodic box."""
     speed, walled = unlike.pop("speed", 1.0), unlike.pop("walled", False)
     groups = {"contact": {"restitution": 0.9}, **unlike}
     v, time = speed * np.ones((2, 4, 2)), np.array([0.0, 1.0])
@@ -532,7 +532,7 @@ def test_single_points_are_seen_and_titles_lie_over_no_words_of_a_wall(simulated
 
 
 def test_an_even_gas_has_no_fuller_half(rng):
-    """Nor one that remembers; where more than half stay in one half it is told."""
+    """This also holds with correlations; a lasting majority in one half is detected."""
     noise = lfilter([1], [1, -0.9], rng.normal(scale=0.02, size=(2000, 300)))
     even = np.array([fuller(0.5 + one).mean() for one in noise])
     assert even.mean() == pytest.approx(0.5, abs=4 * even.std() / np.sqrt(2000))
@@ -557,7 +557,7 @@ USUAL = {
 
 @pytest.fixture
 def gas(simulated):
-    """A run of a periodic gas, with what is unusual about it."""
+    """Write a run of a periodic gas with additional features."""
     return lambda name="gas", **unusual: simulated(GAS.format(**USUAL | unusual), name=name)
 
 
@@ -565,14 +565,14 @@ UNLIKE = "0.1 mass = {} temperature = 2 / &species name = 'b' packing_fraction =
 
 
 def carried(v, mass):
-    """(5,) what disks with the velocities (N, 2) carry: momentum xx, xy, yy, energy x, y."""
+    """Return the kinetic fluxes (5,) for velocities (N, 2): momentum xx, xy, yy, energy x, y."""
     energy = mass * np.sum(v**2, axis=1) / 2
     products = np.array([v[:, 0] ** 2, v[:, 0] * v[:, 1], v[:, 1] ** 2])
     return np.array([*(products @ mass), *(energy @ v)])
 
 
 def test_moments_are_those_of_the_definition(gas):
-    """With a frame at each event places and velocities tell what is carried and handed on."""
+    """With a frame at each event, positions and velocities determine all fluxes and transfers."""
     every = "frames_every_events = 1 observables_every_events = 1"
     run = gas(count=10, packing=UNLIKE.format(1, 5), length=40, restitution=0.9, cadence=every)
     x, v, m, time = run.position[:], run.velocity[:], run.mass, run.time
@@ -599,7 +599,7 @@ def test_moments_are_those_of_the_definition(gas):
 
 
 def test_all_that_changes_velocities_counts_in_what_is_carried(gas):
-    """Kicks, walls that heat and move, and losses: it is the integral of what is carried now."""
+    """With driving, thermal and moving walls and losses, the moment is the integral of the flux."""
     driven = {
         "sides": "'wall', 'periodic' / &side name = 'left' temperature = 3 / "
         "&side name = 'right' motion = 'sine' amplitude = 0.02 period = 0.1 / "
@@ -614,7 +614,7 @@ def test_all_that_changes_velocities_counts_in_what_is_carried(gas):
 
 
 def test_moments_do_not_know_that_the_gas_moves(gas, simulated, tmp_path):
-    """As long as rounding has not parted the two: second differences have no mean growth."""
+    """Second differences have no mean growth, until rounding errors separate the two runs."""
     still = gas(length=100)
     start = write_start(tmp_path / "fast.txt", still.position[0], still.velocity[0] + [0.5, 0.25])
     text = GAS.format(**USUAL | {"length": 100}).replace("temperature = 2", f"file = '{start}'")
@@ -625,7 +625,7 @@ def test_moments_do_not_know_that_the_gas_moves(gas, simulated, tmp_path):
 
 
 def fluctuating(rng, count, memory):
-    """(count, 2) moments of fluxes that forget as exp(-t / memory), without their mean growth."""
+    """Return moments (count, 2) of fluxes with the autocorrelation exp(-t / memory)."""
     keep = np.exp(-1 / memory)
     noise = rng.normal(0, np.sqrt(1 - keep**2), (count + 500, 2))
     moment = np.cumsum(lfilter([1], [1, -keep], noise, axis=0)[500:] + 0.3, axis=0)
@@ -633,7 +633,7 @@ def fluctuating(rng, count, memory):
 
 
 def test_fluxes_that_forget_have_the_coefficient_and_the_errors_they_should():
-    """It is the sum of their memory; right errors hold it in 68 % of all cases."""
+    """The coefficient is the integral of the autocorrelation; correct errors contain it in 68 %."""
     rng, keep = np.random.default_rng(4), np.exp(-1 / 6)
     truth = (1 + keep) / (1 - keep) / 2
     found = [tp.coefficient(fluctuating(rng, 6000, 6.0), 1.0, 100) for _ in range(300)]
@@ -647,7 +647,7 @@ def test_fluxes_that_forget_have_the_coefficient_and_the_errors_they_should():
 
 
 def test_squares_allow_for_the_mean_growth_that_is_taken_away():
-    """Steps without memory gain their number, whatever they gain on average."""
+    """The mean square of a random walk is its number of steps, whatever the mean step."""
     moment = np.cumsum(np.random.default_rng(6).normal(2.0, 1.0, (41, 4000)), axis=0)
     moment -= np.linspace(moment[0], moment[-1], 41)
     assert tp.squares(moment, 20).mean() == pytest.approx(20, rel=0.05)
@@ -677,7 +677,7 @@ def test_runs_of_one_cadence_are_taken_together_however_warm_they_are(gas):
 
 
 def test_of_a_mixture_there_are_the_viscosities(gas, tmp_path, capsys):
-    """Hardly unlike disks have those of equal ones; runs of other disks are not taken together."""
+    """Nearly equal disks have the viscosities of equal ones; different runs are refused."""
     mixed = gas("mixed", packing=UNLIKE.format(0.1, 9))
     rows = drawn(tmp_path, "transport", mixed.path)
     assert {row["what"] for row in rows if not row["wt"]} == {"viscosity", "bulk_viscosity"}
@@ -692,7 +692,7 @@ def test_of_a_mixture_there_are_the_viscosities(gas, tmp_path, capsys):
 
 
 def test_the_viscosity_of_grains_is_what_their_heat_takes(simulated):
-    """In a sheared box: work, the shear rate squared times it, is lost or heats."""
+    """In a sheared box the work, viscosity times squared shear rate, is dissipated or heats."""
     run = simulated("""&box boundary = 'periodic', 'periodic' shear_rate = 0.5 /
     &species count = 100 packing_fraction = 0.4 temperature = 1 / &contact restitution = 0.8 /
     &stop collisions_per_disk = 100 / &output observables_every_collisions_per_disk = 0.1 /""")
@@ -754,7 +754,7 @@ SETTLED = ("equation_of_state", "melting", "coverage", "transport", "gravity", "
     ],
 )
 def test_runs_that_a_script_is_not_for_are_refused(gas, tmp_path, capsys, unusual, refused):
-    """In one line, beside a run that it is for where it compares them."""
+    """The message is one line; scripts that compare runs also receive a suitable run."""
     path = gas(**{"length": 20} | unusual).path
     for script, said in refused.items():
         compared = script == "correlations" or unusual is MIXED
@@ -776,7 +776,7 @@ SHEARED = """&box upper = 20, 10 boundary = 'wall', 'periodic' /
 
 
 def test_fields_are_those_of_the_disks_in_each_cell(tmp_path):
-    """Two disks in the left half that move together, two in the right half that part."""
+    """Two disks in the left half move together, two disks in the right half separate."""
     position = np.array([[[0.1, 0.2], [0.2, 0.8], [0.7, 0.2], [0.8, 0.8]]] * 8)
     velocity = np.array([[[1.0, 2.0], [1.0, 2.0], [3.0, 2.0], [-1.0, 2.0]]] * 8)
     run = written(tmp_path / "a.h5", position, velocity, periodic=PERIODIC, radius=0.1)
@@ -795,7 +795,7 @@ def test_fields_are_those_of_the_disks_in_each_cell(tmp_path):
     ("cells", "shear"), [((16, 12), 0.0), ((16, 12), 0.5), ((4, 1), 0.0), ((1, 4), 0.5)]
 )
 def test_fields_of_few_values_have_no_bias_and_their_errors_hold(tmp_path, rng, cells, shear):
-    """A gas between walls whose velocities and places are drawn: kT = 2, even where it can be.
+    """Random velocities and positions between walls: kT = 2 and a uniform accessible density.
 
     The flow, of equal disks and of the few in a cell, is no heat, and takes none.
     """
@@ -815,7 +815,7 @@ def test_fields_of_few_values_have_no_bias_and_their_errors_hold(tmp_path, rng, 
 
 
 def test_cells_in_which_few_disks_were_have_no_error_of_nothing(tmp_path, rng):
-    """Of one disk in each of two blocks all is flow, and where none was there may be one."""
+    """One disk in each of two blocks determines the flow only; an empty cell has no error of 0."""
     place = np.full((32, 4, 2), 0.1)
     place[[18, 30], 3, 0] = 0.5
     run = written(tmp_path / "a.h5", place, rng.normal(size=place.shape), periodic=PERIODIC)
@@ -839,7 +839,7 @@ def test_a_map_of_a_round_container_is_drawn_in_it(tmp_path, rng):
 
 
 def test_the_area_that_centres_can_reach(tmp_path):
-    """Not the strip of a radius at a wall, nor the disks around a circle and a straight wall."""
+    """Strips of one radius at walls and around circles and straight walls are not accessible."""
     one = np.full((2, 1, 2), 0.5)
     parts = {"radius": 0.1, "edges": (4, 2), "obstacles": [((1.0, 1.0), 0.4, 0)]}
     parts |= {"walls": [((3.0, 1.0), (3.4, 1.0))], "periodic": (True, False)}
@@ -849,7 +849,7 @@ def test_the_area_that_centres_can_reach(tmp_path):
     assert area == pytest.approx([3.6 - np.pi * 0.5**2, 3.6 - stadium], rel=2e-3)
 
 
-GASES = {  # input, cells, and the kT that is known
+GASES = {  # input, cells and the known kT
     "still": ("""&box upper = 40, 20 / &stop time = 200 /
         &species count = 400 radius = 0.5 temperature = 1 /""", (8, 12),
         lambda run: td.temperature(run).mean),
@@ -870,7 +870,7 @@ GASES = {  # input, cells, and the kT that is known
     + [pytest.param(name, 30, marks=pytest.mark.check) for name in GASES],
 )
 def test_fields_of_gases_have_the_temperature_that_is_known(simulated, gas, seeds):
-    """Of many seeds, the errors of a run hold the mean of all of them as often as they say."""
+    """The errors of a run contain the mean of many seeds with the stated probability."""
     text, cells, truth = GASES[gas]
     output = "&output frames_every_time = 4 observables_every_time = 4 /"
     system = ROOT / "input" / text if text.endswith("nml") else f"{text}\n{output}\n"
@@ -890,7 +890,7 @@ def test_fields_of_gases_have_the_temperature_that_is_known(simulated, gas, seed
 
 
 def test_the_law_carries_the_fluxes_and_is_a_gas_at_rest_without(simulated):
-    """Its gradients times viscosity and conductivity are what passes from wall to wall."""
+    """The gradients times viscosity and conductivity are equal to the fluxes at the walls."""
     run, eta = simulated(SHEARED.format(speed=0)), 0.3
     flux = fields.Fluxes(4 * eta / np.pi * 2 * hd.henderson(eta), 0.0, 0.0)
     law = fields.expected(run, 0, np.linspace(1, 19, 7), flux, (0.5, 2.0))

@@ -1,4 +1,4 @@
-"""The laboratory: simulations at work behind the pages of a browser, and nothing left of them."""
+"""The laboratory: simulations behind the pages of a browser, and their complete removal."""
 
 import asyncio
 import base64
@@ -24,12 +24,12 @@ from synthetic_run import ROOT, run_script
 from whole_runs import PATIENCE, wait_for
 
 INPUTS = sorted(path.stem for path in (ROOT / "input").glob("*.nml"))
-HEAD = 6  # numbers before the places
+HEAD = 6  # numbers before the positions
 
 
 @contextmanager
 def laboratory(program, folder, *words, **options):
-    """The command, and its address; its temporary files lie in a folder."""
+    """Start a laboratory with a folder for temporary files; yield its process and address."""
     own = os.environ | {"RICOCHET": str(program), "TMPDIR": str(folder)}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     command = [sys.executable, ROOT / "post/lab.py", *words]
@@ -44,14 +44,14 @@ def laboratory(program, folder, *words, **options):
 
 @pytest.fixture(scope="module")
 def address(program, tmp_path_factory):
-    """Of a laboratory for all tests that leave it as it is."""
+    """Return the address of a laboratory for tests that do not change it."""
     with laboratory(program, tmp_path_factory.mktemp("lab")) as (process, address):
         yield address
         assert process.poll() is None
 
 
 class Film:
-    """A page with one run, as the page of a browser is to its socket."""
+    """A client with one run that uses its socket as the page of a browser does."""
 
     def __init__(self, session, socket, address):
         """Take what is open."""
@@ -59,7 +59,7 @@ class Film:
         self.frames, self.last = 0, {}
 
     async def say(self, do, **more):
-        with suppress(ConnectionError):  # as a browser has it: what was sent before is still read
+        with suppress(ConnectionError):  # earlier answers are still read
             await self.socket.send_json({"do": do, **more})
 
     async def start(self, name="gas", settings=None, added=(), pace=0.1):
@@ -108,7 +108,7 @@ async def film(address):
 
 
 def place(frame):
-    """(2, N) of a frame."""
+    """Return the positions (2, N) of a frame."""
     count = (len(frame) - 8 * HEAD) // 16
     return np.frombuffer(frame, np.float32, 2 * count, 8 * HEAD).reshape(-1, 2)
 
@@ -118,7 +118,7 @@ def place(frame):
 
 @pytest.mark.parametrize("name", INPUTS)
 def test_what_was_done_is_done_again_by_the_script_to_the_last_bit(address, tmp_path, name):
-    """Of every input: some changes on the way, at any time, heat and cold."""
+    """Each input is run with changes at random times, including heating and cooling."""
     rng = random.Random(name)
 
     async def visit():
@@ -283,7 +283,7 @@ def test_a_side_that_disks_push_is_where_the_engine_has_it(address):
 
 
 def test_the_pressure_beside_a_moving_side_is_that_of_the_area_of_each_moment():
-    """So that of the whole is the mean of its parts."""
+    """Therefore the pressure of the whole time is the mean of the pressures of its parts."""
     samples, count = [], 200
     with Simulation(ROOT / "input/constant_pressure.nml") as run:
         for time in np.linspace(5, 20, 301):
@@ -296,7 +296,7 @@ def test_the_pressure_beside_a_moving_side_is_that_of_the_area_of_each_moment():
 
 
 def test_no_file_is_read_by_another_door(address):
-    """Neither by groups that are added, nor by the values of a scan."""
+    """Neither added groups nor values of a scan can name other files."""
 
     async def visit():
         async with film(address) as one:
@@ -360,7 +360,7 @@ def test_a_run_can_be_kept_after_a_wrong_wish_and_without_a_folder(program, tmp_
         assert process.poll() is None
 
 
-SCANS = {  # of a gas: changes, what is measured, with which values, and what it is proportional to
+SCANS = {  # for a gas: changes, measured quantity, values, and expected proportionality
     "gas, the energy of each disk": ({}, "all/kinetic_energy", ("1", "2"), (1, 4)),
     "gas, collisions per time": ({}, "collisions", ("1", "2"), (1, 2)),
     "gas, pressure": ({}, "virial_pressure", ("1", "2"), (1, 4)),
@@ -376,7 +376,7 @@ SCANS = {  # of a gas: changes, what is measured, with which values, and what it
 
 @pytest.mark.parametrize("case", SCANS)
 def test_a_scan_gives_means_and_rates_whatever_the_time_it_takes(address, case):
-    """All of a run goes as its speeds."""
+    """All rates of a run are proportional to its speeds."""
     settings, of, values, powers = SCANS[case]
 
     async def visit():
@@ -430,7 +430,7 @@ def test_other_sites_are_refused_before_they_cost_anything(address):
             ):
                 for path in ("", "form?gas", "view", "ws", "none"):
                     assert await ask(one.session, path, **headers) == 403, (headers, path)
-            with pytest.raises(aiohttp.WSServerHandshakeError):  # no browser leaves out the origin
+            with pytest.raises(aiohttp.WSServerHandshakeError):  # every browser sends the origin
                 await one.session.ws_connect(address + "ws")
             for path in ("none", "pictures/..%2Fgas.nml", "pictures/gas.png"):
                 assert await ask(one.session, path) == 404, path
@@ -442,7 +442,7 @@ def test_other_sites_are_refused_before_they_cost_anything(address):
 
 
 def test_a_crowd_with_few_files_gets_answers(program, tmp_path):
-    """Many connections that say a byte each, or nothing, while a run goes on."""
+    """Many connections send one byte or nothing while a run continues."""
 
     def few():
         resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
@@ -473,13 +473,13 @@ def test_a_crowd_with_few_files_gets_answers(program, tmp_path):
 
 
 def children(pid):
-    """Numbers of the processes that a process has begun."""
+    """Return the numbers of the child processes of a process."""
     tasks = Path(f"/proc/{pid}/task").glob("*/children")
     return [int(child) for task in tasks for child in task.read_text().split()]
 
 
 def alive(pids):
-    """The processes that are alive."""
+    """Return those of the processes that are alive."""
     found = []
     for pid in pids:
         try:
@@ -505,7 +505,7 @@ def alive(pids):
     ],
 )
 def test_nothing_is_left_behind(program, tmp_path, at, signs):
-    """Neither of runs that go on, nor of one that looks for places, nor of a file being made."""
+    """This holds for running simulations, for one that places disks, and for unfinished files."""
     hard = {"species.gas.packing_fraction": "0.545", "species.gas.radius": "", "run.seed": "7"}
 
     async def act(process, address):
@@ -538,7 +538,7 @@ def test_nothing_is_left_behind(program, tmp_path, at, signs):
 
 
 def test_a_worker_that_dies_is_told_and_the_next_takes_its_place(program, tmp_path):
-    """Each of them, be it at work or ready."""
+    """The worker may be working or spare."""
 
     async def visit(process, address):
         for _ in range(2):
@@ -549,7 +549,7 @@ def test_a_worker_that_dies_is_told_and_the_next_takes_its_place(program, tmp_pa
                 for pid in pids:
                     os.kill(pid, signal.SIGKILL)
                 assert await one.until("closed") == module.DIED.decode()
-            while {*pids} & {*children(process.pid)}:  # the laboratory has not noticed it yet
+            while {*pids} & {*children(process.pid)}:  # the laboratory has not yet detected the end
                 await asyncio.sleep(0.01)
 
     with laboratory(program, tmp_path) as (process, address):

@@ -1,4 +1,4 @@
-"""Published and closed laws in post/: against series, equations and samples, each once."""
+"""Theoretical results in post/, compared with series, equations and samples."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_poin
         assert float(hd.simulated(eta)) == pytest.approx(series, rel=2e-5)
     np.testing.assert_allclose(hd.simulated(hd.FLUID[:, 0]), hd.FLUID[:, 1])
     np.testing.assert_allclose(hd.simulated(hd.FREEZING[:, 0]), hd.FREEZING[:, 1])
-    dense = np.linspace(0.6, 0.698, 99)  # one curve up to freezing, which bends where it begins
+    dense = np.linspace(0.6, 0.698, 99)  # one curve up to freezing, with a kink at its start
     slope = np.gradient(dense * hd.simulated(dense), dense)
     assert np.all(slope > 0) and np.abs(np.diff(slope)).max() < 0.1 * slope.max()
     assert np.isnan(hd.published(0.69, 1000, True))
@@ -27,10 +27,10 @@ def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_poin
 
 
 def test_adiabats_are_those_of_the_room_for_centres_and_of_the_equation_of_state():
-    widths, thin = np.array([2, 1.3, 0.9]), 1e-3  # disks, as if there were a gas of them
+    widths, thin = np.array([2, 1.3, 0.9]), 1e-3  # number of disks, as a real number
     room = (widths[0] - 0.1) / (widths - 0.1)
     assert hd.adiabat(widths, 1.0, thin, 0.05, True) == pytest.approx(room, rel=1e-4)
-    for count in (1, 3, 50):  # 2 N - 1 squares share the work where a momentum is conserved
+    for count in (1, 3, 50):  # degrees of freedom that share the work
         lone = (widths[0] / widths) ** (count / (count - 0.5))
         assert hd.adiabat(widths, 1.0, count, 1e-5, False) == pytest.approx(lone, rel=1e-4)
     dense, radius = hd.adiabat(widths, 1.0, 10**8, 4e-5, True), 4e-5
@@ -61,7 +61,7 @@ def test_rates_of_a_mixture_of_equals_are_those_of_one_gas():
 
 
 def test_the_pressure_of_many_sizes_is_that_of_their_contacts():
-    """Z = 1 + pi / 2 n sum x_i x_j s_ij^2 chi_ij, and equal disks are themselves."""
+    """Z = 1 + pi / 2 n sum x_i x_j s_ij^2 chi_ij, and the limit of equal disks is correct."""
     s, n = np.array([0.01, 0.02, 0.04]), np.array([300, 200, 50])
     eta, pair = np.pi / 4 * n @ s**2, (s[:, None] + s) / 2
     z = 1 + np.pi / 2 * n @ (pair**2 * hd.contact_values(hd.simulated(eta), n, s)) @ n / n.sum()
@@ -97,7 +97,7 @@ def test_free_paths_without_memory_have_the_mean_one():
 
 
 def test_a_mixture_flows_as_one_gas_if_its_disks_are_equal_and_however_its_species_are_cut():
-    """It scales with its units; and a few heavy disks forget stress twice as fast as velocity."""
+    """Results scale with the units; stress of few heavy disks decays twice as fast as velocity."""
     eta, z, names = 0.3, float(hd.henderson(0.3)), ("viscosity", "bulk_viscosity")
     n, size, mass = 4 * eta / np.pi * np.array([0.2, 0.3, 0.5]), np.ones(3), np.ones(3)
     equal, one = hd.enskog_mixture(z, n, size, mass), hd.enskog(z, eta, 1.0)
@@ -131,7 +131,7 @@ def test_chambers_are_even_above_the_threshold_and_as_the_fluxes_say_below():
     xi, layers = 0.9, 3.0
 
     def heat_over_climb(share, climb):
-        """T / m g h of a chamber with this share of the disks."""
+        """Return T / m g h of a chamber with this fraction of the disks."""
         return (2 / (share * layers * np.sqrt(np.pi) * (1 - xi**2))) ** 2 / climb
 
     threshold = heat_over_climb(0.5, 1.0)

@@ -1,4 +1,4 @@
-"""The laboratory's page: what it offers of each input, and that everybody can see and use it."""
+"""The page of the laboratory: controls for each input, accessibility and visibility."""
 
 import importlib.util
 import json
@@ -58,7 +58,7 @@ def test_both_ends_of_each_slider_run(path, monkeypatch, program):
 
 
 def test_disks_can_be_told_from_both_grounds_and_species_in_grey(simulated, browser, tmp_path):
-    """By 3 to 1, as WCAG 2.2 has it for pictures (1.4.11)."""
+    """The contrast is at least 3 to 1, as required by WCAG 2.2 for graphics (1.4.11)."""
     species = "".join(f"&species count = 3 radius = 0.0{k} speed = 1 /\n" for k in (1, 2, 3, 4))
     run = simulated(species + "&stop time = 1 /\n")
     (tmp_path / "film.html").write_text(player.whole(run))
@@ -84,7 +84,7 @@ def test_disks_can_be_told_from_both_grounds_and_species_in_grey(simulated, brow
 
 @pytest.fixture
 def opened(browser, program, tmp_path, monkeypatch):
-    """The laboratory, with its first run moving."""
+    """Return the browser with the laboratory when the first run moves."""
     monkeypatch.setenv("RICOCHET", str(program))
     command = [sys.executable, ROOT / "post/lab.py", "--no-open"]
     process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
@@ -99,12 +99,12 @@ def opened(browser, program, tmp_path, monkeypatch):
 
 
 def inside(browser, what):
-    """Something of the newest film."""
+    """Return the value of an expression in the newest film."""
     return browser.run(f"return filmOf(current()).inside().{what}")
 
 
 def moving(browser, than=0):
-    """Wait until there is a newer run than this one, and its disks move."""
+    """Wait until the disks of a newer run than the given one move."""
     seen = """const box = current(); if (!(box?.run > arguments[0]) || busy || again) return false;
         const { stream, moment } = filmOf(box).inside();
         return stream.run === box.run && moment.time > 0"""
@@ -113,14 +113,14 @@ def moving(browser, than=0):
 
 
 def slide(browser, number, place):
-    """Drag a slider of the form to a share of its length."""
+    """Drag a slider of the form to a fraction of its length."""
     act = """const range = document.querySelectorAll('.slider [type=range]')[arguments[0]];
     range.value = arguments[1] * range.max; range.dispatchEvent(new Event('input'));"""
     browser.run(act, number, place)
 
 
 def test_changes_that_a_run_refuses_start_one_run_that_moves(opened):
-    """As of a run that has collapsed: what is said of it meanwhile does not stop the next."""
+    """After a collapse, messages about the old run do not stop the new run."""
     before = opened.run("return current().run")
     opened.run("""const one = filmOf(current()), settings = { 'species.gas.count': '5' };
         one.inside().stream.ended = true;
@@ -170,7 +170,7 @@ def test_a_value_that_cannot_be_waits_alone(opened):
     assert opened.run("return document.querySelector('.wrong')") is None
 
 
-#: Texts that sliders of the input gas are given: number, variable, a value that can be.
+#: Texts typed beside sliders of the input gas: number, variable, an allowed value.
 TYPED = [
     (0, "species.gas.speed", lambda rng: rng.uniform(0.1, 9)),
     (1, "species.gas.count", lambda rng: rng.randint(2, 900)),
@@ -181,7 +181,7 @@ TYPED = [
 
 
 def some_text(rng, value):
-    """A number as people write it, or nearly."""
+    """Return a random text that is a number or similar to a number."""
     forms = "{}", "{:.3}", "{:.2e}", " {:.9f}", "{:.12}!"
     text = str(value) if isinstance(value, int) else rng.choice(forms).format(value)
     text = rng.choice([text, text.replace("e", "D"), text.replace(".", ",")])
@@ -193,7 +193,7 @@ def some_text(rng, value):
 
 
 def type_at(browser, number, text):
-    """Type beside a slider, and Enter."""
+    """Type a text beside a slider, followed by Enter."""
     field = "document.querySelectorAll('.slider input:not([type])')[arguments[0]].select()"
     browser.run(field, number)
     for key in text or "\ue003":  # backspace
@@ -202,7 +202,7 @@ def type_at(browser, number, text):
 
 
 def test_a_text_at_a_slider_is_the_value_that_runs_or_waits_with_one_message(opened):
-    """As the program judges it; nothing else changes."""
+    """The program decides if the text is valid; nothing else changes."""
     rng, path = random.Random(8), ROOT / "input/gas.nml"
     opened.run("""const old = hear; hear = (source, news) =>
         news.is === 'file' ? window.kept = atob(news.body) : old(source, news);""")
@@ -276,7 +276,7 @@ def test_a_paused_run_goes_back_step_by_step_and_on(opened):
 
 
 def test_what_is_clicked_is_downloaded_or_measured(opened, tmp_path):
-    """A script and an output of the same moment, an input that runs; the energies of a scan."""
+    """Script and output have the same time, the input can be run, and a scan returns energies."""
     slide(opened, 3, 0.5)  # restitution
     wait_for(lambda: "script" in opened.run("return $('shelf').textContent"))
     changed = opened.run("return current().changes[0][0]")

@@ -1,4 +1,4 @@
-"""The player: what its file holds, and in a real browser true paths, pictures, buttons, the log."""
+"""The player: content of its file and, in a browser, paths, pictures, controls and event log."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from whole_runs import wait_for
 
 
 def bouncing_gas(path, rng, frames=40, count=60, **more):
-    """A run of disks that drift; the second half is a heavier species."""
+    """Write a run of drifting disks; the second half of them is a heavier species."""
     velocity = maxwell_velocities(rng, frames, count)
     phase = rng.uniform(0, 6, (1, count, 2))
     position = 0.5 + 0.3 * np.cos(np.arange(frames)[:, None, None] / 9 + phase)
@@ -29,13 +29,13 @@ def bouncing_gas(path, rng, frames=40, count=60, **more):
 
 
 def still_run(path, position, **more):
-    """A run whose disks stand at the positions given, frame by frame."""
+    """Write a run with disks at rest at the given positions of each frame."""
     observables = {"collisions": np.zeros(len(position))}
     return write_run(path, position, np.zeros_like(position), observables=observables, **more)
 
 
 def filmed(run, frames, traced=()):
-    """The data of the page."""
+    """Return the data of the page of a run."""
     return player.film(run, frames, "speed", list(traced))
 
 
@@ -74,7 +74,7 @@ def test_speeds_are_counted_at_the_moment_and_so_far(playing, tmp_path, rng):
 
 
 def test_speeds_beside_disks_at_rest_are_counted_by_factors(playing, tmp_path, rng):
-    """As around a crater: one bar of disks at rest beside a Maxwell curve would say nothing."""
+    """As in a crater: a bar of disks at rest beside Maxwell's curve would hide all others."""
     velocity = maxwell_velocities(rng, 5, 60) * np.array([1e-2, 1.0, 1.0])[np.arange(60) % 3, None]
     velocity[:, ::4] = 0
     observables = {"collisions": np.zeros(5)}
@@ -87,7 +87,7 @@ def test_speeds_beside_disks_at_rest_are_counted_by_factors(playing, tmp_path, r
 
 
 def test_a_film_keeps_to_its_room(tmp_path, rng, monkeypatch):
-    """Of ten thousand disks, and of few disks and many frames."""
+    """The limit holds for ten thousand disks, and for few disks with many frames."""
     still = np.broadcast_to(np.float32(0.5), (1, 10000, 2))
     run = written(tmp_path / "a.h5", still, still, collisions=np.zeros((1, 10000)))
     assert player.frames_that_fit(run, player.ROOM) >= 200
@@ -102,7 +102,7 @@ def test_a_film_keeps_to_its_room(tmp_path, rng, monkeypatch):
 
 # --- texts of others ---
 
-#: Texts that would become part of a page which does not escape them.
+#: Texts that would be executed or displayed wrongly by a page that does not escape them.
 HOSTILE = (
     "</title></script><script>document.title='taken'</script>",
     "<img src=x onerror=\"document.title='taken'\">",
@@ -113,7 +113,7 @@ HOSTILE = (
 
 @pytest.fixture
 def playing(browser, tmp_path):
-    """`playing(path, *options)` makes the player of a run and opens it, paused."""
+    """Return a function that makes the player of a run and opens it in the paused state."""
 
     def play(path, *options):
         assert run_script("player", path, "-o", tmp_path / "film.html", *options) == 0
@@ -140,7 +140,7 @@ def test_texts_of_the_file_stay_texts(playing, tmp_path, rng, text):
 
 @pytest.fixture
 def opened(playing, tmp_path, rng):
-    """The player of a small gas, paused at its first frame."""
+    """Return the player of a small gas, paused at the first frame."""
     return playing(bouncing_gas(tmp_path / "gas.h5", rng))
 
 
@@ -165,7 +165,7 @@ def test_the_policy_of_the_page_stops_what_is_not_its_own(opened):
 
 
 def stage(browser) -> str:
-    """All layers of the drawing in one text."""
+    """Return all layers of the drawing as a text."""
     return browser.run("return layers.map(layer => layer.toDataURL()).join()")
 
 
@@ -246,7 +246,7 @@ def test_a_click_on_a_disk_shows_its_trace(playing, tmp_path, rng):
 
 
 def test_disks_have_their_true_size(opened):
-    """Area of the pixels of one colour against the circle of its radius; large and small."""
+    """The area of the pixels of a colour is compared with the area of the disk, large and small."""
     for zoom in (1, 12):
         area, radius = opened.run(
             """state.colour = 'species'; refresh(); step(0);
@@ -265,7 +265,7 @@ def test_disks_have_their_true_size(opened):
 
 
 def colours_at(browser, *points):
-    """Colours of the stage at points of the box, given in units of its edges."""
+    """Return the colours of the stage at points of the box in units of its edges."""
     return browser.run(
         """return arguments[0].map(([x, y]) => {
           const [px, py] = [[x, 0], [y, 1]].map(([s, k]) => film.lower[k] + s * film.edges[k]);
@@ -317,14 +317,14 @@ LOGGED = ("output.frames_every_time=0.5", "output.event_log=.true.")
 
 
 def many(text):
-    """More disks than have all digits in the page."""
+    """Return more disks than a page stores with all digits."""
     return text.replace("count = 8", "count = 24").replace("0.05", "0.02")
 
 
 @pytest.mark.parametrize("box", BOXES)
 @pytest.mark.parametrize("exact", [True, False])
 def test_paths_energies_and_colours_follow_the_log(simulated, playing, box, exact):
-    """A film of few frames with an event log against a run with many frames."""
+    """A film of few frames with an event log is compared with a run with many frames."""
     text = BOXES[box] + (FEW if exact else many(FEW))
     run = simulated(text, *LOGGED)
     truth = simulated(text, "output.frames_every_time=0.03", name="many")
@@ -366,7 +366,7 @@ def test_paths_energies_and_colours_follow_the_log(simulated, playing, box, exac
 
 @pytest.mark.parametrize("box", BOXES)
 def test_events_to_come_are_those_of_the_log(simulated, playing, box):
-    """Listed, and stepped to one by one."""
+    """The events are listed, and each one can be stepped to."""
     run = simulated(BOXES[box] + FEW, *LOGGED)
     browser, events = playing(run.path), run.event_log()
     times = events.time[:40]
@@ -393,7 +393,7 @@ def test_events_to_come_are_those_of_the_log(simulated, playing, box):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_sides_are_drawn_where_disks_meet_them(simulated, playing, seed):
-    """Of random systems: none is beyond a side, hits touch it; what comes next is in the log."""
+    """In random systems no disk is beyond a side, disks touch it in collisions, as logged."""
     rng = np.random.default_rng(seed)
     text = f"&run seed = {seed} /\n&box lower = -3, 2 upper = -1.8, 3.1 /\n" + FEW
     for name in rng.choice(SIDES, rng.integers(1, 4), replace=False):
@@ -439,7 +439,7 @@ def test_sides_are_drawn_where_disks_meet_them(simulated, playing, seed):
 
 
 def test_disks_with_unknown_paths_stand_as_in_the_frame_and_the_film_says_so(simulated, playing):
-    """Straight flights would lead them away from the walls where they turn."""
+    """Straight flights would be wrong, because disks are reflected by walls."""
     run = simulated("&box boundary = 'periodic', 'wall' /\n" + FEW)
     browser = playing(run.path)
     browser.run("state.arrows = true; go(0.45 * last())")
@@ -457,13 +457,13 @@ def test_disks_with_unknown_paths_stand_as_in_the_frame_and_the_film_says_so(sim
     said = browser.run("return $('between').textContent")
     assert "Frames only" in said and "output.event_log" in said
     before = browser.run("return moment.time")
-    browser.press("n")  # nothing is told of what comes next
+    browser.press("n")  # next events are not listed
     told = "return [moment.time, $('event').hidden, $('coming').hidden]"
     assert browser.run(told) == [before, True, True]
 
 
 def test_time_is_that_of_the_run_whenever_frames_are_taken(playing, simulated):
-    """Frames at unequal times: half of the film's time is half of the way."""
+    """With frames at unequal times, half of the film's time is half of the distance."""
     run = simulated(
         """&species name = 'a' radius = 0.01 position = 0.05, 0.05 velocity = 0.08, 0.08 /
         &output frames_at = 0.1, 0.2, 0.3 event_log = .true. / &stop time = 10 /"""
@@ -473,7 +473,7 @@ def test_time_is_that_of_the_run_whenever_frames_are_taken(playing, simulated):
     browser.run("go(5)")
     assert browser.run("return [X[0], Y[0]]") == pytest.approx([0.45, 0.45])
     assert browser.run("return +$('scrub').value") == pytest.approx(0.5)
-    # Pictures come here when the test says so, 60 in a second of their time.
+    # The test triggers each picture, with a simulated rate of 60 per second.
     browser.run("window.requestAnimationFrame = draw => { window.draw = draw; }")
     browser.run("pace = 1; $('pace').value = 0; go(0); play(true); window.now = performance.now()")
     second = """draw(now); const start = moment.time;
@@ -538,7 +538,7 @@ def test_the_camera_follows_the_clicked_disk(gas):
         return gaps;"""
     )
     assert len(gaps) > 3 and max(gaps) < 1
-    gas.point("mouse", [(200, 200), (230, 200), (260, 200)])  # a drag lets it go
+    gas.point("mouse", [(200, 200), (230, 200), (260, 200)])  # a drag ends following a disk
     assert gas.run("return camera.follow") == -1
 
 
@@ -579,7 +579,7 @@ def test_box_and_controls_are_seen_without_scrolling(browser, playing, tmp_path,
             assert box["top"] >= 0 and box["bottom"] <= height, (name, box)
     assert boxes["stage"]["height"] >= (110 if edges == (3, 1) or size == "upright" else 260)
     assert boxes["play"]["height"] >= (44 if phone else 38)
-    if phone:  # the histogram is seen with the disks
+    if phone:  # the histogram and the disks are visible together
         assert boxes["histogram"]["bottom"] < height and boxes["histogram"]["height"] > 70
     if size == "wide":
         assert boxes["energy"]["right"] > 1860 and boxes["energy"]["bottom"] < 1080
@@ -590,7 +590,7 @@ def test_box_and_controls_are_seen_without_scrolling(browser, playing, tmp_path,
 
 
 def test_species_are_striped_and_never_look_like_a_hole(playing, tmp_path):
-    """The centre of each disk has its colour, the legend names a pattern only where it is seen."""
+    """The centre of each disk is coloured; the legend names only visible patterns."""
     x = np.array([[[0.2, 0.5], [0.5, 0.5], [0.8, 0.5]]] * 2)
     kinds = {"species": [1, 2, 3], "names": ("a", "b", "c"), "radius": [0.1, 0.1, 0.004]}
     browser = playing(still_run(tmp_path / "a.h5", x, **kinds))
@@ -617,7 +617,7 @@ def test_small_disks_far_apart_are_drawn_large_enough_and_the_page_says_so(playi
 
 
 def test_the_arrows_of_a_film_have_a_scale(playing, tmp_path, rng):
-    """An arrow of a round speed, as long as one of that speed on a disk, at any zoom."""
+    """The arrow of a round speed is as long as that of a disk of this speed, at any zoom."""
     v = rng.normal(size=(2, 12, 2))
     observables = {"collisions": np.zeros(2)}
     path = write_run(tmp_path / "a.h5", 0 * v + 0.5, v, observables=observables)

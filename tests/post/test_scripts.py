@@ -1,4 +1,4 @@
-"""Each script of post/ against what it should find in runs that are made by closed formulas."""
+"""Each script of post/ is tested on synthetic runs with known results."""
 
 import csv
 from types import SimpleNamespace
@@ -39,11 +39,11 @@ from ricochet.figures.drawing import caption, plt, with_images
 from ricochet.script import chosen_frames, distinct, frame_list, grouped
 from synthetic_run import drawn, maxwell_velocities, run_script, write_run, written
 
-TWO = statistics.student(2)  # what an error of two runs is larger by
+TWO = statistics.student(2)  # Student's factor of the error of two runs
 
 
 def refusal(capsys, script, *arguments, code=2):
-    """The message of a script that refuses its arguments; exit code 1 where a law fails."""
+    """Return the message of a script that refuses its arguments (exit code 1 if a law fails)."""
     assert run_script(script, *arguments) == code
     said = capsys.readouterr().err
     assert said.startswith(f"{script}.py: ") and said.count("\n") == 1
@@ -54,7 +54,7 @@ def refusal(capsys, script, *arguments, code=2):
 
 
 def gas(path, rng, count=200, frames=41, mass=1.0, **more):
-    """Equal speeds at first, then Maxwell with the energy kept; half a collision per frame."""
+    """Write a gas that relaxes from equal to Maxwellian speeds, half a collision per frame."""
     angle = rng.uniform(0, 2 * np.pi, (1, count))
     start = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     v = np.concatenate([start, maxwell_velocities(rng, frames - 1, count)])
@@ -69,13 +69,13 @@ def gas(path, rng, count=200, frames=41, mass=1.0, **more):
 
 
 def mixed(path, rng):
-    """Half of the disks four times as heavy."""
+    """Write a gas in which half of the disks have four times the mass."""
     species = {"species": np.repeat([1, 2], 100), "names": ("a", "b")}
     return gas(path, rng, mass=np.repeat([1.0, 4.0], 100), **species)
 
 
 def made_to_cool(path, rate=0.05):
-    """Lets the frames of a file lose energy by exp(-rate) from one to the next."""
+    """Reduce the energy of each frame of a file by exp(-rate) relative to the previous one."""
     with h5py.File(path, "r+") as file:
         velocity, mass = file["particles/disks/velocity/value"], file["particles/disks/mass"][()]
         first = 0.5 * np.sum(mass[:, None] * velocity[0] ** 2)
@@ -115,7 +115,7 @@ def test_reduced_speeds_do_not_know_units_and_relax_from_minus_one_half(tmp_path
 
 @pytest.mark.parametrize(("power", "exact"), [(1, np.sqrt(np.pi) / 2), (4, 2)])
 def test_moments_of_speeds_hold_those_of_maxwell(rng, power, exact):
-    """In units of the sample: these take away 0.71 and 0.55 of the scatter."""
+    """Scaling by the sample reduces the scatter by 0.71 and 0.55."""
     gases = np.sqrt(rng.exponential(size=(1000, 500)))
     gases /= np.sqrt(np.mean(gases**2, axis=1, keepdims=True))
     mean, error = np.array([speeds.moment(u, power, 500) for u in gases]).T
@@ -133,7 +133,7 @@ def test_moments_of_speeds_hold_those_of_maxwell(rng, power, exact):
     ],
 )
 def test_the_law_of_fixed_energy_is_used_only_where_it_holds(tmp_path, rng, system, exact):
-    """Gravity takes kinetic energy away and gives it back."""
+    """Under gravity the kinetic energy is not conserved."""
     run = gas(tmp_path / "run.h5", rng, **system)
     drawn(tmp_path, "speeds", run)
     known = read_run(run)
@@ -143,14 +143,14 @@ def test_the_law_of_fixed_energy_is_used_only_where_it_holds(tmp_path, rng, syst
 
 @pytest.fixture
 def figures(monkeypatch):
-    """The figures that scripts draw."""
+    """Collect the figures that scripts draw."""
     found, save = [], script.save
     monkeypatch.setattr(script, "save", lambda *all_of: (found.append(all_of[0]), save(*all_of)))
     return found
 
 
 def test_a_gas_that_cools_is_not_called_equilibrium(tmp_path, rng, capsys, figures):
-    """Its frames are each drawn at their own temperature, here Maxwell's."""
+    """Each frame is scaled by its own temperature; the speeds are Maxwellian."""
     calm = gas(tmp_path / "calm.h5", rng, count=2000)
     cool = made_to_cool(gas(tmp_path / "cool.h5", rng, count=2000))
     drawn(tmp_path, "speeds", calm)
@@ -173,14 +173,14 @@ def test_fewer_frames_than_asked_for_are_said(tmp_path, rng, capsys):
 
 
 def cells(printed):
-    """The row of a printed table by column."""
+    """Return the row of a printed table as a dictionary."""
     header, row, _ = (line.split() for line in printed.splitlines())
     return dict(zip(header, row, strict=True))
 
 
 @pytest.mark.parametrize("drift", [0.0, 0.02])
 def test_a_sheared_gas_is_steady_relative_to_its_flow(tmp_path, rng, capsys, figures, drift):
-    """With kT 0.5 beside a flow that has ten times that, or with one that drifts."""
+    """The kT is 0.5 in a flow with ten times this energy, or with a drift."""
     sides = {"periodic": (True, True), "observable_time": np.arange(121.0)}
     box = {"box": {"shear_rate": 10.0}, "contact": {"restitution": 0.9}}
     path = gas(tmp_path / "a.h5", rng, count=1000, frames=121, parameters=box, **sides)
@@ -208,7 +208,7 @@ def test_speeds_of_few_disks_or_at_rest_or_on_sliding_walls_are_refused(tmp_path
 
 
 def words_on(figure):
-    """All texts of a figure, in one line."""
+    """Return all texts of a figure in one line."""
     parts = [text.get_text() for text in figure.findobj(plt.Text)]
     return " ".join(" ".join(parts).split())
 
@@ -242,7 +242,7 @@ def test_mixture_has_the_means_of_maxwell(tmp_path, rng):
 
 
 def cooled(path, xi, decay, heavy=2.0, seed=1, points=101):
-    """Energies that decay with collisions; the heavy species `heavy` times as hot."""
+    """Write energies that decay with collisions; the heavy species is `heavy` times as hot."""
     t = np.linspace(0, 1, points) ** 2
     total, x = np.exp(-decay * t), np.zeros((1, 4, 2))
     observables = {
@@ -257,7 +257,7 @@ def cooled(path, xi, decay, heavy=2.0, seed=1, points=101):
 
 
 def test_cooling_averages_over_runs_on_one_grid(tmp_path):
-    """Relative energies against collisions, those of the input against time."""
+    """Relative energies are drawn against collisions, energies in input units against time."""
     paths = [
         cooled(tmp_path / f"{k}.h5", 0.9, decay, points=p)
         for k, (decay, p) in enumerate([(1.0, 401), (2.0, 301)])
@@ -281,7 +281,7 @@ def test_a_gas_of_one_kind_cools_without_a_ratio(tmp_path, rng):
 
 @pytest.mark.parametrize("end", [25.0, None])
 def test_the_cooling_rate_is_that_of_the_homogeneous_state(rng, end):
-    """Three per cent above the law, scattering by one; at half the rate after the end."""
+    """The rate is three per cent above the law with a scatter of one, and half of it later."""
     tau, true = np.linspace(0, 60, 601), 1.03 * cooling.hard_disks.haff_rate(0.9)
     tracks = []
     for factor in 1 + 0.01 * rng.normal(size=20):
@@ -298,7 +298,7 @@ def test_the_cooling_rate_is_that_of_the_homogeneous_state(rng, end):
 
 
 def test_the_steady_ratio_has_forgotten_its_start(monkeypatch, tmp_path):
-    """Of runs that follow the law, whether they start without a spin or with too much of it."""
+    """Runs that follow the law start without rotation or with too much rotation."""
     law, tau = (0.9, 0.0, 0.5), np.linspace(0, 25, 251)
 
     def run(start, last=251):
@@ -321,7 +321,7 @@ def test_the_steady_ratio_has_forgotten_its_start(monkeypatch, tmp_path):
 
 
 def collision(path, b, ratio=1e6):
-    """Two frames of a light disk scattered by a heavy one at rest, by the collision rule."""
+    """Write two frames of a light disk that is scattered by a heavy disk at rest."""
     r, v = np.array([0.1, 0.001]), np.array([1.0, 0.0])
     normal = np.array([-np.sqrt(1 - b**2), b]) if abs(b) < 1 else np.zeros(2)
     after = v - 2 * ratio / (1 + ratio) * (v @ normal) * normal
@@ -344,7 +344,7 @@ def test_scattering_of_a_run(tmp_path, b):
 
 
 def impact(path, mass=25.0, speed=5.0, xi=0.5, seed=1, moved=3, left=0.1, names=True, walls=0):
-    """A bed of 4 x 20 disks; the `moved` first ones of the upper row pushed aside."""
+    """Write a bed of 4 x 20 disks with the first `moved` disks of the top row displaced."""
     r = 0.02
     xs, ys = np.meshgrid(np.arange(20) * 0.05 + 0.025, [0.35, 0.3, 0.25, 0.2])
     first = np.concatenate([[[0.5, 0.75]], np.stack([xs.ravel(), ys.ravel()], axis=1)])
@@ -413,7 +413,7 @@ def test_a_crater_that_was_cut_short_is_marked(tmp_path, capsys, words, more):
 
 
 def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
-    """Three masses, two speeds, two seeds; and two runs that stand alone, one of them twice.
+    """The grid has three masses, two speeds, two seeds; two runs are isolated, one of them doubled.
 
     Points that the box or time cut short are in no fit; the same run twice counts once.
     """
@@ -462,7 +462,7 @@ def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
 
 
 def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0, seed=1, hits=15):
-    """An ideal gas in equilibrium in the gravity box; `hits` pair collisions per frame."""
+    """Write an ideal gas in equilibrium under gravity with `hits` pair collisions per frame."""
     mass, r = np.repeat([0.025, 0.05], 30), 0.04
     height = r + rng.exponential(temperature / (mass * 9.81), (frames, 60))
     x = np.stack([rng.uniform(r, 8 - r, (frames, 60)), height], axis=-1)
@@ -502,7 +502,7 @@ def test_gravity_slopes_are_those_of_the_laws(tmp_path, rng):
 
 
 def test_crowded_disks_spread_upwards_and_share_their_energy(tmp_path, rng):
-    """To first order a small radius lowers the density by the area that is taken, times n."""
+    """To first order a small radius reduces the density by n times the excluded area."""
     run = read_run(falling(tmp_path / "run.h5", rng))
     h = np.linspace(0, 15.9, 4001)
     species = [gravity.samples(run, kind, list(range(80, 400))) for kind in run.by_species]
@@ -530,13 +530,13 @@ def test_thermalisation_time_ignores_a_passing_agreement():
         known = statistics.Estimate(np.abs(difference), np.full(8, error))
         return statistics.propagate_error(lambda curve: equipartition.entry(time, curve), known)
 
-    assert found(gap, 0.005) == pytest.approx((3 + 0.1 / 0.11, 0.005 / 0.11))  # of a steep line
+    assert found(gap, 0.005) == pytest.approx((3 + 0.1 / 0.11, 0.005 / 0.11))  # for a steep line
     for unknown in (found(gap + 1, 0.04), found(gap, 0.06), found(gap, np.nan)):
         assert np.isnan(unknown.mean)
 
 
 def test_one_run_of_many_disks_has_a_thermalisation_time_with_an_error(rng):
-    """Its error is from the fluctuations in equilibrium, which hold the truth in 68 % of cases."""
+    """Its error follows from fluctuations in equilibrium and has a coverage of 68 %."""
     time, found = np.arange(0, 40, 0.25) + 0.25, []
     kinds = [SimpleNamespace(mass=mass) for mass in (1.0, 2.0)]
     for _ in range(200):
@@ -561,7 +561,7 @@ def test_one_run_does_not_say_that_energies_agree(tmp_path, rng, capsys):
     assert row["T_therm"] == "nan" and "use more runs" in capsys.readouterr().err
     several = [read_run(falling(tmp_path / f"{k}.h5", rng, seed=k)) for k in range(2, 60)]
     assert equipartition.approach(several, 2, 0.1).thermalisation.mean == 1
-    other = read_run(falling(tmp_path / "other.h5", rng, frames=300))  # in windows of their own
+    other = read_run(falling(tmp_path / "other.h5", rng, frames=300))  # in separate windows
     assert len(equipartition.approach([several[0], other], 0.25, 0.1).time) < 300
 
 
@@ -649,7 +649,7 @@ def test_paths_break_where_a_period_is_crossed_and_pass_corners(tmp_path):
 
 
 def timed(path, count=3, search="cells", **provenance):
-    """A run that says how long it took."""
+    """Write a run with a recorded wall time."""
     x = np.zeros((1, count, 2))
     return write_run(path, x, x, parameters={"run": {"search": search}}, provenance=provenance)
 
@@ -687,7 +687,7 @@ def test_several_cores_are_compared_with_one_by_medians(tmp_path):
 
 
 def neighbours(folder, rng, pairs=3, growth=2.0, frames=81):
-    """Files of pairs of runs of two disks, 1e-12 exp(growth t) apart up to 0.5, time 0 to 16."""
+    """Write pairs of runs of two disks with distances 1e-12 exp(growth t) up to 0.5, t < 16."""
     time = np.linspace(0, 16, frames)
     paths = []
     for k in range(pairs):
@@ -718,7 +718,7 @@ def test_lyapunov_finds_the_rate_of_divergence(tmp_path, rng, capsys):
 
 
 def tracer(path, rng, radii=(0.4, 0.4), walk=0.3, frames=20001):
-    """A random walk through a box of two scatterers; a frame every 10 mean free times.
+    """Write a random walk in a box of two scatterers with a frame every 10 mean free times.
 
     With R = 0.5 and two scatterers in 2 x 2 the density n R^2 is 1/8, the mean free time 2.
     """
@@ -806,6 +806,6 @@ NEEDY = (
 
 @pytest.mark.parametrize("script", [*NEEDY.split(), "speeds", "transport"])
 def test_a_run_for_which_the_law_does_not_hold_is_refused_with_exit_1(simulated, capsys, script):
-    """Two equal disks between walls; what is wrong with a file or an option is exit 2."""
+    """The runs have two equal disks between walls; errors of files and options are exit 2."""
     run = simulated("&species count = 2 radius = .05 speed = 1 / &stop time = 20 /" + EVERY)
     assert str(run.path) in refusal(capsys, script, run.path, code=1)

@@ -1,4 +1,4 @@
-"""p-values of speeds: uniform where the law holds, tiny where it does not."""
+"""p-values of speeds: uniform if the law is correct, tiny if it is wrong."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ SEEDS = 100
 
 
 def made(rng, count, frames, mass, periodic, keep, fixed):
-    """Velocities (F, N, 2) of the law, each of which keeps the share `keep` from frame to frame."""
+    """Return velocities (F, N, 2) of the law with the correlation `keep` between frames."""
     size = frames + 200, count, 2
     v = lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.normal(size=size), axis=0)[200:]
     v /= np.sqrt(mass)[:, None]
@@ -49,13 +49,13 @@ def test_p_values_are_uniform_where_the_law_holds(tmp_path, rng, system):
         found.append((test.ks_p, test.chi2_p, test.independent / (run.species == 1).sum()))
     ks, chi2, free = np.transpose(found)
     assert kstest(ks, "uniform").pvalue > 1e-3 and kstest(chi2, "uniform").pvalue > 1e-3
-    # Energies of frames are scaled away; the next polynomial of Laguerre falls as keep^4.
+    # Scaling removes the energies of frames; the next Laguerre polynomial decays as keep^4.
     least = frames * (1 - keep**4) / (1 + keep**4)
     assert 0.85 * least < np.mean(free) <= (0.95 if keep else 1) * frames
 
 
 def test_a_wrong_law_has_a_tiny_p_value(tmp_path, rng):
-    """Equal speeds, and the a2 = 0.1 of a gas that noise heats."""
+    """Wrong laws are equal speeds, and a2 = 0.1 as in a gas with white-noise driving."""
     angle = rng.uniform(0, 2 * np.pi, (20, 500))
     equal = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     noisy = rng.normal(size=(20, 500, 2)) * rng.gamma(10, 1 / 10, (20, 500, 1)) ** 0.5

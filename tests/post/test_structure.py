@@ -1,4 +1,4 @@
-"""How disks are arranged and how they move: made runs against closed formulas."""
+"""Structure and time correlations of synthetic runs, compared with exact results."""
 
 import pickle
 from itertools import pairwise
@@ -41,7 +41,7 @@ def test_points_at_random_are_not_correlated(tmp_path, rng, periodic):
 
 
 def test_pairs_are_counted_in_the_box_of_the_moment(tmp_path, rng):
-    """Where a side presses the disks together; nothing is known of frames with none far from it."""
+    """A side compresses the disks; frames without disks far from walls have no result."""
     time, stroke = (
         np.arange(60.0),
         {"motion": "constant_velocity", "velocity": 0.01, "start_time": 0.0, "end_time": 50.0},
@@ -79,7 +79,7 @@ def test_the_structure_factor_of_points_at_random_is_1_of_a_lattice_n(tmp_path, 
 
 @pytest.mark.parametrize("sides", [(1.0, 1.0), (1.5, 0.7)])
 def test_a_structure_factor_is_the_mean_over_all_wave_vectors(tmp_path, rng, sides):
-    """Each of the whole plane counts once, so that x and y are alike."""
+    """Each wave vector of the plane is used once, so that x and y are equivalent."""
     x = rng.uniform(size=(2, 40, 2)) * sides
     run = written(tmp_path / "run.h5", x, x, edges=sides, periodic=PERIODIC, radius=0.5)
     edges = np.array([3.0, 6.5, 9.5, 20.0])
@@ -114,7 +114,7 @@ def test_partial_structures_are_those_of_each_pair_of_species_and_add_up(tmp_pat
 
 
 def test_the_structure_of_one_run_knows_that_its_frames_remember(tmp_path, rng):
-    """Of two places, each for half of the time: worth two frames, not as many as there are."""
+    """Two configurations, each for half of the time, are equivalent to two independent frames."""
     places = rng.uniform(size=(2, 200, 2))
     run = written(tmp_path / "run.h5", *[np.repeat(places, 16, axis=0)] * 2, periodic=PERIODIC)
     parts = [slice(0, 16), slice(16, 32), slice(0, 32)]
@@ -125,7 +125,7 @@ def test_the_structure_of_one_run_knows_that_its_frames_remember(tmp_path, rng):
 
 
 def triangular(columns, rows):
-    """A perfect crystal in its periodic box."""
+    """Write a perfect triangular crystal in a periodic box."""
     i, j = np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij")
     x = np.stack([i + 0.5 * (j % 2), j * np.sqrt(0.75)], axis=-1).reshape(-1, 2) + 0.2
     return x, (columns, rows * np.sqrt(0.75))
@@ -133,7 +133,7 @@ def triangular(columns, rows):
 
 def test_a_crystal_is_in_order_and_points_at_random_are_not(tmp_path, rng):
     x, edges = triangular(12, 14)
-    # Shaken a little: in a perfect one the triangulation of the copies is not unique.
+    # Positions are perturbed, because the triangulation of a perfect crystal is not unique.
     x = x + rng.normal(0, 1e-6, x.shape)
     frames = np.stack([x, x])
     crystal = written(tmp_path / "c.h5", frames, frames, edges=edges, periodic=PERIODIC)
@@ -159,7 +159,7 @@ def test_a_crystal_is_in_order_and_points_at_random_are_not(tmp_path, rng):
 
 
 def test_a_cluster_hangs_together_across_a_periodic_side_and_not_across_a_wall(tmp_path):
-    """Three disks in a row over the side; a large one that small ones at its rim belong to."""
+    """Three disks in a row across the side; small disks at the rim of a large one belong to it."""
     x = [(0.05, 0.5), (0.98, 0.5), (0.91, 0.5), (0.5, 0.5), (0.5, 0.77), (0.23, 0.5), (0.2, 0.1)]
     radius = np.array([0.035] * 3 + [0.2] + [0.06] * 2 + [0.035])
     for periodic, expected in ((True, 3), (False, 2)):
@@ -173,7 +173,7 @@ def test_a_cluster_hangs_together_across_a_periodic_side_and_not_across_a_wall(t
 
 
 def flights(rng, count, time):
-    """Positions and velocities (T, count, 2) of points that take a new velocity at the rate 1.
+    """Return positions and velocities (T, count, 2) of points with velocity changes at rate 1.
 
     Each component is normal with variance 1, so that <v(0) v(t)> / 2 = D'(t) = exp(-t).
     """
@@ -191,7 +191,7 @@ def flights(rng, count, time):
 
 @pytest.mark.parametrize(("step", "lag"), [(0.4, 8), (1.0, 4), (2.0, 2), (5.0, 2)])
 def test_memory_and_diffusion_are_right_however_far_apart_frames_are(tmp_path, rng, step, lag):
-    """In mean free times; the ways and slopes of each flight are exact."""
+    """The unit is the mean free time; displacements and slopes of each flight are exact."""
     count, time = 1000, step * np.arange(1200)
     x, v = flights(rng, count, time)
     image = np.floor(x).astype(int)
@@ -221,11 +221,11 @@ TIMES = {
 
 @pytest.mark.parametrize("times", TIMES.values(), ids=TIMES)
 def test_each_lag_is_exact_whenever_frames_are(tmp_path, rng, times):
-    """Disks of two species that fly freely across the sides."""
+    """Disks of two species move freely across the sides."""
     species, reach, wave = np.arange(300) % 2 + 1, 0.7, 3.0
     v = rng.normal(size=(300, 2)) * np.sqrt(species)[:, None]
     v -= v.mean(axis=0)
-    x = 0.3 + times[:, None, None] * v + 0.4 * times[:, None, None]  # the drift does not count
+    x = 0.3 + times[:, None, None] * v + 0.4 * times[:, None, None]  # the drift does not contribute
     image, still = np.floor(x).astype(int), np.zeros_like(x) + v
     parts = {"image": image, "time": times, "periodic": PERIODIC}
     run = written(tmp_path / "a.h5", x - image, still, species=species, names=("a", "b"), **parts)
@@ -252,7 +252,7 @@ def test_each_lag_is_exact_whenever_frames_are(tmp_path, rng, times):
 
 
 def test_a_correlator_keeps_few_samples_and_looks_at_many_lags(tmp_path, rng):
-    """And finds all lags of very many times by trying some of them."""
+    """It finds all lags of very many times by testing a part of the pairs."""
     x = rng.uniform(size=(4000, 3, 2))
     run = written(tmp_path / "run.h5", x, x, time=np.arange(4000.0))
     known, most = pairs.Correlator(run, run.time), 0
@@ -296,7 +296,7 @@ MIXED = """&run seed = {seed} / &box boundary = 'periodic', 'periodic' /
 
 @pytest.mark.parametrize("side", ["periodic", "wall"])
 def test_what_is_found_on_the_fly_and_in_parts_is_that_of_the_file(simulated, tmp_path, side):
-    """To the last bit: in one go, of a file that grows, and through stop and resume."""
+    """Results are bit-identical: in one pass, for a growing file, and after stop and resume."""
     texts = [MIXED.format(seed=1, packing=0.2, until=until) for until in (0.5, 1.01)]
     texts = [text.replace("periodic", side) for text in texts]
     short, run = (simulated(text, name=f"{k}") for k, text in enumerate(texts))
@@ -318,7 +318,7 @@ def test_what_is_found_on_the_fly_and_in_parts_is_that_of_the_file(simulated, tm
 
 
 def test_disks_that_differ_by_their_mass_alone_have_the_structure_of_equal_ones(simulated):
-    """At contact g is that of the pressure, S of small k the compressibility: 1 / (eta Z)'."""
+    """Contact g follows from the pressure, S at small k from the compressibility 1 / (eta Z)'."""
     run = simulated(MIXED.format(seed=1, packing=0.1, until=10))
     eta, near, far = 0.2, np.array([1, 1.02]), np.array([0.01, 0.5])
     frames = [structure.evenly(run, most=200)]
@@ -336,7 +336,7 @@ def test_disks_that_differ_by_their_mass_alone_have_the_structure_of_equal_ones(
 
 
 def test_a_dilute_mixture_flies_as_maxwells_law_has_it(simulated):
-    """F_s = exp(-k^2 kT t^2 / 2 m), <r^2> = 2 kT t^2 / m: eight seeds, within four errors."""
+    """F_s = exp(-k^2 kT t^2 / 2 m) and <r^2> = 2 kT t^2 / m, within four errors of eight seeds."""
     runs = [
         simulated(MIXED.format(seed=seed, packing=1e-5, until=0.1), name=f"{seed}")
         for seed in range(8)
@@ -351,7 +351,7 @@ def test_a_dilute_mixture_flies_as_maxwells_law_has_it(simulated):
 
 
 def test_errors_of_one_run_hold_the_truth_as_often_as_they_say(tmp_path, rng):
-    """At lags below an eighth of it; longer ones have none."""
+    """This applies to lags below an eighth of the run; longer lags have no errors."""
     time, held, lag = 0.5 * np.arange(400), [], np.array([0.5, 4.0, 20.0, 50.0])
     for k in range(50):
         x, v = flights(rng, 8, time)

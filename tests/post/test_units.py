@@ -47,14 +47,14 @@ def test_what_is_no_name_of_a_unit_is_refused(capsys, text, problem):
 
 
 def test_no_script_writes_a_unit_of_its_own():
-    """All labels are by `Units.label`: else --units would be ignored silently."""
+    """All labels use `Units.label`; otherwise --units would be ignored silently."""
     paths = [*ROOT.glob("post/*.py"), *ROOT.glob("post/ricochet/*/*.py")]
     names = {path.name for path in paths if "(reduced units)" in path.read_text()}
     assert names == {"units.py"}
 
 
 def test_the_axes_of_a_figure_have_the_named_units(tmp_path, rng, monkeypatch):
-    """A film and a picture take the name from the run, too."""
+    """Films and pictures also use the names of the units."""
     v = maxwell_velocities(rng, 3, 20)
     more = {"observables": {"collisions": np.arange(3)}}
     path = write_run(tmp_path / "gas.h5", rng.uniform(0.1, 0.9, v.shape), v, **more)
