@@ -172,7 +172,7 @@ def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
             axes.set_ylabel(runs[0].units.label("mean energy per disk", "energy"))
         if k == 0:
             measured = all(len(own) >= FEWEST_RUNS for _, own in groups)
-            title = "band: 95 % of single runs" + ("" if measured else " at least (estimate)")
+            title = "band: 95 % of single runs" + ("" if measured else " at least, estimated")
             axes.legend(loc="upper right", title=title)
     places = grid[above, :3], grid[above, 3:]
     draw_overview(figure, places, runs, list(zip(groups, results, strict=True)))

@@ -218,7 +218,7 @@ def drawn_gas(rng) -> DrawnGas:
 
 @pytest.mark.parametrize("systems", [12, pytest.param(400, marks=pytest.mark.check)])
 def test_kt_and_z_of_any_gas_are_right_or_refused(simulated, systems):
-    """The kT is that of walls or driving, or follows from the energy; Z is that of the undriven gas."""
+    """The kT is that of walls or driving, or follows from the energy; Z is of the undriven gas."""
     found = []
     for k in range(systems):
         known = drawn_gas(np.random.default_rng([int(os.environ.get("SEED", "1")), k]))
