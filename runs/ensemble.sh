@@ -7,7 +7,7 @@ export OMP_NUM_THREADS=1 # default of one core for each member; run.threads has 
 
 usage() {
   cat <<TEXT
-$me: many runs of one input, seeds x values, safe to stop and to repeat
+$me: performs many runs of one input (seeds x values), and continues after an interruption
 
 usage:  $me INPUT.nml -d FOLDER [option]...
 
@@ -16,27 +16,27 @@ members:
   --scan VARIABLE=A,B,C  values of a variable; repeated: every combination.  Vectors contain commas,
                          so separate them by semicolons: --scan 'species.ball.velocity=0,-1;0,-2'
                          One element: --scan 'box.gravity(2)=-5,-10'
-  --set VARIABLE=VALUE   the same for all members; may be repeated
+  --set VARIABLE=VALUE   value of a variable in all members; may be repeated
   --manifest FILE        instead of --seeds and --scan: one member per line,
                              NAME <TAB or blank> --set VARIABLE=VALUE --set VARIABLE=VALUE ...
                          (a NAME with blanks needs the TAB; lines that begin with # are left out)
 running:
-  -j N                   members at a time [all cores]
+  -j N                   number of members that run at the same time [number of cores]
   --dry-run              print the members, check the input of the first, and stop
-  --engine pool          who runs them: this script, on this machine [default],
+  --engine pool          this script runs the members on this machine [default],
            slurm         a Slurm job array, -j N members at a time in all; sbatch takes its options
                          from the environment: SBATCH_TIMELIMIT, SBATCH_PARTITION, ...
            parallel      GNU parallel, -j N members at a time on each host
-  --tasks N              of the array at most: they share the members [10 for each of -j N, and what
-                         the site allows]
+  --tasks N              largest number of tasks of the Slurm array, which share the members [10 for
+                         each of -j N, within the limits of the site]
   --retry                submit members that failed to Slurm once more
   --sshloginfile FILE    hosts for GNU parallel, as in its manual [this machine]
-  --share K/M            of M parts of the list the K-th (what the engines start elsewhere)
+  --share K/M            run only the K-th of M parts of the list (used by the engines)
   -h, --help
 
 Member NAME writes FOLDER/NAME.h5 and FOLDER/NAME.log.  The same command again continues: a member
-with NAME.h5 is finished and left out, one with NAME.h5.part resumes, one that broke off or failed
-is tried again (by Slurm only with --retry).  TERM or Ctrl-C stops all members after a checkpoint.  Copies of the command on one folder
+with NAME.h5 is finished and left out, one with NAME.h5.part resumes, a member that failed
+or was interrupted without data starts again (with Slurm only with --retry).  TERM or Ctrl-C stops all members after a checkpoint.  Copies of the command on one folder
 share the work.  The program is what RICOCHET names, or ricochet beside this command (in a clone
 build/ricochet).  All machines need the same folders.
 

@@ -112,7 +112,7 @@ def first_rate(run: Run) -> float:
     Parameters
     ----------
     run : Run
-        a run of smooth disks that cool in a periodic box
+        a simulation of smooth disks that cool in a periodic box
 
     Returns
     -------
@@ -156,7 +156,7 @@ def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     Parameters
     ----------
     run : Run
-        a run of smooth disks that cool in a periodic box
+        a simulation of smooth disks that cool in a periodic box
 
     Returns
     -------
@@ -314,7 +314,7 @@ def rough_law(run: Run) -> tuple[float, float, float]:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
 
     Returns
     -------

@@ -67,7 +67,7 @@ def energy_fraction(run: Run) -> float:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
 
     Returns
     -------
@@ -88,7 +88,7 @@ def ended_by_time(run: Run, size: Crater) -> bool:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     size : Crater
         its crater
 
@@ -111,7 +111,7 @@ def box_takes_part(run: Run, side_collisions: float) -> bool:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     side_collisions : float
         number of collisions with the sides; it may be a mean over runs
 
@@ -167,7 +167,7 @@ def projectile(run: Run) -> int:
     Parameters
     ----------
     run : Run
-        a run with a species 'projectile', or with a single disk that moves at the start
+        a simulation with a species 'projectile', or with a single disk that moves at the start
 
     Returns
     -------
@@ -200,7 +200,7 @@ def bed(run: Run) -> np.ndarray:
     Parameters
     ----------
     run : Run
-        a run with a projectile
+        a simulation with a projectile
 
     Returns
     -------
@@ -223,7 +223,7 @@ def displaced(run: Run, frame: int = -1) -> np.ndarray:
     Parameters
     ----------
     run : Run
-        a run with a projectile
+        a simulation with a projectile
     frame : int
         the frame [the last]
 
@@ -246,7 +246,7 @@ def crater(run: Run) -> Crater:
     Parameters
     ----------
     run : Run
-        a run in which a projectile meets a bed at rest
+        a simulation in which a projectile meets a bed at rest
 
     Returns
     -------
@@ -292,7 +292,7 @@ def hole(run: Run) -> np.ndarray:
     Parameters
     ----------
     run : Run
-        a run with a projectile
+        a simulation with a projectile
 
     Returns
     -------

@@ -207,7 +207,7 @@ def places(run: Run, cells: Cells) -> np.ndarray:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     cells : tuple of int
         numbers of cells along x and y
 

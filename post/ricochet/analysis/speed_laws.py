@@ -154,7 +154,7 @@ def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> Speed
     frames : list of Index
         (R,) frames of each run
     name : str
-        the species
+        name of the species
 
     Returns
     -------

@@ -26,9 +26,9 @@ def kt_of_frames(
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     frames : Index
-        the frames
+        frames to use
     species : str, optional
         the species [all disks together]
     component : int, optional
@@ -63,9 +63,9 @@ def reduced_speeds(
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     frames : Index
-        the frames
+        frames to use
     each : bool
         whether each frame is scaled with its own kT instead of the mean kT of all frames
     species : str, optional
@@ -119,7 +119,7 @@ def relaxation(
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     until : float
         collisions per disk up to which frames are used
     frames : int, optional
@@ -154,7 +154,7 @@ def means(runs: Sequence[Run], frames: Sequence[Index], name: str) -> tuple[Esti
     frames : list of Index
         (R,) frames of each run
     name : str
-        the species
+        name of the species
 
     Returns
     -------

@@ -22,7 +22,7 @@ def stream_function(run: Run, flux: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     run : Run
-        a run with the same box; no flux passes its walls
+        a simulation with the same box; no flux passes its walls
     flux : numpy.ndarray
         (2, NY, NX) density times flow along x and y [1/(length time)]; NaN in cells without data,
         as inside obstacles, is treated as 0

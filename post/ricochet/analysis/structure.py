@@ -51,7 +51,7 @@ def pair_correlation(
     Parameters
     ----------
     run : Run
-        a run in a box at rest
+        a simulation in a box at rest
     frames : Index
         the frames: a number, a slice, or a list
     edges : numpy.ndarray
@@ -111,7 +111,7 @@ def structure_factor(
     Parameters
     ----------
     run : Run
-        a run in a periodic box
+        a simulation in a periodic box
     frames : Index
         the frames: a number, a slice, or a list
     edges : numpy.ndarray
@@ -167,7 +167,7 @@ def evenly(run: Run, frames: Index = slice(None), most: int = 50) -> list[int]:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     frames : Index
         frames from which to select [all]
     most : int
@@ -250,9 +250,9 @@ def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray:
     Parameters
     ----------
     run : Run
-        a run in a box at rest
+        a simulation in a box at rest
     frame : Index
-        a frame, or several
+        number of a frame, or index of several frames
     gap : float
         largest gap between neighbours [length]
 
@@ -289,9 +289,9 @@ def bond_order(run: Run, frame: Index) -> np.ndarray:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     frame : Index
-        a frame, or several
+        number of a frame, or index of several frames
 
     Returns
     -------
@@ -336,9 +336,9 @@ def bond_correlation(
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     frames : Index
-        the frames
+        frames to use
     psi : sequence of numpy.ndarray
         (F, N) `bond_order` of each of the frames
     edges : numpy.ndarray

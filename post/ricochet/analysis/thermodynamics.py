@@ -83,7 +83,7 @@ def all_settle(runs: Sequence[Run]) -> bool:
 def after_start(run: Run, skip: float | None = None) -> float:
     """Return the time after `skip` collisions per disk, or by default after `SPEEDS_FORGET`.
 
-    A run too short for that counts from its middle.
+    For a shorter run, the time is half of the duration of the run.
     """
     time = np.union1d(run.time, run.collisions_per_disk.time)
     tau = run.collisions_per_disk_at(time)
@@ -108,7 +108,7 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     skip : float, optional
         collisions per disk that are left out at the start [until no observable drifts]
 
@@ -178,7 +178,7 @@ def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     skip : float, optional
         collisions per disk that are left out at the start [until no observable drifts]
 
@@ -210,7 +210,7 @@ def frames_from(
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     start : float
         time of the first frame
     apart : float
@@ -310,7 +310,7 @@ def free_disks(run: Run) -> float:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
 
     Returns
     -------
@@ -345,7 +345,7 @@ def kt_at_start(run: Run) -> float:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
 
     Returns
     -------
@@ -383,7 +383,7 @@ def temperature(run: Run, skip: float | None = None) -> SeriesMean:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     skip : float, optional
         collisions per disk that are left out at the start [until no observable drifts]
 
@@ -425,7 +425,7 @@ def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     mass : float
         mass of the disk
     skip : float, optional
@@ -456,7 +456,7 @@ def packing(run: Run) -> float:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
 
     Returns
     -------
@@ -493,7 +493,7 @@ def mean_free_time(run: Run, start: float = 0.0) -> float:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     start : float
         time after which collisions are counted
 
@@ -569,7 +569,7 @@ def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     skip : float, optional
         collisions per disk that are left out at the start [until no observable drifts]
 
@@ -599,7 +599,7 @@ def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     skip : float, optional
         collisions per disk that are left out at the start [until no observable drifts]
 
@@ -628,7 +628,7 @@ def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     skip : float, optional
         collisions per disk that are left out at the start [until no observable drifts]
 
@@ -661,7 +661,7 @@ def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     skip : float, optional
         collisions per disk that are left out at the start [until no observable drifts]
 
@@ -693,7 +693,7 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     skip : float, optional
         collisions per disk that are left out at the start [until no observable drifts]
 
@@ -725,7 +725,7 @@ def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     skip : float, optional
         collisions per disk that are left out at the start [until no observable drifts]
 
@@ -765,7 +765,7 @@ def pair_rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     skip : float, optional
         collisions per disk that are left out at the start [until no observable drifts]
 
@@ -804,7 +804,7 @@ def rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     Parameters
     ----------
     run : Run
-        a run
+        the simulation to analyse
     skip : float, optional
         collisions per disk that are left out at the start [until no observable drifts]
 

@@ -198,7 +198,7 @@ def enskog_of(run: Run, reduced: bool = False) -> dict[str, float]:
     Parameters
     ----------
     run : Run
-        a run that conserves its kinetic energy
+        a simulation that conserves its kinetic energy
     reduced : bool
         whether the units are the mean mass, the mean diameter and kT, instead of those of the run
 

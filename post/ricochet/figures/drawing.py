@@ -112,7 +112,7 @@ def label_of(run: Run, colour: str) -> str:
 
 
 def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
-    """Return the number (..., N) that colours each disk, see `COLOURINGS`."""
+    """Return the value (..., N) by which each disk is coloured; see `COLOURINGS`."""
     if colour == "collisions" and run.event_count is not None:
         return run.event_count[as_index(frame)].astype(float)
     if colour == "psi6":

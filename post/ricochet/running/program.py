@@ -253,7 +253,8 @@ def lines_from(terminal: int) -> Iterator[str]:
 def unseen(system: str | Path | Mapping[str, Any], place: Path | None = None) -> str | None:
     """Return the text of an input that is not a file, or None for a file.
 
-    Starting files of arrays are written beside `place`; without it into a folder of this process.
+    Starting files of arrays are written to the folder of `place`, by default to a folder of this
+    process.
     """
     if isinstance(system, Mapping):
         return namelist(system, place)

@@ -17,7 +17,7 @@ SPECIES = re.compile(r"[1-9]\d*|[A-Za-z][A-Za-z0-9_-]{0,39}")  # as read by the 
 #: Columns whose name in the text is shorter.
 TURNING = {"angular_velocity": "omega", "orientation": "angle"}
 
-#: Variables of a species that may have a value for each disk, beside position and velocity.
+#: Variables of a species, besides position and velocity, that may have a value for each disk.
 PER_DISK = ("radius", "mass", "angular_velocity", "orientation")
 NUMBERS = itertools.count(1)
 
