@@ -9,6 +9,7 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ricochet import ProgramError, RunError, ensemble, read_run, sweep
@@ -45,7 +46,29 @@ def test_a_sweep_and_the_script_go_on_with_each_others_members(tmp_path):
         again = sweep(text, {**VALUES, "species.a.velocity": [(1, -1), (0, 1)]}, tmp_path, pool)
     assert len(again) == 8 and set(again.state) == {"finished"}
     with pytest.raises(RunError, match="another input"):
-        sweep(f"{text}! changed", VALUES, tmp_path)
+        sweep(text.replace("count = 30", "count = 31"), VALUES, tmp_path)
+    assert [*sweep(f"{text}! changed", VALUES, tmp_path).wall_time] == [*again.wall_time]
+
+
+@pytest.mark.usefixtures("_tools")
+def test_finished_members_are_extended_with_the_same_bits(program, tmp_path):
+    """By a later stop and another schedule; a stop that is reached leaves them as they are."""
+    values = {"contact.restitution": [0.9, 1], "run.seed": [1, 2]}
+    longer = GAS.replace("disk = 5", "disk = 9") + "&output frames_every_time = 0.1 /\n"
+    whole = sweep(longer, values, tmp_path / "whole")
+    sweep(GAS, {**values, "run.seed": 1}, tmp_path / "grown")
+    grown = sweep(longer, values, tmp_path / "grown")
+    names = ["member", "collisions", "time", "total_energy", "virial"]
+    names = [name for name in names if name in whole]
+    assert grown[names].equals(whole[names]) and set(grown.state) == {"finished"}
+    for name in whole.member:
+        one, other = (read_run(tmp_path / folder / f"{name}.h5") for folder in ("whole", "grown"))
+        assert np.array_equal(one.position[-1], other.position[-1])
+        assert np.array_equal(one.velocity[-1], other.velocity[-1])
+    before = [path.read_bytes() for path in sorted((tmp_path / "grown").glob("*.h5"))]
+    again = sweep(GAS, values, tmp_path / "grown")
+    assert again[names].equals(whole[names]) and set(again.state) == {"finished"}
+    assert before == [path.read_bytes() for path in sorted((tmp_path / "grown").glob("*.h5"))]
 
 
 @pytest.mark.usefixtures("_tools")

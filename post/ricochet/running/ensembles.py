@@ -12,12 +12,14 @@ NAME.log.  Therefore `sweep` continues the member runs of `runs/ensemble.sh` and
 import contextlib
 import fcntl
 import itertools
+import json
 import multiprocessing
 import os
 import re
 import signal
 import stat
 import subprocess
+import tempfile
 import threading
 import time
 import zlib
@@ -37,6 +39,7 @@ from .simulation import Simulation
 if TYPE_CHECKING:
     import pandas
 
+FINISHED = ": is a finished run, "
 BROKE_OFF = ": its run broke off "
 LOOK = 0.2  # interval at which a worker checks for an interrupt [s]
 LONGEST_NAME = 200  # characters in the name of a member
@@ -53,6 +56,9 @@ def sweep(
 
     Finished member runs are left out and interrupted ones continue.  After an interrupt, repeat the
     same call.
+
+    If the input differs from that of the finished members only in variables that may change when a
+    run is resumed, such as a later stop or another sampling schedule, the members are extended.
 
     Parameters
     ----------
@@ -221,7 +227,7 @@ def remember_alone(folder: Path, text: str, overrides: Mapping[str, str]) -> Non
     path = folder / "input.nml"
     old = path.read_text(encoding="utf-8", errors="surrogateescape") if path.is_file() else text
     data = {name for name in before if any(files_of(folder, name)) and not failed(folder, name)}
-    if old != text and data:
+    if old != text and data and not may_continue(folder, old, text):
         raise RunError(
             f"{folder}: holds members of another input (see {path}); choose another folder"
         )
@@ -230,9 +236,34 @@ def remember_alone(folder: Path, text: str, overrides: Mapping[str, str]) -> Non
             raise RunError(
                 f"{folder}: holds a member '{name}' with other settings ({before[name]})"
             )
-    put(path, text)
+    if not path.is_file() or old != text:
+        put(path, text)  # newer than the members that are finished: `run_member` extends them
     lines = sorted(f"{name}\t{rest}\n" for name, rest in {**before, **overrides}.items())
     put(folder / "manifest.txt", "".join(lines))
+
+
+def may_continue(folder: Path, old: str, new: str) -> bool:
+    """Whether two inputs differ only in variables that may change when a run is continued."""
+    program = find_program()
+    table = json.loads(subprocess.check_output([program, "--print-variables"]))
+    kept = []
+    for text in (old, new):
+        with tempfile.NamedTemporaryFile("w", suffix=".nml", dir=folder) as file:
+            file.write(text)
+            file.flush()
+            printed = subprocess.run(
+                [program, "--print-input", file.name], capture_output=True, check=False
+            )
+        if printed.returncode:
+            return False
+        groups = [
+            (group["group"], group["name"], name, value)
+            for group in json.loads(printed.stdout)
+            for name, value in group["values"].items()
+            if not table[group["group"]][name]["resumable"]
+        ]
+        kept.append(sorted(groups, key=str))
+    return kept[0] == kept[1]
 
 
 def put(path: Path, text: str) -> None:
@@ -243,9 +274,13 @@ def put(path: Path, text: str) -> None:
 
 
 def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
-    """Return the paths of the finished and the unfinished file of a member, or None."""
+    """Return the paths of the finished and the unfinished file of a member run, None if absent.
+
+    A finished run that is being extended has both files, and counts as unfinished.
+    """
     whole, part = folder / f"{name}.h5", folder / f"{name}.h5.part"
-    return whole if whole.is_file() else None, part if part.is_file() else None
+    unfinished = part if part.is_file() else None
+    return whole if whole.is_file() and not unfinished else None, unfinished
 
 
 def log_of(path: Path) -> TextIO:
@@ -273,7 +308,7 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
         except BlockingIOError:
             return 0
         finished, unfinished = files_of(folder, name)
-        if finished:
+        if finished and not is_older(finished, folder / "input.nml"):
             return 0
         if before := last_words(folder, name):
             print(file=log, flush=True)  # separates the log from that of an earlier attempt
@@ -282,7 +317,11 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
         command = [find_program(), folder / "input.nml", *output]
         environment = {**os.environ, "OMP_NUM_THREADS": "1"}
         pipes = {"stdin": subprocess.DEVNULL, "stdout": log, "stderr": log, "env": environment}
-        code = finished_with([*command, *["--resume"] * bool(unfinished)], mark, **pipes)
+        resume = ["--resume"] * bool(finished or unfinished)
+        code = finished_with([*command, *resume], mark, **pipes)
+        if finished and FINISHED in last_words(folder, name):
+            finished.touch()  # the new input does not ask for more than it has
+            return 0
         if unfinished and BROKE_OFF in last_words(folder, name):
             code = finished_with(command, mark, **pipes)  # the member starts from the beginning
         if code < 0:
@@ -293,6 +332,11 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
             kill = f"{given_up}killed by signal {-code}{memory}{again}, {moment}"
             print(f"{kill} on {os.uname().nodename}", file=log)
         return code
+
+
+def is_older(path: Path, other: Path) -> bool:
+    """Whether a file was written before another one."""
+    return path.stat().st_mtime_ns < other.stat().st_mtime_ns
 
 
 def is_there(pid: int) -> bool:
