@@ -13,11 +13,12 @@ usage:  $me INPUT.nml -d FOLDER [option]...
 
 members:
   --seeds LIST           run.seed of each member: 1-8 or 1,5,9 or 1-4,11
-  --scan VARIABLE=A,B,C  values of a variable; repeated: every combination.  Vectors contain commas,
-                         so separate them by semicolons: --scan 'species.ball.velocity=0,-1;0,-2'
-                         One element: --scan 'box.gravity(2)=-5,-10'
+  --scan VARIABLE=A,B,C  values of a variable; several options combine all their values.  Vectors
+                         contain commas and are therefore separated by semicolons:
+                         --scan 'species.ball.velocity=0,-1;0,-2'
+                         An element of a vector: --scan 'box.gravity(2)=-5,-10'
   --set VARIABLE=VALUE   value of a variable in all members; may be repeated
-  --manifest FILE        instead of --seeds and --scan: one member per line,
+  --manifest FILE        list of members, instead of --seeds and --scan; one member per line:
                              NAME <TAB or blank> --set VARIABLE=VALUE --set VARIABLE=VALUE ...
                          (a NAME with blanks needs the TAB; lines that begin with # are left out)
 running:
@@ -34,14 +35,15 @@ running:
   --share K/M            run only the K-th of M parts of the list (used by the engines)
   -h, --help
 
-Member NAME writes FOLDER/NAME.h5 and FOLDER/NAME.log.  The same command again continues: a member
-with NAME.h5 is finished and left out, one with NAME.h5.part resumes, a member that failed
-or was interrupted without data starts again (with Slurm only with --retry).  TERM or Ctrl-C stops all members after a checkpoint.  Copies of the command on one folder
-share the work.  The program is what RICOCHET names, or ricochet beside this command (in a clone
-build/ricochet).  All machines need the same folders.
+Member NAME writes FOLDER/NAME.h5 and FOLDER/NAME.log.  The same command again continues: a finished
+member (with NAME.h5) is left out, a member with NAME.h5.part resumes, and a member that failed or
+was interrupted without data starts again (with Slurm only with --retry).  TERM or Ctrl-C stops all
+members after a checkpoint.  Copies of the command on one folder share the work.  The program is
+that of RICOCHET, or ricochet in the folder of this command (in a clone build/ricochet).  All
+machines need the same folders.
 
-exit:   0 all finished; 1 some failed; 2 wrong usage; 3 the folder cannot be used; 75 stopped, the
-        same command continues
+exit:   0 all members finished; 1 some members failed; 2 wrong usage; 3 the folder cannot be used;
+        75 stopped, the same command continues
 TEXT
 }
 
