@@ -1,4 +1,4 @@
-"""Changes of a running simulation: it continues as one that is read from a file at that moment.
+"""Changes of a running simulation, which continues like one that is loaded from a file.
 
 Each random system is advanced, and changed at random moments: gravity, the laws and motions of all
 boundaries, the driving, the contacts and the velocities.  The first course also tries changes that
@@ -47,7 +47,7 @@ CONTACT += ("reference_speed", "wall_rule", "tangential_restitution", "friction"
 CONTACT += ("wall_tangential_restitution", "wall_friction")
 SAMPLED = ("total_energy", "dissipated_energy", "heat", "work", "drive_energy")
 SAMPLED += ("all/kinetic_energy",)
-#: Features whose course depends on more than the state of the disks at one moment.
+#: Features for which the trajectory depends on more than the present state of the disks.
 MEMORY = r"&drive|contact_time|temperature =|motion =|shear_rate|'steps'|pair_restitution"
 
 
@@ -58,7 +58,7 @@ class Change(NamedTuple):
     velocity: np.ndarray | None = None
 
     def apply(self, simulation: Simulation) -> None:
-        """Make the change, now."""
+        """Apply the change to a simulation at its present time."""
         if self.velocity is None:
             simulation._change(self.settings)
         else:
@@ -72,7 +72,7 @@ def settings(group: str, words: str, reset: tuple[str, ...] = ()) -> list[str]:
 
 
 def drawn_change(simulation: Simulation, draw: Draw) -> Change:
-    """A change that fits the system as it was at the start; it may be refused."""
+    """Return a random change that is valid for the initial system; the program may refuse it."""
     rng = draw.rng
     walls = {name.rpartition(".")[0] for name in simulation._values()}
     walls = sorted(wall for wall in walls if wall.startswith(("obstacle.", "wall.")))
@@ -104,7 +104,7 @@ def drawn_change(simulation: Simulation, draw: Draw) -> Change:
 
 
 def drawn_velocity(simulation: Simulation, draw: Draw) -> np.ndarray:
-    """Velocities that have to do with those of now, or not."""
+    """Return velocities that are related to the present ones, or independent of them."""
     rng, velocity = draw.rng, simulation.velocity
     if draw.chance(0.25):
         return velocity[::-1].copy()
@@ -116,10 +116,10 @@ def drawn_velocity(simulation: Simulation, draw: Draw) -> np.ndarray:
 
 
 class Course:
-    """A random system in memory, and what happened when, for those that repeat it."""
+    """A random system in memory with a record of its changes, by which it can be repeated."""
 
     def __init__(self, program: Path, seed: str):
-        """Writes its input into this folder."""
+        """Write the input of the system into a folder."""
         self.program, self.rng = program, random.Random(seed)
         system = accepted(program, Path(), self.rng, most=MOST_DISKS)
         self.draw, self.steps = system.draw, "'steps'" in system.text
@@ -134,7 +134,7 @@ class Course:
         self.found: dict = {}  #: all that files of it have said
 
     def next_moment(self, simulation: Simulation) -> dict:
-        """After some events, or some time, as fast as the disks are now."""
+        """Return the next moment: a number of events, or a time suited to the present speeds."""
         rng, draw = self.rng, self.draw
         speed = simulation.observable("all/mean_speed") or draw.speed
         if draw.sheared:
@@ -148,14 +148,14 @@ class Course:
         return {"time": simulation.time + time, "events": events}
 
     def advance(self, simulation: Simulation) -> None:
-        """To the next moment."""
+        """Advance the simulation to the next moment."""
         moment = self.next_moment(simulation)
         self.moments.append((moment, simulation.time))
         simulation.advance(**moment)
         self.moments[-1] = moment, simulation.time
 
     def run(self) -> Simulation:
-        """The first course of events, which the others repeat."""
+        """Perform the first run, which the other runs repeat."""
         simulation = Simulation("case.nml")
         self.look(simulation)
         try:
@@ -176,7 +176,7 @@ class Course:
         return simulation
 
     def attempt(self, simulation: Simulation, change: Change) -> None:
-        """A change that may be refused; before or after it one in which no value differs."""
+        """Attempt a change that may be refused, beside a change to equal values."""
         if self.rng.random() < 0.3:
             self.change_nothing(simulation)
         before = facts(simulation)
@@ -191,7 +191,7 @@ class Course:
             self.change_nothing(simulation)
 
     def change_nothing(self, simulation: Simulation) -> None:
-        """A change in which no value differs."""
+        """Apply a change in which all values remain the same."""
         before, known = facts(simulation), (simulation.changes, simulation.input)
         if self.rng.random() < 0.3:
             simulation.velocity = simulation.velocity
@@ -205,7 +205,7 @@ class Course:
             self.faults.append(f"a change of nothing: {unlike(before, facts(simulation))}")
 
     def look(self, simulation: Simulation) -> None:
-        """Take samples of the energies, and find the deepest overlap."""
+        """Sample the energies, and determine the largest overlap."""
         observed = simulation._observed()
         for name, values in self.samples.items():
             values.append(float(observed[name][0]) if name in observed else 0.0)
@@ -225,7 +225,7 @@ class Course:
                 self.faults.append(f"overlap {deepest:g} times what is allowed at {time}")
 
     def judge_energy(self) -> None:
-        """The balance of energy over the whole course."""
+        """Check the energy balance of the whole run."""
         found = {name: value for name, value in self.found.items() if "/observables" not in name}
         for name, values in self.samples.items():
             found[f"/observables/{name}/value"] = np.array(values)
@@ -233,7 +233,7 @@ class Course:
             self.faults.append(f"energy: {part:g} times what is allowed")
 
     def repeat(self, name: str) -> Simulation:
-        """In other slices and in another way, saved and loaded."""
+        """Repeat the run with other steps and another method, saved and loaded."""
         rng, simulation = self.rng, Simulation("case.nml", *self.way())
         for k in range(len(self.moments) + 1):
             if k > 0:
@@ -251,7 +251,7 @@ class Course:
         return simulation
 
     def way(self) -> tuple[dict[str, str], int]:
-        """Variables and a number of threads that change no bit."""
+        """Return variables and a number of threads that do not change the results."""
         searches = ["cells", "pairs", *["rescan"] * (self.draw.disks <= 60)]
         ways = {"run.search": self.rng.choice(searches)}
         if not self.steps:
@@ -259,7 +259,7 @@ class Course:
         return ways, self.rng.choice([1, 1, 2, 3])
 
     def continue_by_program(self, simulation: Simulation) -> None:
-        """The program continues a file as the simulation itself does, and ends where it ends."""
+        """Check that the program continues a file as the simulation does, to the same end."""
         simulation.save("last.h5", force=True, input="last.nml")
         moment = self.next_moment(simulation)
         stop = [f"--set=stop.{name}={value!r}" for name, value in moment.items()]
@@ -283,7 +283,7 @@ class Course:
             self.faults.append(f"the program differs: {different}, times {where}")
 
     def start_from_last_frame(self, simulation: Simulation) -> None:
-        """A new run of the last frame has the same first collisions, where nothing has memory."""
+        """Check that a run from the last frame has the same first collisions."""
         text, slowest = simulation.input, np.abs(simulation.velocity)
         if re.search(MEMORY, text) or np.any((slowest > 0) & (slowest < 1e-100)):
             return
@@ -311,32 +311,32 @@ class Course:
 
 
 def kept(simulation: Simulation, name: str) -> Simulation:
-    """Saved and loaded."""
+    """Return the simulation after saving and loading."""
     simulation.save(f"{name}.h5", force=True)
     simulation.close()
     return Simulation.load(f"{name}.h5")
 
 
 def facts(simulation: Simulation) -> dict[str, np.ndarray]:
-    """All that can be asked of a state."""
+    """Return all properties of the state of a simulation."""
     names = ("time", "events", "collisions", "position", "velocity", "image", "orientation")
     there = {name: getattr(simulation, name, None) for name in names}
     return simulation._observed() | {n: np.array(v) for n, v in there.items() if v is not None}
 
 
 def unlike(one: dict, other: dict) -> list[str]:
-    """Names of what differs by a bit."""
+    """Return the names of the properties that are not bit-identical."""
     same = {name for name in one if name in other and one[name].tobytes() == other[name].tobytes()}
     return sorted((one.keys() | other.keys()) - same)
 
 
 def without_ways(text: str) -> str:
-    """An input without what changes no bit."""
+    """Return an input without the variables that do not change the results."""
     return re.sub(r"  (search|queue) = .*\n", "", text)
 
 
 def faults(program: Path, seed: str) -> list[str]:
-    """Faults of the changes of a random system."""
+    """Return the faults found for the changes of a random system."""
     course = Course(program, seed)
     first = course.run()
     for name in ("again", "other"):
@@ -367,7 +367,7 @@ def test_a_changed_simulation_continues_exactly(program, tmp_path, monkeypatch, 
 
 
 def test_a_change_suppresses_no_collision():
-    """Two disks that met last meet again through the sides, the clocks of both at the change."""
+    """Two disks collide again through the sides; the local times of both are that of the change."""
     gas = Simulation(
         """&box boundary = 'periodic', 'periodic' /
         &species name = 'a' radius = 0.1 position = 0.3, 0.5, 0.7, 0.5 velocity = 1, 0, 0, 0 /"""
@@ -380,7 +380,7 @@ def test_a_change_suppresses_no_collision():
 
 @pytest.mark.parametrize("pull", [-1e35, -1e50, -1e90])
 def test_extreme_accelerations_leave_the_caller_in_control(pull):
-    """`advance` returns when its patience is over."""
+    """`advance` returns after a limited time."""
     script = f"""
 from ricochet import Simulation
 disks = {{"count": 50, "packing_fraction": 0.1, "speed": 1}}
@@ -393,7 +393,7 @@ assert gas._go_on((1.0, 2**62, 2**62), 0.05) and gas.events > events"""
 
 @pytest.mark.parametrize("factor", [1e-3, 1e-9, 1e-11])
 def test_a_gas_that_was_slow_for_long_is_exact_when_it_is_fast_again(factor):
-    """Times count from the change: overlaps are rounding of the fast gas."""
+    """Times are relative to the change, so that overlaps are rounding errors of the fast gas."""
     disks = {"count": 50, "packing_fraction": 0.2, "speed": 1}
     gas = Simulation({"species": disks}).advance(time=0.5)
     gas.velocity = factor * gas.velocity
@@ -419,7 +419,7 @@ def test_a_gas_that_was_slow_for_long_is_exact_when_it_is_fast_again(factor):
 def test_a_cold_gas_ends_at_the_same_time_in_memory_and_by_the_program(
     program, tmp_path, monkeypatch, act, reached
 ):
-    """It cools by 1e-25 soon; after a change this counts from the velocities of the change."""
+    """The gas soon cools by 1e-25; after a change this is relative to the changed velocities."""
     monkeypatch.chdir(tmp_path)
     text = "&box upper = 1, 1 boundary = 'periodic', 'periodic' /\n&contact restitution = 0.1 /\n"
     text += "&species name = 'a' radius = 0.1 position = 0.3, 0.5, 0.7, 0.5"
@@ -434,7 +434,7 @@ def test_a_cold_gas_ends_at_the_same_time_in_memory_and_by_the_program(
 
 
 def test_a_piston_without_force_does_work():
-    """Disks push it; it pushes back others."""
+    """Disks push the piston, which pushes other disks."""
     disks = {"name": "a", "count": 30, "packing_fraction": 0.1, "speed": 1}
     piston = {"name": "right", "motion": "piston", "mass": 10, "force": 0}
     gas = Simulation({"species": disks, "side": piston}).advance(events=300)
@@ -443,7 +443,7 @@ def test_a_piston_without_force_does_work():
 
 
 def test_a_held_piston_is_released_where_it_is_and_held_there():
-    """At any time; the saved input has its position."""
+    """This is possible at any time; the saved input contains the position."""
     disks = {"name": "a", "count": 30, "packing_fraction": 0.1, "speed": 1}
     gas = Simulation({"species": disks}).advance(time=0.5)
     gas.change({"side.right.motion": "piston", "side.right.mass": 20, "side.right.force": 25})
@@ -458,7 +458,7 @@ def test_a_held_piston_is_released_where_it_is_and_held_there():
 
 
 def test_a_changed_simulation_whose_start_would_not_fit_is_saved(program, tmp_path, monkeypatch):
-    """A disk of the start lies where the side is held now."""
+    """An initial disk overlaps the position at which the side is now held."""
     monkeypatch.chdir(tmp_path)
     disks = {"name": "a", "radius": 0.05, "position": [0.3, 0.5, 0.94, 0.5], "speed": 1}
     side = {"name": "right", "motion": "constant_velocity", "velocity": 0.5, "end_time": 1}

@@ -1,4 +1,4 @@
-"""Sheared boxes, kicks, sides that move, and walls with laws: what no random system shows.
+"""Sheared boxes, driving, moving sides and walls with collision rules, in special cases.
 
 Bits, balances, momentum and gaps are asserted of all systems (test_random_systems.py), what baths,
 noise, swimming disks, viscosity and bouncing come to in the validation.
@@ -48,7 +48,7 @@ SHEARED = """&run seed = 3 /
 
 
 def test_a_pair_meets_across_the_seam_as_inside(run_of):
-    """By Galileo: the disk beyond the top is seen with the velocity of the image."""
+    """By Galilean invariance, the disk beyond the top has the velocity of its image."""
     slip, lift = 0.3 * 10, np.array([0, 4.5])
     place = np.array([[3, 5], [4.2, 5.9]])
     velocity = np.array([[0.5, 0.3], [-0.6, -0.4]])
@@ -78,7 +78,7 @@ def test_a_pair_meets_across_the_seam_as_inside(run_of):
 
 
 def test_a_free_disk_goes_straight_on(run_of):
-    """Unwrapped, whatever it passes, and however often."""
+    """Its unwrapped path is straight across all sides."""
     run = run_of(
         """&box lower = -1, 2 upper = 2, 4 boundary = 'periodic', 'periodic' shear_rate = -0.4 /
         &species name = 'a' radius = 0.1 position = 0.5, 2.5 velocity = 0.3, 1.7 /
@@ -127,7 +127,7 @@ def test_kicks_are_relative_to_the_profile(run_of):
 
 # --- kicks ---
 
-#: One disk that meets nothing.
+#: One disk without collisions.
 ONE = """&box boundary = 'periodic', 'periodic' upper = 50, 50 /
 &species count = 1 radius = 0.1 mass = 2 temperature = 0.6 /
 &output frames_every_time = {} /
@@ -145,7 +145,7 @@ ONE = """&box boundary = 'periodic', 'periodic' upper = 50, 50 /
 def test_kicks_are_at_multiples_of_the_interval_and_no_events(
     observed, every, interval, end, steps, kicked
 ):
-    """The velocity changes at each kick, and only there; in time steps at the end of its step."""
+    """The velocity changes only at kicks; with time steps, at the end of the step."""
     drive = f"&drive kind = 'brownian' interval = {interval} temperature = 1 / &stop time = {end} /"
     found = observed(ONE.format(every) + drive + steps)
     velocity = found["/particles/disks/velocity/value"][:, 0]
@@ -155,7 +155,7 @@ def test_kicks_are_at_multiples_of_the_interval_and_no_events(
 
 
 def test_energy_balances_where_kinetic_and_potential_energy_cancel(observed):
-    """The sum over many disks is far smaller than its terms, and as exact as if it were not."""
+    """The sum over many disks is much smaller than its terms, but equally exact."""
     found = observed(
         """&box lower = -0.5, 9.5 upper = 0.5, 10.5 gravity = 0, 0.1 /
         &species count = 5000 packing_fraction = 0.1 temperature = 1 /
@@ -169,7 +169,7 @@ def test_energy_balances_where_kinetic_and_potential_energy_cancel(observed):
 
 
 def test_what_was_met_last_is_met_again_after_a_kick(observed):
-    """Two disks side by side are kicked together again and again: no hit is taken for the last."""
+    """Two adjacent disks are repeatedly kicked together; no collision is left out."""
     found = observed(
         "&species count = 2 radius = 0.1 position = 0.1, 0.5, 0.3, 0.5 /"
         "&box upper = 0.400001, 1 / &contact restitution = 0.99 contact_time = 1e-12 /"
@@ -180,7 +180,7 @@ def test_what_was_met_last_is_met_again_after_a_kick(observed):
 
 
 def test_the_kicks_of_a_disk_are_its_own(observed):
-    """They do not depend on who else there is, nor on where a disk is in memory."""
+    """Kicks do not depend on other disks, nor on the position of a disk in memory."""
     drive = "&drive kind = 'brownian' interval = 0.1 temperature = 1e-4 / &stop time = 1 /"
     disk = "&species count = 1 radius = 0.01 position = 0.9, 0.9 /"
     others = "&species grid = 20, 20 radius = 0.01 region = 0, 0.8, 0, 0.8 /"
@@ -192,7 +192,7 @@ def test_the_kicks_of_a_disk_are_its_own(observed):
 
 
 def test_a_gas_at_rest_waits_for_its_kick(performed):
-    """Nothing can happen before it, and no rule names a time."""
+    """No event can occur before the kick, and no stop rule contains a time."""
     drive = "&drive kind = 'noise' interval = 7 strength = 1 / &stop collisions = 1000 /"
     _, said = performed("&species count = 100 radius = 0.01 /" + drive)
     assert "note" not in said and "kicks = 1\n" in said and "collisions = 1000\n" in said
@@ -219,7 +219,7 @@ BOUNCE = """&box gravity = 0, -1 upper = 1, 1000 /
 
 
 def test_a_disk_between_two_walls_knows_them_apart(observed):
-    """It leaves the left wall with half its speed, the right one with all."""
+    """The disk leaves the left wall with half its speed and the right wall with its full speed."""
     found = observed(
         """&side name = 'left' restitution = 0.5 / &species count = 1 radius = 0.1
         position = 0.5, 0.5 velocity = 1, 0 / &stop time = 6 / &output frames_every_events = 1 /"""
@@ -238,7 +238,7 @@ def test_a_disk_between_two_walls_knows_them_apart(observed):
     ],
 )
 def test_disks_grow_between_walls_whatever_their_law(observed, law):
-    """The places of `dense` disks are those between elastic walls."""
+    """The positions of `dense` disks are those between elastic walls."""
     places = [
         observed(
             f"&obstacle centre = 0.5, 0.5 radius = 0.2 {words} /"
@@ -253,7 +253,7 @@ def test_disks_grow_between_walls_whatever_their_law(observed, law):
 
 @pytest.mark.parametrize("dynamics", ["events", "steps"])
 def test_a_side_shakes_a_bed_at_rest(observed, dynamics):
-    """Nothing moves at the start, and there is no gravity: the first event comes from the side."""
+    """Nothing moves at the start, without gravity; the first event is caused by the side."""
     found = observed(
         """&side name = 'bottom' motion = 'sine' amplitude = 0.05 period = 1 /
         &run dt = 1e-3 / &species count = 300 radius = 0.02 / &stop time = 3 /""".replace(
@@ -265,7 +265,7 @@ def test_a_side_shakes_a_bed_at_rest(observed, dynamics):
 
 
 def test_a_side_that_crushes_disks_ends_the_run(ricochet, tmp_path):
-    """Between the packing at which they jam and 1, which is refused at once."""
+    """The packing fraction is between jamming and 1; a value of 1 is refused at once."""
     write_input(
         tmp_path,
         """&side name = 'right' motion = 'constant_velocity' velocity = 0.5 end_time = 1 /
@@ -277,7 +277,7 @@ def test_a_side_that_crushes_disks_ends_the_run(ricochet, tmp_path):
 
 
 def test_a_stroke_goes_from_begin_to_end_and_stays(observed):
-    """A disk hits it before the stroke, and in flight; the side takes all its speed, and leaves."""
+    """A disk hits the side before and during the stroke; the side stops the disk and moves away."""
     found = observed(
         """&side name = 'right' motion = 'constant_velocity' velocity = -0.5
         start_time = 1 end_time = 4 /
@@ -292,7 +292,7 @@ def test_a_stroke_goes_from_begin_to_end_and_stays(observed):
 
 @pytest.mark.parametrize("placement", ["random", "dense", "grid"])
 def test_sides_start_where_their_position_is(observed, placement):
-    """A still one stays there, others begin there; disks start between them, and stay there."""
+    """Fixed sides stay, moving sides begin there; disks start between them and remain between."""
     grid = " grid = 15, 6 region = 0.2, 1.5, -0.3, 0.8" * (placement == "grid")
     found = observed(
         f"""&box upper = 2, 1 / &side name = 'right' position = 1.5 /
@@ -322,7 +322,7 @@ def test_sides_start_where_their_position_is(observed, placement):
 
 
 def test_disks_meet_wherever_a_side_that_they_push_goes(observed):
-    """Far beyond the box, big ones among small ones, too; a side with a stroke may follow."""
+    """This includes positions far beyond the box, unequal disks, and two moving sides."""
     cells, pairs = (
         observed(
             f"""&run search = '{search}' /
@@ -337,7 +337,7 @@ def test_disks_meet_wherever_a_side_that_they_push_goes(observed):
 
 
 def test_a_side_that_disks_push_keeps_momentum_and_energy(observed):
-    """Its own, that of the force, and what is lost, added to those of the disks."""
+    """The balance includes the piston, the force, the disks and the losses."""
     found = observed(
         """&box upper = 2, 1 / &side name = 'right' motion = 'piston' mass = 20 force = 300 /
         &species count = 200 packing_fraction = 0.2 temperature = 1 / &stop time = 4 /
@@ -361,7 +361,7 @@ def test_a_side_that_disks_push_keeps_momentum_and_energy(observed):
 
 
 def test_time_steps_come_close_to_events(observed):
-    """The moments of some bounces of a disk on a floor that moves, at a fine step."""
+    """The times of several bounces of a disk on a moving floor are compared at a small step."""
     times = [
         observed(BOUNCE, *options)["/particles/disks/velocity/time"][1:6]
         for options in ([], ["run.dynamics=steps", "run.dt=1e-5"])
@@ -377,7 +377,7 @@ RAMP = "&wall from = 0, 0.3 to = 1, 0.1 /"
 @pytest.mark.parametrize("on", [SHAKEN.format("sine"), SHAKEN.format("parabolic"), BOWL, RAMP])
 @pytest.mark.parametrize("lossy", [0, 0.5])
 def test_disks_rest_on_what_has_restitution_0(observed, on, lossy):
-    """They are parted so gently and so seldom that the run goes on, and never sink in."""
+    """They separate so slowly and rarely that the run continues, and they never overlap."""
     found = observed(
         f"""{on} &box gravity = 0, -1 / &contact contact_time = 1e-3
         restitution = {lossy} wall_restitution = 0 wall_rule = 'normal' / &stop time = 3 /

@@ -1,4 +1,4 @@
-"""runs/ensemble.sh with a stand-in for the program: what is run, skipped, resumed and reported.
+"""runs/ensemble.sh with a substitute for the program: runs, skips, resumes and reports.
 
 With the program itself: neither faults nor the order of the work show in the results.
 """
@@ -52,7 +52,7 @@ echo data >"$out.h5"
 
 @pytest.fixture
 def lab(tmp_path):
-    """A folder with the stand-in and an input file, with a blank in its name."""
+    """Return a folder with the substitute and an input file with a blank in its name."""
     folder = tmp_path / "a lab"
     folder.mkdir()
     executable(folder / "program", PROGRAM, "bash")
@@ -92,7 +92,7 @@ def test_a_tool_that_is_missing_is_told(lab, tool, engine, said):
 
 
 def started(lab, *options, members):
-    """An ensemble of which so many members run; they go on when the file `hold` is gone."""
+    """Start a sweep in which members wait until the file `hold` is removed."""
     before = len(starts(lab))
     (lab / "hold").touch()
     process = subprocess.Popen(
@@ -107,13 +107,13 @@ def started(lab, *options, members):
 
 
 def workers_of(launcher) -> list[int]:
-    """Process ids."""
+    """Return the process ids of workers."""
     pid = launcher.pid
     return list(map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split()))
 
 
 def waits(launcher) -> bool:
-    """Whether a launcher and its workers have nothing to do."""
+    """Return whether a launcher and its workers are idle."""
     return all(map(is_asleep, [launcher.pid, *workers_of(launcher)]))
 
 
@@ -125,7 +125,7 @@ def starts(lab):
 
 
 def test_members_are_seeds_times_values(lab):
-    """Values that are vectors are separated by semicolons."""
+    """Vector values are separated by semicolons."""
     scan = ["--scan", "species.ball.velocity=0,-1;0,-2", "--set", "contact.restitution=0.5"]
     result = ensemble(lab, "--seeds", "1-2,5", *scan)
     assert result.returncode == 0
@@ -148,7 +148,7 @@ def test_members_take_a_core_each_whatever_the_cluster_says(lab, monkeypatch):
 
 
 def test_names_and_values_may_be_anything(lab):
-    """Also when the folder's own list is taken as the manifest of another ensemble."""
+    """This includes using the list in the folder as the manifest of another sweep."""
     names = ["*", "@", "$HOME", "a;b", "[x]", "'", '"', "!", "~", "a&b"]
     names += ["%s", "\\n", "ü", "one two"]
     rest = "--set run.title=a b --set species.ball.velocity=0,-1"
@@ -175,7 +175,7 @@ def test_finished_members_are_skipped_and_checkpoints_resumed(lab):
 
 @pytest.mark.parametrize("jobs", ["1", "3"])
 def test_one_failure_does_not_stop_the_others(lab, jobs):
-    """It is tried once, not by every worker; what stopped has neither failed nor finished."""
+    """The member is tried once, not by every worker; a stopped member has not failed."""
     manifest = lab / "members.txt"
     manifest.write_text("a\nb\t--set outcome.exit=4\nc\nd\t--set outcome.exit=75\n")
     result = ensemble(lab, "--manifest", str(manifest), "-j", jobs)
@@ -254,7 +254,7 @@ def lines_of(path) -> list[str]:
 
 
 def test_slurm_gives_up_what_failed_and_says_who_when_and_where(lab, slurm):
-    """A member that was killed goes on, one that failed does only with --retry, or mended."""
+    """A killed member continues, a failed one only with --retry or a corrected input."""
     manifest = lab / "members.txt"
     manifest.write_text("a\nb\t--set outcome.exit=4\nc\t--set outcome.exit=9\n")
     members = ("--manifest", str(manifest))
@@ -318,7 +318,7 @@ RANDOM_MOMENTS = [str(random.Random(1).randrange(10, 500)) for _ in range(200)]
     ],
 )
 def test_a_signal_at_any_command_leaves_nothing_behind(lab, moment):
-    """To the launcher; also to a worker just when it starts a member."""
+    """The signal is sent to the launcher, and to a worker while it starts a member."""
     assert moment.isdigit() or moment in SCRIPT.read_text()
     (lab / "hold").touch()
     (lab / "at_a_command").write_text(AT_A_COMMAND)
@@ -331,7 +331,7 @@ def test_a_signal_at_any_command_leaves_nothing_behind(lab, moment):
 
 
 def processes_of(folder) -> dict[int, list[str]]:
-    """The commands of processes that name a folder."""
+    """Return the commands of processes that contain the name of a folder."""
     found = {}
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         with contextlib.suppress(OSError):  # gone
@@ -423,7 +423,7 @@ def test_what_cannot_name_a_member_is_one_line(lab, name):
 @pytest.mark.parametrize("how", ["link", "link to nothing", "hard link", "pipe", "folder", "file"])
 @pytest.mark.parametrize("name", ["seed_2.log", "input.nml", "manifest.txt"])
 def test_only_files_of_its_own_are_written(lab, name, how):
-    """Whatever stands in their place is named in one line, before any member runs."""
+    """Other files in their place are reported in one line before any member runs."""
     (lab / "out").mkdir()
     precious = lab / "precious"
     precious.write_text("precious")
@@ -489,7 +489,7 @@ def test_dry_run_starts_nothing(lab):
 
 
 def test_dry_run_checks_the_first_member(program, tmp_path):
-    """A wrong input is refused before anything runs; one element of a vector can be scanned."""
+    """An invalid input is refused before any run; an element of a vector can be scanned."""
     input_file = write_input(tmp_path, MIXTURE)
 
     def dry(scan):
@@ -507,7 +507,7 @@ def test_dry_run_checks_the_first_member(program, tmp_path):
 
 @pytest.fixture
 def real(program, tmp_path):
-    """`real(folder, *options)` starts an ensemble of the program itself, six members by default."""
+    """Return a function that starts a sweep of the real program with six members by default."""
     text = MIXTURE.replace("event_log", "checkpoint_every = 0.05 event_log")
     input_file = write_input(tmp_path, text.replace("time = 4", "time = 20"))
 
@@ -524,18 +524,18 @@ def real(program, tmp_path):
 
 
 def finish(process) -> int:
-    """The exit code of an ensemble, when it has come to its end."""
+    """Wait for the end of a sweep and return its exit code."""
     process.communicate(timeout=PATIENCE)
     return process.returncode
 
 
 def members_in(folder) -> list[int]:
-    """Process ids of the programs that write into a folder."""
+    """Return the process ids of the programs that write into a folder."""
     return [pid for pid, words in processes_of(f"{folder}/").items() if "-o" in words]
 
 
 def disturb(process, folder, rng):
-    """TERM or KILL, for the launcher or a member."""
+    """Send TERM or KILL to the launcher or a member."""
     how = rng.choice([signal.SIGTERM, signal.SIGKILL])
     members = members_in(folder)
     victim = rng.choice(members) if members and rng.random() < 0.5 else process.pid
@@ -546,14 +546,14 @@ def disturb(process, folder, rng):
 
 
 def differences_of(one, other) -> list[str]:
-    """Differences between the six members of two ensembles."""
+    """Return the differences between the six members of two sweeps."""
     names = [f"seed_{k}.h5" for k in range(1, 7)]
     return [f"{name}: {what}" for name in names for what in differences(one / name, other / name)]
 
 
 @pytest.mark.parametrize("times", [5, pytest.param(20, marks=pytest.mark.check)])
 def test_a_disturbed_ensemble_equals_an_undisturbed_one(real, tmp_path, times):
-    """TERM and KILL to launcher and members at random moments, and the command given again."""
+    """TERM and KILL are sent at random times, and the command is repeated."""
     begin = time.monotonic()
     assert finish(real("calm", "-j", "2")) == 0
     duration = time.monotonic() - begin

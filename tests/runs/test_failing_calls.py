@@ -1,4 +1,4 @@
-"""Each system call of a run fails, or is met by a signal or a kill: one line, nothing is lost."""
+"""Each system call of a run fails or is interrupted: the run prints one line and loses no data."""
 
 import os
 import re
@@ -42,7 +42,7 @@ WAYS = {
 
 @pytest.fixture(scope="module")
 def stage(program, tmp_path_factory):
-    """A folder with what must come of the run, folders to copy for each option, and their traces.
+    """Return a folder with the expected result, folders to copy for each option, and traces.
 
     Each is named after the options of the run.
     """
@@ -72,24 +72,24 @@ def stage(program, tmp_path_factory):
 
 
 def copy_folder(source, target):
-    """Unlike Python's own functions `cp` leaves the holes of a file what they are."""
+    """Copy a folder with `cp`, which preserves holes of files in contrast to Python's functions."""
     subprocess.run(["cp", "-a", source, target], check=True)
 
 
 def started(*command, folder):
-    """The run, in a folder; killed with all that it has started if it hangs."""
+    """Start the run in a folder; if it hangs, kill it with all its child processes."""
     return ran("timeout", "-s", "KILL", PATIENCE, *command, cwd=folder, timeout=None)
 
 
 def traced(program, folder, option, *what):
-    """The run under strace, which writes to the file `trace`."""
+    """Start the run under strace, which writes to the file `trace`."""
     fast = [] if ":signal=" in "".join(what) else ["--seccomp-bpf"]  # with it strace 6.1 sends none
     strace = ["strace", *fast, "-f", "-y", "-o", "trace", *what]
     return started(*strace, program, *COMMAND, *option.split(), folder=folder)
 
 
 def positions(stage, option, call, first="gas.nml") -> range:
-    """The numbers of the calls of one kind, from the first line on that mentions something."""
+    """Return the numbers of the calls of one kind after the first line that contains a text."""
     lines = (stage / f"trace{option}").read_text().splitlines()
     begin = next(k for k, line in enumerate(lines) if first in line)
     calls = [k for k, line in enumerate(lines) if re.match(rf"\d+ +{call}\(", line)]
@@ -97,14 +97,14 @@ def positions(stage, option, call, first="gas.nml") -> range:
 
 
 def chosen(stage, option, call, step) -> list[int]:
-    """Some calls, and those of the last moments, when HDF5 cuts the file and it gets its name."""
+    """Return random calls and the last ones, when HDF5 truncates the file and it is renamed."""
     numbers = positions(stage, option, call)
     last = {"pwrite64": 6, "ftruncate": 2, "rename": 2, "unlink": 2}.get(call, 1)
     return sorted({*numbers[::step], *numbers[-last:]})
 
 
 def outcome(check, program, stage, option, call, inject) -> str:
-    """Faults after a run in which a call was disturbed; empty if there are none."""
+    """Return the faults after a run with a disturbed call; empty without faults."""
     folder = stage / f"{option} {call} {inject}"
     copy_folder(stage / option, folder)
     try:
@@ -117,13 +117,13 @@ def outcome(check, program, stage, option, call, inject) -> str:
 
 
 def same_results(stage, result) -> bool:
-    """As the same bytes but for times: a hundred times faster than a comparison of all objects."""
+    """Compare bytes except times, which is a hundred times faster than comparing all objects."""
     whole = stage / "whole" / "gas.h5"
     return timeless(whole) == timeless(result) or differences(whole, result) == []
 
 
 def timeless(path) -> bytes:
-    """A file without how long the run took."""
+    """Return the content of a file without the times of the run."""
     content = path.read_bytes()
     with h5py.File(path, locking=False) as file:
         for name in ("wall_time", "collisions_per_second"):
@@ -140,16 +140,16 @@ def check_after_failure(program, stage, folder, option, call, inject):
         assert run.stderr == ""
         assert same_results(stage, result)
         return
-    if "inject=write:error=ENOSPC" not in inject:  # else there is no room for a message either
+    if "inject=write:error=ENOSPC" not in inject:  # otherwise the message would fail, too
         one_line(run)
     if call == "write" and result.exists() and same_results(stage, result):
-        return  # only its summary could not be written
+        return  # only the summary could not be written
     assert not result.exists() or result.read_bytes() == earlier, "the earlier result is gone"
     go_on(program, stage, folder, option)
 
 
 def go_on(program, stage, folder, option):
-    """The file that was left is good, and the run goes on from there, or from its start."""
+    """Check that the remaining file is valid and that the run continues or starts again."""
     part = folder / "gas.h5.part"
     if part.exists():
         found = committed(part)
@@ -164,7 +164,7 @@ def go_on(program, stage, folder, option):
 
 
 def check_after_kill(program, stage, folder, option, call, inject):
-    """The final name has an earlier result or the whole one; the other file continues."""
+    """Check that the final file is an earlier or complete result and the other file continues."""
     result = folder / "gas.h5"
     earlier = result.read_bytes() if result.exists() else None
     run = traced(program, folder, option, "-e", f"trace={call}", "-e", inject)
@@ -176,11 +176,11 @@ def check_after_kill(program, stage, folder, option, call, inject):
 
 
 def check_after_signal(program, stage, folder, option, call, inject):
-    """Stopped with a checkpoint, finished, or not begun; never something between."""
+    """Check that the run was stopped with a checkpoint, finished, or not started."""
     before = contents_of(folder)
     run = traced(program, folder, option, "-e", f"trace={call}", "-e", inject)
     trace = (folder / "trace").read_text()
-    if "--- SIGTERM" not in trace:  # what the system tells of itself takes more calls at times
+    if "--- SIGTERM" not in trace:  # reading system information needs a varying number of calls
         made = len(re.findall(rf"^\d+ +{call}\(", trace, re.MULTILINE))
         assert made < int(inject.rpartition("=")[2]), "no signal was sent"
         assert run.returncode == FINISHED
@@ -200,7 +200,7 @@ def check_after_signal(program, stage, folder, option, call, inject):
 
 
 def contents_of(folder) -> dict[str, bytes]:
-    """Files by name."""
+    """Return the contents of files by name."""
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "trace"}
 
 
@@ -214,7 +214,7 @@ MEETINGS += [(check_after_kill, call, ["signal=SIGKILL"]) for call in KILLED]
 @pytest.mark.parametrize(("check", "call", "ways"), MEETINGS)
 @pytest.mark.parametrize("step", [250, pytest.param(1, marks=pytest.mark.check)])
 def test_whatever_meets_a_call_costs_nothing(program, stage, check, call, ways, step):
-    """A failure one line; a signal stops the run, or finds it finished; a kill leaves what was."""
+    """A failure prints one line, a signal stops the run, a kill preserves the last state."""
     cases = [
         (option, f"inject={call}:{what}:when={number}{again}")
         for option in OPTIONS
@@ -233,7 +233,7 @@ def test_whatever_meets_a_call_costs_nothing(program, stage, check, call, ways, 
 @pytest.mark.parametrize("error", ["EINTR", "EAGAIN"])
 @pytest.mark.parametrize("forever", ["", "+"])
 def test_a_reluctant_standard_output_is_no_failure(program, stage, error, forever):
-    """The result is there."""
+    """The result is complete."""
     folder = stage / f"{error}{forever}"
     copy_folder(stage / "--force", folder)
     (number,) = positions(stage, "--force", "write", first="write(1<")

@@ -1,4 +1,4 @@
-"""Input files, good, bad and absurd, and the command line of the program."""
+"""Valid, invalid and absurd input files, and the command line of the program."""
 
 import itertools
 import json
@@ -22,7 +22,7 @@ OTHERS = """&obstacle name = 'pin' centre = 0.5, 0.5 radius = 0.1 /
 GOOD = """&species name = 'gas' count = 20 radius = 0.02 speed = 1 /
 &stop time = 0.1 /
 """
-#: Inputs that are refused, with their messages.
+#: Invalid inputs with their messages.
 ROWS = Path(__file__).with_name("refused.txt").read_text().splitlines()
 DISKS, STARTED = (
     "&species count = 10 radius = .01 /",
@@ -33,7 +33,7 @@ PLACE = r'f(:\d+)?: (\S+|".*"): |--set '
 
 @pytest.fixture
 def checked(ricochet, tmp_path):
-    """`checked(bytes or text, *options)` runs --check on a file named gas.nml."""
+    """Return a function that runs --check on a file gas.nml with given content."""
 
     def run(content, *options, **more):
         data = content.encode() if isinstance(content, str) else content
@@ -44,7 +44,7 @@ def checked(ricochet, tmp_path):
 
 
 def lines_of(run) -> list[str]:
-    """Lines on stderr, which must be free of traces of the run-time library."""
+    """Return the lines on stderr, which must not contain messages of the run-time library."""
     assert not re.search(r"backtrace|SIG[A-Z]{3}|libgfortran|Fortran runtime", run.stderr)
     return run.stderr.splitlines()
 
@@ -65,7 +65,7 @@ def test_the_reference_file_is_what_print_defaults_prints(ricochet):
 
 
 def groups_of(ricochet, *words) -> list[dict]:
-    """The output of --print-input."""
+    """Return the groups in the output of --print-input."""
     run = ricochet("--print-input", *words)
     assert (run.returncode, run.stderr) == (0, "")
     return json.loads(run.stdout)
@@ -93,7 +93,7 @@ LETTERS = "a1 '\"\\&/=!,()*\t\u00f6"
 
 
 def drawn(rng: random.Random, row: dict) -> object:
-    """A value that a variable may have, or a list of them."""
+    """Return a random allowed value of a variable, or a list of values."""
     if row["size"] != 1:
         few = [drawn(rng, row | {"size": 1}) for _ in range(rng.randint(1, 3))]
         return [rng.choice(few) for _ in range(row["size"] or rng.randint(2, 9))]
@@ -108,7 +108,7 @@ def drawn(rng: random.Random, row: dict) -> object:
 
 
 def spelt(rng: random.Random, value: object) -> str:
-    """One of the ways to write a value, or a list; of a list what is equal may be counted."""
+    """Return a random spelling of a value or list; equal elements may be written with a count."""
     if isinstance(value, list):
         words = []
         for one, row in itertools.groupby(value):
@@ -128,7 +128,7 @@ def spelt(rng: random.Random, value: object) -> str:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_values_in_all_their_spellings_are_printed(ricochet, tmp_path, seed):
-    """Also of an input that is refused since they do not go together."""
+    """This includes inputs whose values are refused because they are incompatible."""
     rng = random.Random(seed)
     table = json.loads(ricochet("--print-variables").stdout)
     text, written = rng.choice(["", "\ufeff"]), []
@@ -300,7 +300,7 @@ def test_what_is_no_file_is_refused_without_waiting(ricochet, tmp_path, kind):
     elif kind == "link to nothing":
         path.symlink_to(tmp_path / "nothing")
     elif kind == "secret":
-        path.touch(0)  # empty to those who may read everything
+        path.touch(0)  # for root no file is unreadable
     run = ricochet(path, "--check")
     assert run.returncode == (USAGE if kind in ("pipe", "device", "secret") else FILES)
     assert [str(path) in line for line in lines_of(run)] == [True]
@@ -349,7 +349,7 @@ def test_wrong_usage_is_one_line(ricochet, command):
 
 
 def test_the_limits_that_are_printed_are_those_that_hold(ricochet, checked):
-    """Of every variable; what is absurd but allowed is refused in other words, or valid."""
+    """For every variable, absurd but allowed values are valid or refused with another message."""
     instance = {"species": ".gas", "obstacle": ".pin", "wall": ".ramp", "side": ".top"}
     numbers = [
         (group, name, row)
@@ -379,7 +379,7 @@ def test_the_limits_that_are_printed_are_those_that_hold(ricochet, checked):
 
 
 def report(ricochet, folder, text) -> tuple[int, list[str]]:
-    """Exit code and messages of --check."""
+    """Return the exit code and the messages of --check."""
     text, *start = re.sub(r"600\*(.)", lambda found: 600 * found[1], text).split("<< ")
     text, *settings = text.replace("\\n", "\n").split("--set ")
     if start:
@@ -397,7 +397,7 @@ def report(ricochet, folder, text) -> tuple[int, list[str]]:
 
 
 def is_told(words: str, line: str) -> bool:
-    """Whether a message has the words of the table, in their order."""
+    """Return whether a message contains the words of the table in the same order."""
     return bool(re.search(".*".join(map(re.escape, words.strip().split(" ... "))), line))
 
 

@@ -1,4 +1,4 @@
-"""A kill, a signal, a full disk, a twin or a reader never harms a run."""
+"""Kills, signals, full disks, concurrent runs and readers never damage a run."""
 
 import contextlib
 import itertools
@@ -19,27 +19,27 @@ from whole_runs import committed, differences, ended_soon, filled_pipe, frames_i
 from whole_runs import held, is_asleep, is_beginning, let_work, one_line, ran, wait_for, with_fsync
 from whole_runs import write_input
 
-#: Frames as fast as they come, in a file that grows; a checkpoint now and then.
+#: Frequent frames in a growing file, with occasional checkpoints.
 BUSY = """&species name = 'gas' count = 100 radius = 0.02 speed = 1 /
 &stop collisions = 20000 /
 &output frames_every_events = 9 observables_every_events = 5 checkpoint_every = 0.05 /
 """
-#: The same with all room allocated at the start.
+#: The same with all space allocated at the start.
 PLANNED = """&species name = 'gas' count = 100 radius = 0.02 speed = 1 /
 &stop time = 30 /
 &output frames_every_time = 0.01 observables_every_time = 0.004 checkpoint_every = 0.05 /
 """
 LONG = ["--set", "stop.collisions=1000000000", "--set", "output.checkpoint_every="]
-#: An output that is rebuilt at the end: the length of the event log is not known before.
+#: An output that is rebuilt at the end, because the length of the event log is unknown.
 LOGGED = """&box boundary = 'periodic', 'wall' /
 &species name = 'gas' count = 60 radius = 0.03 temperature = 1 /
 &stop time = 30 /
 &output frames_every_time = 0.4 observables_every_time = 0.4 event_log = .true.
   checkpoint_every = 600 /
 """
-#: Message of a run on a full disk: which file, how much is wanted, how much is free ...
+#: Message of a run on a full disk: file, required size, free size ...
 NO_ROOM = r"^disk/gas\.h5(\.part)?: .*(\d+ bytes needed, \d+ bytes free|.* are free)"
-#: ... and what to do, at the start and later.
+#: ... and advice, at the start and later.
 MAKE_ROOM = NO_ROOM + "(; choose fewer frames or make room)?$"
 GO_ON = NO_ROOM + "; --resume continues from the last checkpoint$"
 
@@ -47,7 +47,7 @@ GO_ON = NO_ROOM + "; --resume continues from the last checkpoint$"
 @pytest.mark.parametrize("text", [BUSY, PLANNED], ids=["growing", "planned"])
 @pytest.mark.parametrize("tries", [8, pytest.param(200, marks=pytest.mark.check)])
 def test_kills_cost_no_committed_sample_and_no_result(ricochet, started, tmp_path, text, tries):
-    """In the file that is left all is right, and the run goes on from it, never from earlier."""
+    """The remaining file is valid, and the run continues from its last committed state."""
     write_input(tmp_path, text.replace("0.05", "0.001"))
     assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
     whole = committed(tmp_path / "whole.h5")
@@ -57,11 +57,11 @@ def test_kills_cost_no_committed_sample_and_no_result(ricochet, started, tmp_pat
         goal = frames_in(part) + rng.randrange(frames // 3)
         process = started("gas.nml", "-o", "gas.h5", "--quiet", *["--resume"] * part.exists())
         let_write(process, part, goal)
-        time.sleep(rng.uniform(0, 0.05))  # so much until samples are committed
+        time.sleep(rng.uniform(0, 0.05))  # amount of data until samples are committed
         process.kill()
         message = process.communicate()[1]
         assert process.returncode in (FINISHED, -signal.SIGKILL), message
-        if (tmp_path / "gas.h5").exists():  # perhaps killed just after
+        if (tmp_path / "gas.h5").exists():  # may be killed shortly afterwards
             (tmp_path / "gas.h5").rename(tmp_path / "finished.h5")
             assert differences(tmp_path / "whole.h5", tmp_path / "finished.h5") == []
             times.append(0.0)  # of the next run
@@ -80,13 +80,13 @@ def test_kills_cost_no_committed_sample_and_no_result(ricochet, started, tmp_pat
 
 
 def let_write(process, part, frames):
-    """Returns when a run has committed so many frames, or has ended."""
+    """Wait until a run has committed the given number of frames, or has ended."""
     let_work(process)
     wait_for(lambda: has_ended(process) or frames_in(part) >= frames)
 
 
 def test_files_never_take_the_place_of_closed_standard_streams(program, tmp_path):
-    """Else messages would be written into them."""
+    """Otherwise messages would be written into these files."""
     command = [program, write_input(tmp_path, BUSY), "-o", "gas.h5", *LONG]
     shell = ["bash", "-c", 'exec "$@" <&- >&- 2>&-', "bash", *map(str, command)]
     process = subprocess.Popen(shell, cwd=tmp_path)
@@ -100,13 +100,13 @@ def test_files_never_take_the_place_of_closed_standard_streams(program, tmp_path
 
 
 def shown_until_stopped(program, folder, enough):
-    """The lines that a run writes to its terminal; TERM stops it when there are enough."""
+    """Return the lines that a run writes to its terminal until TERM stops it."""
     screen, keyboard = pty.openpty()
     run = subprocess.Popen([program, "gas.nml"], cwd=folder, stdout=keyboard, stderr=keyboard)
     os.close(keyboard)
     rest = ""
     try:
-        with contextlib.suppress(OSError):  # how Linux says that nobody writes any more
+        with contextlib.suppress(OSError):  # on Linux: no process writes any longer
             while data := os.read(screen, 65536):
                 *lines, rest = re.split(r"(?=\r\x1b)", rest + data.decode())
                 yield from lines
@@ -136,7 +136,7 @@ def shown_until_stopped(program, folder, enough):
     ids=["run", "placing"],
 )
 def test_progress_stays_on_one_line_of_the_terminal(program, tmp_path, text, shown, last):
-    """It is cut, not wrapped; what a signal has to say stands on a line of its own."""
+    """The line is truncated, not wrapped; the message about a signal has a separate line."""
     write_input(tmp_path, text)
     shares = []
     for line in shown_until_stopped(program, tmp_path, lambda: len({*shares}) >= 3):
@@ -149,7 +149,7 @@ def test_progress_stays_on_one_line_of_the_terminal(program, tmp_path, text, sho
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGINT", "SIGHUP", "SIGXCPU"])
 @pytest.mark.parametrize("times", [1, 2])
 def test_a_signal_stops_the_run_with_a_checkpoint(started, tmp_path, name, times):
-    """Also when another one comes within a moment, as launchers send them."""
+    """This includes a second signal within a moment, as sent by launchers."""
     process, number = start_long(started, tmp_path), getattr(signal, name)
     if times == 1:
         message = ended_soon(process, number)
@@ -172,7 +172,7 @@ def test_usr1_makes_a_checkpoint_and_the_run_goes_on(started, tmp_path):
 
 
 def wait_for_checkpoint(folder):
-    """Returns when the first checkpoint of a new run counts: it takes the other place."""
+    """Wait until the first checkpoint of a new run is valid: it is stored in the other place."""
 
     def is_there():
         with h5py.File(folder / "gas.h5.part", "r", locking=False) as file:
@@ -182,26 +182,26 @@ def wait_for_checkpoint(folder):
 
 
 def test_a_later_second_signal_ends_the_run_at_once(started, tmp_path):
-    """Also a program that has no time to look: here it waits for a disk that does not answer."""
+    """This holds for a blocked program, which here waits for a disk that does not respond."""
     endless = with_fsync(tmp_path, "while (1) usleep(100000);")
     process = started(write_input(tmp_path, BUSY), "-o", "gas.h5", *LONG, env=endless)
     wait_for((tmp_path / "gas.h5.part").exists)
     process.send_signal(signal.SIGTERM)
     wait_for(lambda: not is_pending(process.pid, signal.SIGTERM))
-    time.sleep(0.6)  # those that follow within half a second do not count
+    time.sleep(0.6)  # signals within half a second are ignored
     process.send_signal(signal.SIGTERM)
     assert process.wait() == -signal.SIGTERM
 
 
 def is_pending(pid, number) -> bool:
-    """Whether a process has still to take notice of a signal."""
+    """Return whether a signal to a process is still pending."""
     status = Path(f"/proc/{pid}/status").read_text()
     masks = re.findall(r"^(?:Sig|Shd)Pnd:\s+(\w+)", status, re.MULTILINE)
     return any(int(mask, 16) >> (number - 1) & 1 for mask in masks)
 
 
 def stopped_in_time(process, *codes):
-    """TERM ends the process within a second, as stopped or with one of the codes; what it said."""
+    """Check that TERM ends a process within a second with an allowed code; return its output."""
     message = ended_soon(process, signal.SIGTERM)
     assert process.returncode in {STOPPED, *codes}, message
     return message
@@ -227,7 +227,7 @@ def test_a_signal_ends_a_run_that_is_still_being_set_up(
 
 
 def test_a_slow_disk_does_not_slow_the_run_down(ricochet, tmp_path):
-    """A run that waits for its checkpoints takes as many steps between them as another.
+    """A run with slow checkpoints makes as many steps between them as another run.
 
     The disk takes twice as long as the run means to compute between two looks at the clock; the
     run is over after a few dozen checkpoints, not after one at each collision.
@@ -239,7 +239,7 @@ def test_a_slow_disk_does_not_slow_the_run_down(ricochet, tmp_path):
 
 
 def test_a_run_whose_samples_cease_still_makes_checkpoints(started, tmp_path):
-    """Sixty pairs collide one after the other, each with a sample, and rest; one disk flies on."""
+    """Sixty pairs collide successively, each with a sample, and stop; one disk flies on."""
     pairs = "".join(f"0.1, {y}, {0.2 + y / 100}, {y}, " for y in range(1, 61))
     speeds = "1, 0, -1, 0, " * 60
     text = f"""&box upper = 1, 62 /
@@ -268,7 +268,7 @@ def test_a_run_whose_samples_cease_still_makes_checkpoints(started, tmp_path):
     ],
 )
 def test_many_disks_stop_in_time(started, tmp_path, method, side):
-    """While they are searched, in pairs as well, sorted, moved, written, and read again."""
+    """Signals arrive during the search, sorting, moving, writing and reading of disks."""
     text = f"""&run {method} /
     &species grid = {side}, {side} packing_fraction = 0.3 temperature = 1 /
     &stop events = 1000000000 /"""
@@ -282,7 +282,7 @@ def test_many_disks_stop_in_time(started, tmp_path, method, side):
 
 
 def test_a_stuck_summary_does_not_keep_a_finished_run(started, tmp_path):
-    """Whoever reads its standard output may have stopped reading."""
+    """The reader of its standard output may have stopped reading."""
     write_input(tmp_path, "&species count = 10 radius = .01 / &stop time = 1 /")
     with filled_pipe() as inlet:
         process = started("gas.nml", "-o", "gas.h5", stdout=inlet)
@@ -292,7 +292,7 @@ def test_a_stuck_summary_does_not_keep_a_finished_run(started, tmp_path):
 
 
 def test_ignored_signals_stay_ignored(program, tmp_path):
-    """The run of nohup outlives the terminal."""
+    """A run started with nohup continues after the terminal is closed."""
     write_input(tmp_path, BUSY)
     command = ["nohup", program, "gas.nml", "-o", "gas.h5"]
     silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -306,7 +306,7 @@ def test_ignored_signals_stay_ignored(program, tmp_path):
 @pytest.mark.parametrize("text", [PLANNED, BUSY], ids=["planned", "growing"])
 @pytest.mark.parametrize("polls", [30, pytest.param(1000, marks=pytest.mark.check)])
 def test_a_running_file_can_be_read(ricochet, started, tmp_path, text, polls):
-    """No error, and no wrong number, however often one looks."""
+    """Repeated reading causes no errors and never returns wrong numbers."""
     write_input(tmp_path, text)
     assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
     whole, part = committed(tmp_path / "whole.h5"), tmp_path / "gas.h5.part"
@@ -366,7 +366,7 @@ def test_of_twins_started_at_once_one_runs(started, ricochet, tmp_path):
 )
 @pytest.mark.parametrize("sizes", [4, pytest.param(40, marks=pytest.mark.check)])
 def test_a_full_disk_costs_nothing(ricochet, tmp_path, small_disk, text, sizes):
-    """From 64 kB, no room for the layout, to 4 MB; with more room the run goes on where it was."""
+    """Disks have 64 kB (too small for the layout) to 4 MB; with more space the run continues."""
     write_input(tmp_path, text)
     assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
     whole = committed(tmp_path / "whole.h5")
@@ -402,7 +402,7 @@ def test_a_limit_on_the_size_of_files_is_a_full_disk(program, tmp_path):
 
 @pytest.mark.parametrize(("limit", "left"), [("f 2000", []), ("n 4", []), ("n 5", ["gas.h5.part"])])
 def test_a_limit_of_the_process_is_named(program, tmp_path, limit, left):
-    """Not the room on the disk: the event log is too large, or the end needs a second file."""
+    """The limit is not the disk: the event log is too large, or the end needs a second file."""
     write_input(tmp_path, LOGGED)
     command = f'ulimit -{limit}; exec "$0" gas.nml -o gas.h5'
     run = ran("bash", "-c", command, program, cwd=tmp_path)
@@ -412,7 +412,7 @@ def test_a_limit_of_the_process_is_named(program, tmp_path, limit, left):
 
 
 def test_a_disk_for_reading_only_is_left_as_it_is(ricochet, tmp_path, small_disk):
-    """Neither a new run, nor a new folder, nor a stopped run that is to go on."""
+    """This applies to a new run, to a new folder and to a stopped run that should continue."""
     write_input(tmp_path, MIXTURE)
     folder = small_disk(4000)
     stopped = ["gas.nml", "-o", "disk/gas.h5", "--set", "stop.wall_clock=1e-9"]
@@ -437,7 +437,7 @@ def test_the_planned_output_is_compared_with_the_room(ricochet, tmp_path, small_
 
 
 def start_long(started, folder, *options):
-    """A run that takes its time, when it has written some frames."""
+    """Start a long run, and return it after several frames were written."""
     write_input(folder, BUSY)
     process = started("gas.nml", "-o", "gas.h5", *LONG, *options)
     wait_for(lambda: frames_in(folder / "gas.h5.part") > 10)
