@@ -470,7 +470,7 @@ def test_results_are_written_into_files_of_ones_own(
         ("animate run.h5 --count -3", "'-3' is not a whole number above 0"),
         ("trajectory run.h5 --disks one", "'one' is not a list"),
         ("trajectory run.h5 --disks 0", "no disk 0"),
-        ("fields run.h5 --cells 1", "there are 2 to 100000 cells"),
+        ("fields run.h5 --cells 1", "the number of cells must be 2 to 100000"),
         ("fields run.h5 --cells 4 --grid 3,3", "not allowed with"),
         ("fields run.h5 --equilibration nan", "is not a number of at least 0"),
         ("export run.h5 --count 0.5", "'0.5' is not a whole number above 0"),

@@ -200,7 +200,7 @@ def test_a_sheared_gas_is_steady_relative_to_its_flow(tmp_path, rng, capsys, fig
 def test_speeds_of_few_disks_or_at_rest_or_on_sliding_walls_are_refused(tmp_path, rng, capsys):
     slides = {"parameters": {"side/top": {"surface_velocity": 1.0}}, "names": ("disk",)}
     said = refusal(capsys, "speeds", gas(tmp_path / "a.h5", rng, **slides), code=1)
-    assert "a.h5: has surfaces that slide;" in said
+    assert "a.h5: has sliding surfaces;" in said
     for count, words in ((2, "needs at least three disks"), (3, "'disk' is at rest (kT = 0)")):
         x = np.zeros((3, count, 2))
         still = write_run(tmp_path / f"{count}.h5", x, x, observables={"collisions": [0, 0, 0]})
