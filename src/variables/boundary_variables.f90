@@ -25,13 +25,14 @@ module boundary_variables
 
   type(variable_t), parameter :: side_rows(*) = [ &
     variable_t("side", "name", "text", 1, "example", "'bottom'", &
-      "Name of the side of the box that the group describes. The side must be a wall (box.boundary), and one group may " &
-      //"describe each.", choices="left right bottom top"), &
+      "Name of the side of the box that the group describes. The side must be a wall (box.boundary). At most one group may " &
+      //"describe each side.", choices="left right bottom top"), &
     variable_t("side", "motion", "text", 1, "default", "'still'", &
       "Motion of the side along its normal. The work of a moving side on the disks is an observable.", choices=motions, &
       may_change=in_motion), &
     variable_t("side", "amplitude", "real", 1, "required", "0.05", &
-      "Amplitude of the oscillation: the largest displacement of the side from its mean position, that of the box.", &
+      "Amplitude of the oscillation: the largest displacement of the side from its mean position, which box.lower or " &
+      //"box.upper defines.", &
       positive, "length", goes_with="motion sine parabolic", may_change=in_motion), &
     variable_t("side", "period", "real", 1, "required", "1", &
       "Period of the oscillation.", positive, "time", goes_with="motion sine parabolic", may_change=in_motion), &
@@ -43,19 +44,20 @@ module boundary_variables
       unit="length", goes_with="motion still constant_velocity piston", &
       otherwise="the coordinate in box.lower or box.upper"), &
     variable_t("side", "velocity", "real", 1, "required", "1", &
-      "Velocity of the side, positive inwards. With motion = 'sawtooth' it is the velocity of the strikes and must be > 0. " &
-      //"With motion = 'constant_velocity' a negative velocity moves the side outwards.", unit="length/time", &
+      "Velocity of the side, positive inwards. With motion = 'sawtooth' this is the velocity with which the side strikes the " &
+      //"disks, and it must be > 0. With motion = 'constant_velocity' a negative velocity moves the side " &
+      //"outwards.", unit="length/time", &
       goes_with="motion sawtooth constant_velocity", may_change=in_motion), &
     variable_t("side", "start_time", "real", 1, "fallback", "0", &
-      "Time at which the side starts to move. Until then it stands still at its position.", not_negative, "time", &
+      "Time at which the side starts to move. Before this time the side stands still at its position.", not_negative, "time", &
       goes_with="motion constant_velocity", may_change=in_motion), &
     variable_t("side", "end_time", "real", 1, "required", "1", &
-      "Time at which the side stops, later than start_time. From then on it stands still where it is.", positive, "time", &
+      "Time at which the side stops, later than start_time. After this time the side does not move.", positive, "time", &
       goes_with="motion constant_velocity", may_change=in_motion), &
     variable_t("side", "mass", "real", 1, "required", "10", &
       "Mass of the piston.", positive, "mass", goes_with="motion piston", may_change=in_motion), &
     variable_t("side", "force", "real", 1, "required", "1", &
-      "Constant force on the piston, directed inwards. Divided by the length of the side it is the external pressure.", &
+      "Constant force on the piston, directed inwards. The force divided by the length of the side is the external pressure.", &
       not_negative, "energy/length", goes_with="motion piston", may_change=in_motion)]
 
   type(variable_t), parameter :: obstacle_rows(*) = [ &
@@ -71,10 +73,10 @@ module boundary_variables
     variable_t("obstacle", "side", "text", 1, "default", "'outside'", &
       "Side of the circle on which the disks are.", choices="outside inside"), &
     variable_t("obstacle", "file", "text", 1, "optional", "'scatterers.txt'", &
-      "File that describes many circles in place of centre and radius. A text has a line of column names (x y radius) and " &
-      //"one line for each circle; an HDF5 file (.h5) has the datasets centre and radius; up to 1000000 circles. All " &
-      //"circles of the file are one obstacle with one collision rule and one set of observables. The path is relative to " &
-      //"the folder in which the program is started.", excludes="centre radius", &
+      "File that describes many circles in place of centre and radius. A text file contains a line of column names (x y " &
+      //"radius) and one line for each circle. An HDF5 file (.h5) contains the datasets centre and radius. A file may " &
+      //"describe up to 1000000 circles. All circles of the file are one obstacle with one collision rule and one set of " &
+      //"observables. The path is relative to the folder in which the program is started.", excludes="centre radius", &
       otherwise="none; the group describes one circle")]
 
   type(variable_t), parameter :: wall_rows(*) = [ &
@@ -89,42 +91,45 @@ module boundary_variables
       "Second end point of the straight wall: its x and its y coordinate, inside the box.", unit="length", &
       otherwise="none; needed, unless points or file is given"), &
     variable_t("wall", "points", "real", 0, "optional", "0, 0, 0.5, 0.2, 1, 0", &
-      "Points x1, y1, x2, y2, ... of a polyline (at least two) in place of from and to. It is closed if the last point " &
-      //"equals the first.", unit="length", excludes="from to", otherwise="none; the wall is one straight segment"), &
+      "Points x1, y1, x2, y2, ... of a polyline (at least two) in place of from and to. The polyline is closed if the last " &
+      //"point equals the first point.", unit="length", excludes="from to", otherwise="none; the wall is one straight " &
+      //"segment"), &
     variable_t("wall", "file", "text", 1, "optional", "'walls.txt'", &
-      "File that describes many straight walls in place of from and to. A text has a line of column names (x1 y1 x2 y2) and " &
-      //"one line for each wall; an HDF5 file (.h5) has the datasets from and to; up to 1000000 walls. All walls of the " &
-      //"file are one obstacle with one collision rule and one set of observables. The path is relative to the folder in " &
-      //"which the program is started.", excludes="from to points", &
+      "File that describes many straight walls in place of from and to. A text file contains a line of column names (x1 y1 x2 " &
+      //"y2) and one line for each wall. An HDF5 file (.h5) contains the datasets from and to. A file may describe up to " &
+      //"1000000 walls. All walls of the file are one obstacle with one collision rule and one set of observables. The path " &
+      //"is relative to the folder in which the program is started.", excludes="from to points", &
       otherwise="none; the group describes one wall or polyline")]
 
   !> The collision rule of a boundary, which is set in the group of the boundary.
   type(variable_t), parameter :: law_rows(*) = [ &
     variable_t("", "restitution", "real", 1, "optional", "0.9", &
       "Coefficient of restitution of collisions of disks with this boundary: 1 is elastic, 0 perfectly inelastic. The rule " &
-      //"says to which components of the velocity it applies. A thermal boundary (temperature) has none.", unit_interval, &
+      //"determines to which components of the velocity the coefficient applies. A thermal boundary (temperature) has no " &
+      //"coefficient of restitution.", unit_interval, &
       may_change=in_motion, otherwise="contact.wall_restitution"), &
     variable_t("", "rule", "text", 1, "optional", "'normal'", &
-      "Collision rule of this boundary. A thermal boundary (temperature) has none.", choices=wall_rules, &
+      "Collision rule of this boundary. A thermal boundary (temperature) has no collision rule.", choices=wall_rules, &
       may_change=in_motion, otherwise="contact.wall_rule"), &
     variable_t("", "tangential_restitution", "real", 1, "optional", "0.5", &
-      "Coefficient of tangential restitution of this boundary: -1 is smooth, 0 ends the slip of the surfaces, 1 reverses " &
-      //"it. With a value above -1 the boundary is rough, and disks rotate.", tangential, goes_with="rule normal", &
+      "Coefficient of tangential restitution of this boundary: -1 for smooth surfaces, 0 if a collision stops the slip of the " &
+      //"surfaces, 1 if a collision reverses the slip. With a value above -1 the boundary is rough, and disks " &
+      //"rotate.", tangential, goes_with="rule normal", &
       may_change=in_motion, otherwise="contact.wall_tangential_restitution"), &
     variable_t("", "friction", "real", 1, "optional", "0.3", &
-      "Coulomb friction coefficient of this boundary: upper limit of the tangential impulse over the normal impulse. " &
-      //"Friction needs a rough boundary (tangential_restitution > -1).", not_negative, goes_with="rule normal", &
+      "Coulomb friction coefficient of this boundary: upper limit of the ratio of the tangential impulse to the normal " &
+      //"impulse. Friction needs a rough boundary (tangential_restitution > -1).", not_negative, goes_with="rule normal", &
       may_change=in_motion, otherwise="contact.wall_friction"), &
     variable_t("", "temperature", "real", 1, "optional", "1", &
-      "Temperature kT of a thermal boundary: after a collision a disk has a random velocity, as if it came out of a gas of " &
-      //"this temperature. A thermal boundary can slide (surface_velocity), but has no restitution and no motion.", &
+      "Temperature kT of a thermal boundary: after a collision a disk has a random velocity, as if the disk came from a gas " &
+      //"at this temperature. A thermal boundary can slide (surface_velocity), but has no restitution and no motion.", &
       positive, "energy", excludes="restitution rule tangential_restitution friction motion", may_change=in_motion, &
       otherwise="none; the boundary is not thermal"), &
     variable_t("", "surface_velocity", "real", 1, "fallback", "0", &
-      "Tangential velocity of the surface, as of a conveyor belt; the boundary itself stays where it is. Positive is +x for " &
-      //"the bottom and top side, +y for the left and right side, from the first to the second point of a wall, and " &
-      //"counter-clockwise on a circle. A value other than 0 needs a thermal boundary (temperature) or a rough one " &
-      //"(tangential_restitution > -1).", unit="length/time", may_change=in_motion)]
+      "Tangential velocity of the surface, as of a conveyor belt; the boundary itself does not move. A positive velocity is " &
+      //"directed along +x on the bottom and top side, along +y on the left and right side, from the first to the second " &
+      //"point of a wall, and counter-clockwise on a circle. A value other than 0 needs a thermal boundary (temperature) or a " &
+      //"rough one (tangential_restitution > -1).", unit="length/time", may_change=in_motion)]
 
   integer :: g, r
   type(variable_t), parameter :: own_law_rows(*) = [((variable_t(wall_groups(g), law_rows(r)%name, law_rows(r)%kind, &

@@ -32,14 +32,14 @@ module choices
     choice_t("motion", "sine", "The side oscillates about its mean position as a sine."), &
     choice_t("motion", "parabolic", "The side oscillates about its mean position with piecewise constant acceleration, " &
       //"close to a sine."), &
-    choice_t("motion", "sawtooth", "The side stays in its place but strikes each disk with a constant velocity: the limit " &
-      //"of a fast oscillation with small amplitude."), &
+    choice_t("motion", "sawtooth", "The side does not change its position but strikes each disk with a constant velocity: the " &
+      //"limit of a fast oscillation with small amplitude."), &
     choice_t("motion", "constant_velocity", "The side moves with a constant velocity from start_time to end_time, and " &
       //"stands still before and after: compression or expansion."), &
     choice_t("motion", "piston", "The side is a piston with a mass, accelerated by collisions and by a constant force: " &
       //"constant pressure. Not with run.dynamics = 'steps'."), &
     choice_t("side", "outside", "Disks bounce off the outside of the circle."), &
-    choice_t("side", "inside", "The circle is a container: all disks stay inside it. It has no periodic images."), &
+    choice_t("side", "inside", "The circle is a container: all disks stay inside it. The circle has no periodic images."), &
     choice_t("rule", "velocity", "Both components of the velocity are multiplied by the coefficient of restitution; the " &
       //"normal component is reversed. A lone disk without gravity keeps its path."), &
     choice_t("rule", "normal", "The normal component of the velocity is reversed and multiplied by the coefficient of " &
@@ -54,8 +54,8 @@ module choices
     choice_t("radius_distribution", "gaussian", "Gaussian distribution about the mean radius."), &
     choice_t("radius_distribution", "lognormal", "Lognormal distribution, whose logarithm is Gaussian."), &
     choice_t("mass_scaling", "equal", "All disks have the same mass."), &
-    choice_t("mass_scaling", "area", "The mass is proportional to the area of the disk; mass is that of a disk of the mean " &
-      //"radius."), &
+    choice_t("mass_scaling", "area", "The mass of a disk is proportional to its area; mass is the mass of a disk that has the " &
+      //"mean radius."), &
     choice_t("placement", "random", "Random sequential insertion: uniform and without overlap, up to a packing fraction of " &
       //"about 0.54."), &
     choice_t("placement", "grid", "Rectangular grid of columns and rows (grid) that fills the region."), &
@@ -71,12 +71,12 @@ module choices
     choice_t("velocities", "uniform", "Both components are uniform between -speed and speed."), &
     choice_t("velocities", "maxwell", "Velocities are drawn from the Maxwell distribution with kT = temperature."), &
     choice_t("velocities", "explicit", "Velocities as listed in velocity."), &
-    choice_t("velocities", "file", "Velocities, and angular velocities if there are any, as in file."), &
+    choice_t("velocities", "file", "Velocities, and angular velocities if file contains them, as in file."), &
     choice_t("restitution_law", "constant", "Coefficients of restitution do not depend on the impact speed."), &
     choice_t("restitution_law", "power", "1 - e is proportional to g**(1/5) below reference_speed, where e is the " &
       //"coefficient of restitution."), &
-    choice_t("restitution_law", "viscoelastic", "e = 1 - y + 3/5 y**2 with y proportional to g**(1/5) below " &
-      //"reference_speed: viscoelastic bodies. It needs coefficients of at least 7/12."), &
+    choice_t("restitution_law", "viscoelastic", "e = 1 - y + 3/5 y**2 with y proportional to g**(1/5) below reference_speed: " &
+      //"viscoelastic bodies. This law needs coefficients of at least 7/12."), &
     choice_t("kind", "none", "No driving."), &
     choice_t("kind", "noise", "White-noise driving: a kick adds a Gaussian random number to each velocity component, which " &
       //"heats the disks."), &
@@ -84,14 +84,14 @@ module choices
       //"velocity from the Maxwell distribution."), &
     choice_t("kind", "brownian", "Event-driven Brownian dynamics: a kick gives all disks new velocities from the Maxwell " &
       //"distribution."), &
-    choice_t("kind", "active", "Active Brownian disks: as brownian, plus self_propulsion_speed along an orientation that " &
-      //"diffuses."), &
+    choice_t("kind", "active", "Active Brownian disks: as brownian, with an additional velocity self_propulsion_speed along " &
+      //"an orientation that diffuses."), &
     choice_t("frame_columns", "position", "Positions of the disks."), &
     choice_t("frame_columns", "velocity", "Velocities of the disks."), &
     choice_t("frame_columns", "event_count", "Number of events of each disk since the start."), &
-    choice_t("frame_columns", "image", "Number of periods that each disk has travelled, where a boundary is periodic."), &
-    choice_t("frame_columns", "angular_velocity", "Angular velocities, where disks rotate."), &
-    choice_t("frame_columns", "orientation", "Orientations, where disks rotate or are active."), &
+    choice_t("frame_columns", "image", "Number of periods by which each disk has moved, if a boundary is periodic."), &
+    choice_t("frame_columns", "angular_velocity", "Angular velocities, if disks rotate."), &
+    choice_t("frame_columns", "orientation", "Orientations, if disks rotate or are active."), &
     choice_t("precision", "double", "64 bits."), &
     choice_t("precision", "single", "32 bits: half the size, about seven digits.")]
 

@@ -26,9 +26,10 @@ module run_variables
       "Priority queue of the predicted events. Both choices give bit-identical trajectories; the second exists for " &
       //"comparison.", choices="calendar heap", may_change=on_resume), &
     variable_t("run", "threads", "integer", 1, "default", "0", &
-      "Largest number of threads (cores) that the run may use. With 0 it is the environment variable OMP_NUM_THREADS, or 1 " &
-      //"if that is not set. The trajectory is bit-identical for any number. Small systems, sheared boxes, boxes with a " &
-      //"piston, and runs with run.dynamics = 'steps' or run.search other than 'cells' use one thread.", number_of_threads, &
+      "Largest number of threads (cores) that the run may use. With 0 the number is the value of the environment variable " &
+      //"OMP_NUM_THREADS, or 1 if this variable is not set. The trajectory is bit-identical for any number. Small systems, " &
+      //"sheared boxes, boxes with a piston, and runs with run.dynamics = 'steps' or run.search other than 'cells' use one " &
+      //"thread.", number_of_threads, &
       may_change=on_resume)]
 
   type(variable_t), parameter :: stop_rows(*) = [ &
@@ -45,13 +46,13 @@ module run_variables
       "Number of events after which the run ends. Events are collisions of disks with disks, sides and obstacles.", &
       not_negative, may_change=on_resume, otherwise="no limit"), &
     variable_t("stop", "energy_fraction", "real", 1, "optional", "0.1", &
-      "Fraction of the initial kinetic energy at which the run ends: the energy at the start less all energy dissipated in " &
-      //"collisions. It needs inelastic collisions or another stop rule. It excludes driving, shear, and thermal, sliding " &
-      //"or moving boundaries.", energy_left, may_change=on_resume, otherwise="no limit"), &
+      "Fraction of the initial kinetic energy at which the run ends: the energy at the start minus all energy dissipated in " &
+      //"collisions. This rule needs inelastic collisions or another stop rule. It excludes driving, shear, and thermal, " &
+      //"sliding or moving boundaries.", energy_left, may_change=on_resume, otherwise="no limit"), &
     variable_t("stop", "at_rest", "logical", 1, "optional", ".true.", &
-      "End of the run when all disks have come to rest: when the ever shorter bounces of each under box.gravity have ended " &
-      //"or, without gravity, when no disk moves. It needs inelastic collisions. It excludes run.dynamics = 'steps', " &
-      //"contact.contact_time, driving, shear, and thermal, sliding or moving boundaries.", may_change=on_resume, &
+      "End of the run when all disks have come to rest: with box.gravity, when the ever shorter bounces of each disk have " &
+      //"ended; without gravity, when no disk moves. This rule needs inelastic collisions. It excludes run.dynamics = " &
+      //"'steps', contact.contact_time, driving, shear, and thermal, sliding or moving boundaries.", may_change=on_resume, &
       otherwise=".false.: disks at rest do not end the run"), &
     variable_t("stop", "wall_clock", "real", 1, "optional", "3600", &
       "Wall-clock time after which the run stops with a checkpoint and exit code 75. The same command with --resume " &
@@ -95,16 +96,17 @@ module run_variables
       "Number of collisions per disk, 2 collisions/N, between samples of the observables.", positive, may_change=on_resume, &
       otherwise="samples of the initial and the final state only"), &
     variable_t("output", "observables_at", "real", 0, "optional", "0.1, 1, 10", &
-      "Times of single samples of the observables, in increasing order. They are taken in addition to those of " &
-      //"observables_every_... and observables_per_decade.", not_negative, "time", may_change=on_resume, &
+      "Times of single samples of the observables, in increasing order. These samples are taken in addition to the samples " &
+      //"that observables_every_... and observables_per_decade define.", not_negative, "time", may_change=on_resume, &
       otherwise="no such samples"), &
     variable_t("output", "observables_per_decade", "integer", 1, "optional", "10", &
-      "Number of samples of the observables in each power of ten of the time, from decades_from on, which must be given. " &
-      //"They are taken in addition to those of observables_every_... and observables_at.", per_decade, &
+      "Number of samples of the observables in each power of ten of the time, starting at decades_from, which must be given. " &
+      //"These samples are taken in addition to the samples that observables_every_... and observables_at " &
+      //"define.", per_decade, &
       may_change=on_resume, otherwise="no such samples"), &
     variable_t("output", "frame_columns", "text", 0, "optional", "'position', 'velocity'", &
-      "Quantities that frames contain. Positions are always written. A script that needs a quantity that is left out " &
-      //"refuses the file.", choices="position velocity event_count image angular_velocity orientation", &
+      "Quantities that frames contain. Positions are always written. A script reports an error if it needs a quantity that " &
+      //"the file does not contain.", choices="position velocity event_count image angular_velocity orientation", &
       otherwise="all quantities that the run has"), &
     variable_t("output", "precision", "text", 1, "default", "'double'", &
       "Precision of positions and velocities in frames. Checkpoints are always in double precision.", &
@@ -112,9 +114,9 @@ module run_variables
     variable_t("output", "event_log", "logical", 1, "default", ".false.", &
       "Record of every event in /events of the output file: its time, the two partners and the change of momentum."), &
     variable_t("output", "virial_tensor", "logical", 1, "default", ".false.", &
-      "Observables virial_tensor and kinetic_tensor, from which the pressure (stress) tensor follows. They are always " &
-      //"written where disks rotate, in a sheared or driven system, and with thermal, sliding or moving boundaries; " &
-      //"elsewhere .true. adds them at a small cost."), &
+      "Observables virial_tensor and kinetic_tensor, from which the pressure (stress) tensor follows. These observables are " &
+      //"always written if disks rotate, if the system is sheared or driven, and with thermal, sliding or moving boundaries. " &
+      //"In other systems .true. adds them at a small cost."), &
     variable_t("output", "helfand", "logical", 1, "default", ".false.", &
       "Accumulation of the Helfand moments of momentum and energy, from which the shear and the bulk viscosity and the " &
       //"thermal conductivity follow (post/transport.py). It excludes gravity and shear."), &
