@@ -308,8 +308,7 @@ contains
     call put(self, tag, i, cell)
   end subroutine move
 
-  !> Predicts the earliest event of disk i: with a side or cell face, with an obstacle, or with a disk in the nine cells around disk
-  !> i.
+  !> Predicts the earliest event of disk i: with a side, a cell face, an obstacle, or a disk in the nine cells around disk i.
   subroutine predict(self, sim, i)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
