@@ -1,4 +1,4 @@
-"""The engine in this process: its bits are those of the program, and nothing ends the process.
+"""The engine in this process is bit-identical to the program and never ends the process.
 
 That slices of time, a save and a load leave no trace in any random system is one of the ways of
 `test_random_systems.py`.
@@ -45,7 +45,7 @@ ENDLESS = {"contact.restitution": 1, "contact.tangential_restitution": 1}
 
 @pytest.fixture(scope="module")
 def whole(program, tmp_path_factory):
-    """The settings that the program reads from it."""
+    """Return the settings that the program reads from an input."""
     folder = tmp_path_factory.mktemp("whole")
     (folder / "gas.nml").write_text(GAS)
     ran(program, "gas.nml", "-o", "gas.h5", "--quiet", cwd=folder, check=True)
@@ -53,7 +53,7 @@ def whole(program, tmp_path_factory):
 
 
 def test_a_simulation_shows_what_the_file_of_its_run_has(whole):
-    """Arrays, observables, counts and the collisions to come, at the start and at the end."""
+    """Arrays, observables, counts and next collisions agree at the start and at the end."""
     with Simulation(GAS) as gas:
         assert {*COLUMNS} < {*dir(gas)}
         log = whole.event_log()
@@ -105,7 +105,7 @@ def test_a_simulation_says_in_one_line_what_it_is():
 
 
 def states(*simulations):
-    """Everything that simulations show."""
+    """Return all properties of the states of simulations."""
     return [
         [(gas.time, gas.events, gas.changes)]
         + [getattr(gas, name).tolist() for name in COLUMNS]
@@ -116,7 +116,7 @@ def states(*simulations):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_copy_and_a_pickle_continue_with_the_same_bits(seed):
-    """Whatever was done before, and neither disturbs the other; so does another process."""
+    """Copies are independent, for any earlier calls; a pickle continues in another process, too."""
     random.seed(seed)
     gas = Simulation(GAS, {"run.seed": seed}, threads=1 + seed)
     gas.advance(events=random.randrange(300))
@@ -186,7 +186,7 @@ def test_a_function_of_events_may_stop_and_change_the_simulation():
 
 @pytest.mark.parametrize("boundary", ["wall", "periodic"])
 def test_positions_are_set_and_their_energy_is_work(boundary):
-    """The simulation continues as one that starts so; a change of nothing is none."""
+    """The simulation continues like one with this start; equal positions are no change."""
     gas = Simulation(GAS, {"box.boundary": [boundary, "wall"], **ENDLESS}).advance(events=77)
     gas.position = before = gas.position
     assert gas.changes == []
@@ -220,7 +220,7 @@ def test_a_moved_disk_keeps_the_periods_that_it_has_crossed():
 
 
 def test_a_moment_where_a_slice_has_ended_is_reached_again():
-    """In one go, to the last bit: in the middle of an epoch, and where one ends."""
+    """A single call reaches the bit-identical state within an epoch and at its end."""
     text = "&box boundary = 'periodic', 'periodic' /\n&species name = 'a' count = 200"
     text += " packing_fraction = 0.6 placement = 'dense' temperature = 1 /\n"
     with Simulation(text) as one, Simulation(text) as other:
@@ -232,7 +232,7 @@ def test_a_moment_where_a_slice_has_ended_is_reached_again():
 
 
 def test_handles_share_nothing_and_give_all_back():
-    """Also one that nobody closes, and one whose input is wrong."""
+    """This includes handles that are never closed and invalid inputs."""
     one, other = Simulation(GAS), Simulation(GAS, {"run.seed": 2})
     for k in range(1, 21):
         one.advance(events=10 * k)
@@ -255,7 +255,7 @@ def test_handles_share_nothing_and_give_all_back():
 
 
 def test_an_interrupt_leaves_the_simulation_whole():
-    """Ctrl-C raises within moments; what goes on has the bits of what nobody stopped."""
+    """Ctrl-C raises quickly; the simulation then continues bit-identically."""
     gas = Simulation(GAS, ENDLESS)
     timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
     timer.start()
@@ -270,7 +270,7 @@ def test_an_interrupt_leaves_the_simulation_whole():
 
 
 def test_other_threads_of_python_run_meanwhile():
-    """The lock of the interpreter is free while the engine works."""
+    """The lock of the interpreter is released while the engine works."""
     gas, counted = Simulation(GAS, ENDLESS), [0]
     worker = threading.Thread(target=gas.advance, kwargs={"events": 10**6})
     worker.start()
@@ -281,7 +281,7 @@ def test_other_threads_of_python_run_meanwhile():
 
 
 def kept(system) -> Simulation:
-    """Saved and loaded."""
+    """Return a simulation after saving and loading."""
     return Simulation.load(Simulation(system).save("kept.h5", force=True))
 
 
@@ -342,7 +342,7 @@ def kept(system) -> Simulation:
     ],
 )
 def test_wrong_use_is_said_in_one_line(act, error, words, tmp_path, monkeypatch):
-    """The process goes on, and so does another simulation."""
+    """The process and other simulations continue."""
     monkeypatch.chdir(tmp_path)
     gas = Simulation(GAS)
     with pytest.raises(error, match=re.escape(words)) as caught:
@@ -352,7 +352,7 @@ def test_wrong_use_is_said_in_one_line(act, error, words, tmp_path, monkeypatch)
 
 
 def test_the_table_says_what_may_change_in_a_running_simulation(program):
-    """Every other variable is refused for that reason, before anything else is looked at."""
+    """Every other variable is refused for this reason before other checks."""
     table = json.loads(ran(program, "--print-variables", check=True).stdout)
     system = GAS + "&side name = 'top' / &wall name = 'w' from = 0.4, 0.5 to = 0.6, 0.5 /"
     system += "&obstacle name = 'o' centre = 0.5, 0.5 radius = 0.01 /"
@@ -372,7 +372,7 @@ def test_the_table_says_what_may_change_in_a_running_simulation(program):
 
 
 def test_a_simulation_that_breaks_off_says_so():
-    """With the message of the program and its code, each time it is asked to go on."""
+    """Every attempt to continue raises the message and exit code of the program."""
     words = """&box gravity = 0, -1 /
     &species count = 1 radius = 0.1 position = 0.5, 0.5 velocity = 0, 0 /
     &contact wall_restitution = 0 /
@@ -385,7 +385,7 @@ def test_a_simulation_that_breaks_off_says_so():
 
 
 def test_a_saved_simulation_goes_on_in_the_program_and_back(program, tmp_path, whole):
-    """To the end of the plain run, bit for bit."""
+    """The end is bit-identical to that of an uninterrupted run."""
     (tmp_path / "gas.nml").write_text(GAS)
     Simulation(GAS).advance(events=150).save(tmp_path / "gas.h5")
     with pytest.raises(ProgramError, match="exists already"):
@@ -400,7 +400,7 @@ def test_a_saved_simulation_goes_on_in_the_program_and_back(program, tmp_path, w
 
 
 def test_a_side_is_held_moved_and_released_where_it_is():
-    """The energy balance stays closed, and the input of then starts with the side in its place."""
+    """The energy balance holds, and the saved input starts with the side in its position."""
     side = "side.right"
     system = {
         "box": {"upper": [2, 1]},
@@ -435,7 +435,7 @@ def test_a_side_is_held_moved_and_released_where_it_is():
 
 
 def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypatch):
-    """With the input that was saved; that of the start is refused by name."""
+    """The program continues with the saved input; the initial input is refused by name."""
     monkeypatch.chdir(tmp_path)
     Path("gas.nml").write_text(GAS)
     gas = Simulation("gas.nml", {"run.seed": 5}).advance(events=50)
@@ -467,7 +467,7 @@ def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypa
 
 
 def test_numbers_that_c_may_give_are_refused_or_count_as_none():
-    """As the header says; Python itself does not give them."""
+    """The header describes such numbers, which Python never passes."""
     engine, gas, room = library(), Simulation(GAS), 200
     message = ctypes.create_string_buffer(room)
     with gas._open() as handle:
@@ -487,7 +487,7 @@ def test_numbers_that_c_may_give_are_refused_or_count_as_none():
     assert gas.advance(events=9).events == 9 and np.isfinite(gas.velocity).all()
 
 
-#: Arguments that a caller in C may give, sensible or not.
+#: Arguments that a caller in C may pass, valid or invalid.
 NUMBERS = np.nan, np.inf, -np.inf, -1.0, 0.0, 0.1, 0.3, 1e-300, 1e100, 1e308
 COUNTS = -(2**31), -5, -1, 0, 1, 5, 60, 500
 SETTINGS = (
@@ -500,7 +500,7 @@ NAMES = "position", "image", "mass", "", "x", "input", "parameters", "changes", 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_random_calls_in_c_have_an_answer(seed):
-    """Whatever the numbers and texts: nothing faults, hangs, or lets a number in that is none."""
+    """For any numbers and texts, no call crashes, hangs or accepts an invalid number."""
     engine, chance = library(), random.Random(seed)
     text, values = ctypes.create_string_buffer(20_000), np.empty((600, 6))
     message = ctypes.create_string_buffer(500)
@@ -534,7 +534,7 @@ def test_random_calls_in_c_have_an_answer(seed):
 
 
 def test_files_that_are_refused_leave_no_memory_behind(tmp_path):
-    """Nothing at the place, no HDF5, HDF5 of others, a run of another program, a damaged one."""
+    """The files are missing, not HDF5, foreign HDF5, runs of another program, or damaged."""
     places = [tmp_path / name for name in ("none.h5", "text.h5", "other.h5", "old.h5", "cut.h5")]
     places[1].write_text("not HDF5")
     with h5py.File(places[2], "w") as file:
@@ -559,7 +559,7 @@ def test_files_that_are_refused_leave_no_memory_behind(tmp_path):
 
 
 def test_a_damaged_input_in_a_file_is_called_damaged(tmp_path):
-    """Whatever the bits that are wrong say, in one line."""
+    """The message is one line for any damaged bits."""
     text = GAS.replace("event_log = .true.", "")  # which is allocated as a whole
     path = Simulation(text).save(tmp_path / "gas.h5")
     whole = path.read_bytes()
@@ -594,7 +594,7 @@ def test_a_damaged_input_in_a_file_is_called_damaged(tmp_path):
     ],
 )
 def test_a_simulation_needs_no_stop(groups, program, tmp_path, monkeypatch):
-    """Whatever the schedule; the saved input has none either, and its run goes on with one."""
+    """This holds for any schedule; a saved input without &stop continues with a stop rule."""
     monkeypatch.chdir(tmp_path)
     system = {"species": {"name": "a", "count": 20, "radius": 0.01, "speed": 1}} | groups
     box = Simulation(system).advance(time=0.25)
@@ -609,7 +609,7 @@ def test_a_simulation_needs_no_stop(groups, program, tmp_path, monkeypatch):
 
 
 def test_an_input_is_saved_over_nothing_but_a_saved_one(tmp_path, monkeypatch):
-    """And that is found out before anything is written."""
+    """The check is made before any file is written."""
     monkeypatch.chdir(tmp_path)
     gas = Simulation(GAS)
     Path("mine.nml").write_text("! my comments\n")
@@ -633,7 +633,7 @@ def test_an_input_is_saved_over_nothing_but_a_saved_one(tmp_path, monkeypatch):
 
 
 def test_the_library_has_no_fault_that_checks_would_find(program):
-    """All tests of this page, with the library that the compiler has made to check itself."""
+    """All tests of this file run with a library that contains run-time checks."""
     checked = Path(program).parent / "tests"
     if not (checked / "libricochet_files.so").is_file():
         pytest.skip("`make test` builds it")
@@ -644,7 +644,7 @@ def test_the_library_has_no_fault_that_checks_would_find(program):
 
 
 def test_the_library_needs_no_hdf5_and_shows_its_functions_only():
-    """The functions of the header."""
+    """The library exports only the functions of the header."""
     path = library()._name
     assert "hdf5" not in ran("ldd", path, check=True).stdout
     listed = ran("nm", "-D", "--defined-only", path, check=True).stdout.split()[2::3]
@@ -667,7 +667,7 @@ def test_the_example_in_the_header_is_a_complete_program(tmp_path):
 
 
 def test_a_fork_and_an_interpreter_that_ends_do_no_harm():
-    """A child goes on by itself; the end during `advance` is the end of the process."""
+    """A child process continues independently; the interpreter can end during `advance`."""
     script = f"""
 import os, threading
 from ricochet import Simulation

@@ -1,4 +1,4 @@
-"""Runs at their limits: of memory, of the stack, and of anything happening any more."""
+"""Runs at the limits of memory and stack, and runs without further events."""
 
 import resource
 
@@ -21,7 +21,7 @@ def options(words) -> list[str]:
 
 @pytest.fixture
 def memory_of(program, tmp_path):
-    """`memory_of(text, *words)`: what a run of this input needs [bytes].
+    """Return a function that measures the memory of a run of an input [bytes].
 
     It is measured in a small process: a program inherits the largest size its parent ever had.
     """
@@ -36,7 +36,7 @@ def memory_of(program, tmp_path):
 
 @pytest.fixture
 def limited(program, tmp_path):
-    """`limited(count, *options, address_space=, ...)` runs a gas under limits of the shell."""
+    """Return a function that runs a gas under resource limits of the shell."""
 
     def run(count, *options, collisions=1000, address_space=None, data=None, stack=None):
         (tmp_path / "gas.nml").write_text(GAS.format(count=count, collisions=collisions))
@@ -84,7 +84,7 @@ def test_whatever_the_limit_of_memory_the_result_is_right_or_one_line(
 ):
     codes = set()
     for size in megabytes:
-        for kind in ("data", "address_space")[: 1 if size < 10 else 2]:  # where a program starts
+        for kind in ("data", "address_space")[: 1 if size < 10 else 2]:  # the program starts
             run = limited(count, *options(words.split()), **{kind: size * 1_000_000})
             if run.returncode == 127:
                 continue  # not even the libraries fit
@@ -113,16 +113,16 @@ def test_a_file_that_declares_absurdly_many_disks_is_refused_at_once(ricochet, t
 
 
 def test_the_memory_of_a_run_does_not_grow(memory_of):
-    """Arrays that come and go at every sample, sorting and checkpoint leave no gaps behind."""
+    """Arrays that samples, sorting and checkpoints allocate do not fragment the memory."""
     text = "&box upper = 1000, 0.001 / " + GAS.format(count=1000, collisions=10**9)
     words = ("species.gas.packing_fraction=1e-4", "output.checkpoint_every=1e-9")
-    words += ("output.observables_every_events=1",)  # a checkpoint at each, if not more often
+    words += ("output.observables_every_events=1",)  # at least one checkpoint per sample
     few, many = (memory_of(text, *words, f"stop.events={events}") for events in (10, 210))
     assert many < few + 1e6
 
 
 def assumed_memory(ricochet, *words) -> float:
-    """The memory that a run of gas.nml needs, as --check states it [bytes]."""
+    """Return the memory of a run of gas.nml as estimated by --check [bytes]."""
     said = ricochet("gas.nml", "--check", *options(words)).stdout
     return 1e6 * float(said.split("needs about ")[1].split(" MB of memory")[0])
 
@@ -138,12 +138,12 @@ placement = 'lattice' velocities = 'maxwell' /
     [
         (490_000, 2, ()),
         (490_000, 2, ("box.boundary=periodic,periodic", "output.frames_every_collisions=490000")),
-        (1_000_000, 6, ()),  # domains, which shorter runs do not have
+        (1_000_000, 6, ()),  # shorter runs do not use domains
         pytest.param(10_000_000, 6, (), marks=pytest.mark.check),
     ],
 )
 def test_a_run_takes_the_memory_that_is_assumed(memory_of, ricochet, count, length, words):
-    """Without domains, with what frames and periodic sides add, and with domains."""
+    """The runs have no domains, frames and periodic sides, or domains."""
     measured = memory_of(LATTICE.format(count=count, length=length), *words)
     assert measured == pytest.approx(assumed_memory(ricochet, *words), rel=0.05)
 
@@ -185,7 +185,7 @@ def test_a_run_uses_no_more_memory_than_is_foretold(memory_of, words, count):
 @pytest.mark.check
 @pytest.mark.parametrize("threads", [1, 2])
 def test_domains_use_at_most_275_bytes_per_disk(memory_of, threads):
-    """And 25 MB, samples apart; to the end, where one core goes on alone."""
+    """Another 25 MB are allowed, besides samples, up to the end on a single core."""
     text = GAS.format(count=500_000, collisions=2_500_000)
     assert memory_of(text, f"run.threads={threads}") < 275 * 500_000 + 25e6
 
@@ -203,7 +203,7 @@ def test_a_million_disks_need_no_stack(limited, words):
 
 
 def test_a_long_input_needs_no_stack(limited, monkeypatch):
-    """Three megabytes, of comments and of walls."""
+    """The input has three megabytes of comments and walls."""
     walls = "".join(f"&wall from = 0.1, {k}e-4 to = 0.9, {k}e-4 /\n" for k in range(1, 5000))
     text = GAS.replace("count = {count}", "count = {count} region = 0, 1, 0.6, 1")
     monkeypatch.setitem(globals(), "GAS", text + walls + "! and so on\n" * 230_000)

@@ -1,4 +1,4 @@
-"""The output file of whole runs: layout, parameters, cadences, and places that are refused.
+"""Output files of runs: layout, parameters, sampling schedules and refused paths.
 
 The meaning of its numbers is asserted of all systems (test_random_systems.py, tests/unit/).
 """
@@ -21,7 +21,7 @@ GRAVITY = """&box upper = 2, 3  boundary = 'periodic', 'wall'  gravity = 0, -2 /
 
 @pytest.fixture
 def ran(ricochet, tmp_path):
-    """`ran(text, *options)` performs a run and returns the open output file."""
+    """Return a function that performs a run and returns the open output file."""
     opened = []
 
     def run(text, *options, name="gas"):
@@ -83,7 +83,7 @@ def test_the_layout_is_h5md(ran):
 
 def test_every_parameter_is_there_as_it_was_used(ran, tmp_path):
     sets = ["species.heavy.mass=5", "species.light.radius=", "species.light.packing_fraction=0.1"]
-    sets += ["run.seed=2", "run.seed=6"]  # the last one counts
+    sets += ["run.seed=2", "run.seed=6"]  # the last one is used
     file = ran(MIXTURE.rstrip("\n"), *(f"--set={word}" for word in sets))["parameters"]
     assert text(file["input"][()]) == MIXTURE.rstrip("\n")
     assert text(file["overrides"][()]).split() == sets
@@ -132,7 +132,7 @@ def test_the_origin_is_there(ran):
     ],
 )
 def test_samples_are_at_the_very_multiples_and_at_the_end(ran, track, cadence, end, expected):
-    """A cadence that is set takes the place of another of the same samples in the input, only."""
+    """A schedule on the command line replaces that of the same samples in the input only."""
     file = ran(MIXTURE, f"--set=output.{track}_{cadence}", "--set=stop.time=", f"--set=stop.{end}")
     disks, seen = file["particles/disks"], file["observables"]
     times, number = disks["position/time"][:], seen["collisions/value"][:]
@@ -160,7 +160,7 @@ COLUMNS = "velocity", "event_count", "image", "angular_velocity", "orientation"
 
 @pytest.mark.parametrize("wanted", [["position"], COLUMNS[:1], COLUMNS[1:4:2], COLUMNS])
 def test_frames_have_the_columns_that_are_asked_for(ran, wanted):
-    """The positions always, and of the others those that the run has; nothing else changes."""
+    """Positions are always written, other columns if the run has them; other data do not change."""
     whole = ran(TURNING, name="whole")["particles/disks"]
     words = ", ".join(f"'{name}'" for name in wanted)
     part = ran(TURNING, f"--set=output.frame_columns={words}", name="part")["particles/disks"]
@@ -174,7 +174,7 @@ def test_frames_have_the_columns_that_are_asked_for(ran, wanted):
 
 @pytest.mark.parametrize("cut", [0, 1.5, 3.0])
 def test_counts_in_frames_grow_longer_where_they_must(ricochet, tmp_path, cut):
-    """A disk that crosses a box of length 1 so fast that 32 bits hold its periods up to t = 2.1."""
+    """A disk crosses a box of length 1 so fast that 32 bits suffice only up to t = 2.1."""
     path = write_input(
         tmp_path,
         """&box boundary = 'periodic', 'periodic' /
@@ -192,7 +192,7 @@ def test_counts_in_frames_grow_longer_where_they_must(ricochet, tmp_path, cut):
 
 
 def test_the_same_input_gives_the_same_bytes(ran, tmp_path):
-    """Cost apart: two numbers of 8 bytes, and both runs on one build and host."""
+    """Exceptions are two numbers for the cost; build and host are the same."""
     every = ["--set", "output.frames_every_time=", "--set", "output.frames_every_events=7"]
     ran(MIXTURE, *every, name="one").close()
     time.sleep(1.1)  # a second later: no time stamps
@@ -255,7 +255,7 @@ def test_impossible_places_are_refused_in_one_line(ricochet, tmp_path):
 
 
 def test_a_species_has_no_name_that_the_file_uses_itself(ricochet, ran, tmp_path):
-    """Nothing that stands beside the groups of species, as found in a file."""
+    """The names of other members of the group of species are not allowed."""
     file = ran(MIXTURE)
     used = {*file["observables"], *file["parameters/species"]} - {"light", "heavy"}
     assert {"all", "committed", "momentum", "names", "counts"} < used
@@ -268,7 +268,7 @@ def test_a_species_has_no_name_that_the_file_uses_itself(ricochet, ran, tmp_path
 
 
 def test_a_file_that_was_rebuilt_lacks_nothing(ran, tmp_path):
-    """One with room for just its samples is not; with another stop rule their number is unknown."""
+    """A file is rebuilt only if the stop rule does not determine its number of samples."""
     planned = ["--set", "output.event_log=.false."]
     ran(GRAVITY, *planned, name="planned").close()
     ran(GRAVITY, *planned, "--set", "stop.collisions=1000000000", name="rebuilt").close()

@@ -1,4 +1,4 @@
-"""A run that is stopped, damaged or finished goes on as if nothing had been, or says why not.
+"""A stopped, damaged or finished run continues exactly, or states why it cannot continue.
 
 That the bits are the same whatever the system and the way is asserted by `test_random_systems.py`.
 """
@@ -22,7 +22,7 @@ GROWING = """&output frames_every_time = 0.05 observables_every_collisions = 30
 event_log = .true. /\n"""
 AT_ONCE = ["--set", "stop.wall_clock=1e-9"]
 COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet"]
-#: A ball that bounces ever faster and lower.
+#: A ball whose bounces become faster and lower.
 COLLAPSE = """&box gravity = 0, -1 /
 &species name = 'ball' radius = 0.05 position = 0.5, 0.5, 0.3, 0.3 /
 &contact restitution = 0.5 /
@@ -33,7 +33,7 @@ COLLAPSE = """&box gravity = 0, -1 /
 
 @pytest.fixture(params=["stopped", "finished"])
 def before(request, ricochet, tmp_path):
-    """Path of the output of a run that can continue, by COMMAND with a later end."""
+    """Return the output of a run that continues with COMMAND and a later end."""
     write_input(tmp_path, MIXTURE)
     end = AT_ONCE if request.param == "stopped" else ["--set", "stop.time=0.5"]
     run = ricochet(*COMMAND, *end)
@@ -44,7 +44,7 @@ def before(request, ricochet, tmp_path):
 
 
 def test_stops_between_and_at_samples_and_before_the_first_event(ricochet, tmp_path):
-    """The wall clock stops a run at once: every part makes one little step, but makes it."""
+    """The limit of wall time stops a run at once; each part makes a small step."""
     write_input(tmp_path, GAS + GROWING)
     short = ["gas.nml", "--set", "species.gas.count=3", "--set", "species.gas.radius=0.15"]
     short += ["--set", "run.search='pairs'", "--set", "stop.time=1", "-o"]
@@ -79,7 +79,7 @@ def test_a_checkpoint_of_another_version_is_refused_by_name(ricochet, before):
     with h5py.File(before, "r+") as file:
         del file["checkpoint/program"]
         file["checkpoint/program"] = np.bytes_("ricochet 0.0.9")
-        del file["parameters/overrides"]  # with a name that is not one any more
+        del file["parameters/overrides"]  # with a former name
         file["parameters/overrides"] = np.bytes_("side.left." + "speed=1\n")
     run = ricochet(*COMMAND, "--resume")
     assert run.returncode == USAGE and "was written by ricochet 0.0.9, but this" in one_line(run)
@@ -99,7 +99,7 @@ def test_an_input_in_the_output_with_a_wrong_bit_is_damaged(ricochet, before, na
 
 
 def flip(path, slot, rng):
-    """Changes a random bit of a checkpoint."""
+    """Change a random bit of a checkpoint."""
     with h5py.File(path, "r+") as file:
         words = file[f"checkpoint/{slot}"][:]
         words[rng.randrange(len(words) - 1)] ^= 1 << rng.randrange(63)
@@ -108,7 +108,7 @@ def flip(path, slot, rng):
 
 @pytest.mark.parametrize("trials", [10, pytest.param(200, marks=CHECK)])
 def test_of_two_checkpoints_one_may_be_damaged(ricochet, tmp_path, trials):
-    """Then the run goes on from the other one; with both damaged it does not."""
+    """The run continues from the other checkpoint; with two damaged ones it is refused."""
     write_input(tmp_path, MIXTURE)
     assert ricochet("gas.nml", "-o", "whole.h5", "--set", "stop.time=1").returncode == FINISHED
     command, rng = [*COMMAND, "--set", "stop.time=1"], random.Random(trials)
@@ -128,7 +128,7 @@ def test_of_two_checkpoints_one_may_be_damaged(ricochet, tmp_path, trials):
 
 @pytest.mark.parametrize("trials", [6, pytest.param(200, marks=CHECK)])
 def test_a_file_that_is_damaged_is_refused_in_one_line(ricochet, before, trials):
-    """Cut anywhere, without its checkpoints, with a wrong one, of others, or gone."""
+    """The file is truncated, missing, foreign, or without valid checkpoints."""
     whole = before.read_bytes()
     for k in range(trials):
         before.write_bytes(whole[: k * len(whole) // trials])
@@ -152,7 +152,7 @@ def test_a_file_that_is_damaged_is_refused_in_one_line(ricochet, before, trials)
 
 
 def test_a_run_that_breaks_off_leaves_its_last_state_and_makes_way(ricochet, tmp_path):
-    """The same command replaces it and says so; it cannot be resumed."""
+    """The same command replaces the file and reports this; the run cannot be resumed."""
     write_input(tmp_path, COLLAPSE)
     run = ricochet("gas.nml", "-o", "gas.h5", "--quiet")
     assert run.returncode == BROKEN and "collapse" in one_line(run)
@@ -176,7 +176,7 @@ def test_a_run_that_breaks_off_leaves_its_last_state_and_makes_way(ricochet, tmp
 
 
 def test_a_run_that_passed_a_collapse_says_so(ricochet, tmp_path):
-    """In all places, with the collisions that took no time; contacts as it proposes prevent it."""
+    """All outputs report the collapse; the proposed contact time prevents it."""
     crater = [CRATER, "-o", tmp_path / "crater.h5", "--force"]
     run = ricochet(*crater, "--set=contact.contact_time=0", "--set=output.event_log=T")
     found = contents(tmp_path / "crater.h5")
@@ -193,7 +193,7 @@ def test_a_run_that_passed_a_collapse_says_so(ricochet, tmp_path):
     assert run.returncode == FINISHED and "collapse" not in run.stderr + run.stdout
 
 
-#: Disks that touch, in a row, in a triangle and in two lattices, and one that strikes them.
+#: Touching disks in a row, a triangle and two lattices, and a disk that strikes them.
 DIAGONAL = 0.125 * 3**0.5 / 2
 TOUCHING = {
     "cradle": [(0.75 + 0.125 * k, 1) for k in range(5)],
@@ -213,7 +213,7 @@ TOUCHING = {
 @pytest.mark.parametrize("restitution", [0.75, 0.9, 0.95, 0.999])
 @pytest.mark.parametrize("name", TOUCHING)
 def test_disks_that_touch_and_are_struck_are_no_collapse(ricochet, tmp_path, name, restitution):
-    """Not above the threshold of their number: nothing is said, and scripts take the run."""
+    """Below the threshold no collapse is reported, and scripts accept the run."""
     places = [(0.125, 1), *TOUCHING[name]]
     write_input(
         tmp_path,
@@ -230,7 +230,7 @@ def test_disks_that_touch_and_are_struck_are_no_collapse(ricochet, tmp_path, nam
 # --- a finished run goes on ---
 
 
-#: Three collisions at the time 0.5, and walls from 2.25 on.
+#: Three collisions at t = 0.5, and wall collisions from t = 2.25 on.
 TOGETHER = """&box upper = 8, 8 /
 &species radius = 0.25 position = 1,1, 2,1, 1,3, 2,3, 1,5, 2,5
   velocity = 0.5,0, -0.5,0, 0.5,0, -0.5,0, 0.5,0, -0.5,0 /
@@ -265,7 +265,7 @@ def test_the_last_frame_of_steps_is_after_the_kick_whatever_the_cadence(ricochet
 def test_a_sample_between_collisions_of_one_moment_is_not_that_of_the_moment(
     ricochet, tmp_path, end
 ):
-    """The moment is not over, neither for samples nor for `stop.time`."""
+    """The time is not complete, neither for samples nor for `stop.time`."""
     cadences = "&output frames_every_time = 0.25 observables_every_time = 0.5 /"
     write_input(tmp_path, TOGETHER + cadences)
     for time in (0.5, 3):
@@ -280,7 +280,7 @@ def test_a_new_cadence_counts_from_where_the_run_goes_on(ricochet, tmp_path):
     write_input(tmp_path, MIXTURE)
     assert ricochet(*COMMAND, "--set", "stop.time=1.3").returncode == FINISHED
     new = ["output.frames_every_time=0.5", "output.observables_every_events=100", "stop.time=3.1"]
-    many = sorted({0.01 * k for k in range(1, 130)} | {1.6})  # more than are kept as a text
+    many = sorted({0.01 * k for k in range(1, 130)} | {1.6})  # more than are stored as text
     new += [f"output.frames_at={','.join(map(repr, many))}", "output.decades_from=0.3"]
     new += [
         "output.frames_per_decade=1",
@@ -324,7 +324,7 @@ def test_a_check_of_a_run_that_goes_on_changes_nothing(ricochet, before):
 
 
 def test_a_finished_run_that_is_continued_needs_room(ricochet, small_disk, tmp_path):
-    """Without it the run that is there is unharmed."""
+    """Without sufficient space the existing run is not changed."""
     disk = small_disk(2000)
     write_input(tmp_path, MIXTURE)
     command = ["gas.nml", "-o", "disk/gas.h5", "--quiet", "--set"]
@@ -340,7 +340,7 @@ def test_a_finished_run_that_is_continued_needs_room(ricochet, small_disk, tmp_p
 
 
 def test_a_run_knows_its_overrides(ricochet, tmp_path):
-    """Stop rules and cadences are as the command says; the rest is as it was, in the same words."""
+    """The command sets stop rules and schedules; other overrides keep their text."""
     write_input(tmp_path)
     fixed = ["run.seed=8", "species.heavy.mass=7", "Contact.restitution=0.9", "run.title=a = b"]
     sets = [f"--set={word}" for word in fixed]

@@ -1,4 +1,4 @@
-"""The scripts of the systems in runs/, in a copy where stand-ins note what would be done."""
+"""The scripts of runs/ in a copy in which substitutes record the calls."""
 
 import os
 import shutil
@@ -26,7 +26,7 @@ def study(tmp_path):
     noted = f"echo \"$LC_ALL\" >>'{tmp_path}/language.txt'"
     executable(tmp_path / "bin" / "awk", f'{noted}\nexec {shutil.which("awk")} "$@"')
     own = {
-        "LC_ALL": "de_DE.UTF-8",  # where numbers have commas
+        "LC_ALL": "de_DE.UTF-8",  # with decimal commas
         "PATH": f"{tmp_path}/bin:{os.environ['PATH']}",
         "PYTHON": f"{tmp_path}/python",
         "RICOCHET": f"{tmp_path}/ricochet",

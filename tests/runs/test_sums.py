@@ -17,7 +17,7 @@ HEAVY = """&box upper = 4, 2 /
 
 
 def masses(rng: random.Random) -> str:
-    """A system with masses over 30 decades at most, equal speeds or equal temperatures."""
+    """Return a system with masses over up to 30 decades and equal speeds or temperatures."""
     mass = sorted(10 ** rng.uniform(-15, 15) for _ in range(rng.randint(1, 4)))
     words = []
     for k, m in enumerate(mass):
@@ -40,7 +40,7 @@ def masses(rng: random.Random) -> str:
 
 
 def sums_and_logs(found: dict) -> dict:
-    """Last values of the sums, and what the log has: pairs by name."""
+    """Return pairs, by name, of final sums and the corresponding sums over the log."""
     log = {name: found[f"/events/{name}"] for name in ("i", "j", "momentum_change")}
     radius = found["/particles/disks/radius"]
     change = log["momentum_change"].astype(np.longdouble)

@@ -1,4 +1,4 @@
-"""Ensembles from Python: each goes on with what the script has left, and tells what there is."""
+"""Sweeps from Python, which also continue members of the script, and tables of members."""
 
 import os
 import re
@@ -31,7 +31,7 @@ def _tools(program, monkeypatch):
 
 @pytest.mark.usefixtures("_tools")
 def test_a_sweep_and_the_script_go_on_with_each_others_members(tmp_path):
-    """Members have the same names, inputs and overrides; none is run twice."""
+    """Members have equal names, inputs and overrides, and no member is run twice."""
     text = GAS.replace("temperature = 1", "")
     table = sweep(text, VALUES, tmp_path)
     assert table.member[0] == "restitution_0.8_a.velocity_1_-1_seed_1"
@@ -52,7 +52,7 @@ def test_a_sweep_and_the_script_go_on_with_each_others_members(tmp_path):
 
 @pytest.mark.usefixtures("_tools")
 def test_finished_members_are_extended_with_the_same_bits(program, tmp_path):
-    """By a later stop and another schedule; a stop that is reached leaves them as they are."""
+    """A later stop and another schedule extend members; a stop already reached does not."""
     values = {"contact.restitution": [0.9, 1], "run.seed": [1, 2]}
     longer = GAS.replace("disk = 5", "disk = 9") + "&output frames_every_time = 0.1 /\n"
     whole = sweep(longer, values, tmp_path / "whole")
@@ -213,7 +213,7 @@ with {pool}(2) as pool:
 
 
 def wait_until(there) -> None:
-    """Patiently: a busy machine takes its time."""
+    """Wait until a condition holds, with a long limit for busy machines."""
     for _ in range(6000):
         if there():
             return
@@ -230,7 +230,7 @@ def test_overrides_have_their_types(word, value):
 
 @pytest.mark.parametrize("link", [Path.symlink_to, Path.hardlink_to])
 def test_nothing_is_written_through_a_link(tmp_path, link):
-    """Nor into a file with another name."""
+    """Files with several names are not written to either."""
     (tmp_path / "mine").write_text("mine")
     (tmp_path / "runs").mkdir()
     link(tmp_path / "runs/seed_1.log", tmp_path / "mine")

@@ -1,4 +1,4 @@
-"""One run on several cores: how many it has, and ends that no random system may come to.
+"""Runs on several cores: numbers of threads, and ends that random systems rarely reach.
 
 That threads change no bit, whatever is written and however a run is stopped, is asserted of all
 systems (test_random_systems.py).
@@ -12,13 +12,13 @@ import pytest
 
 from whole_runs import BROKEN, FINISHED, STOPPED, differences, ran, write_input
 
-#: So many that several cores share them.
+#: Enough disks for several cores.
 GAS = "&species name = 'gas' count = 10000 packing_fraction = 0.3 temperature = 1 /\n"
 
 
 @pytest.fixture
 def gas(ricochet, tmp_path):
-    """A folder with a short run of 10 000 disks on one core."""
+    """Return a folder with a short run of 10 000 disks on one core."""
     write_input(tmp_path, GAS + "&stop events = 30000 /\n")
     assert ricochet("gas.nml", "-o", "one.h5").returncode == FINISHED
     return tmp_path
@@ -31,7 +31,7 @@ def threads_of(path: Path) -> int:
 
 @pytest.mark.parametrize("log", ["", "&output event_log = .true. /\n"], ids=["plain", "log"])
 def test_a_collapse_ends_a_run_on_several_cores_as_on_one(ricochet, tmp_path, log):
-    """However long a window should be, it is bounded; the run breaks off in the same state."""
+    """The length of a window is bounded; the run stops in the same state."""
     lossy = "&contact restitution = 0.3 / &stop collisions_per_disk = 200 /\n"
     write_input(tmp_path, GAS.replace("10000", "5000") + lossy + log)
     one, two = (
@@ -65,7 +65,7 @@ def test_more_threads_than_cores_are_warned_of(ricochet, gas, options, environme
 
 
 def test_the_threads_are_those_of_the_last_part(ricochet, gas):
-    """One where a run is too small, or of a kind, that one core does alone."""
+    """A run that is too small, or of a kind without domains, uses one core."""
     command = ["gas.nml", "-o", "many.h5", "--quiet"]
     begin = ["--set=stop.wall_clock=1e-9", "--set=run.threads=3"]
     assert ricochet(*command, *begin).returncode == STOPPED
@@ -90,7 +90,7 @@ def test_moments_of_a_run_that_goes_on_on_several_cores_count_from_its_start(ric
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_run_says_what_it_did_on_one_core_though_it_had_two(ricochet, gas, threads):
-    """In the summary and in the file; a spell of so few events is not worth two."""
+    """Summary and file report one core, because two do not pay for few events."""
     few = "--set=stop.collisions=9000"
     done = ricochet("gas.nml", "-o", "two.h5", few, f"--set=run.threads={threads}")
     said = [line for line in done.stdout.splitlines() if line.startswith("events_on_one_core")]

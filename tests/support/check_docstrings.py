@@ -1,4 +1,4 @@
-"""Checks the docstrings of public Python functions against the numpydoc standard.
+"""Check the docstrings of public Python functions against the numpydoc standard.
 
     python tests/support/check_docstrings.py
 
@@ -25,7 +25,7 @@ MODULES = (
     "fields",
     "streams",
 )
-#: Rules that do not apply here, and why.
+#: Rules that do not apply here, with reasons.
 IGNORED = {
     "GL01": "the summary stands on the line of the quotes, as everywhere in the project",
     "ES01": "a summary that says all needs no more text",
@@ -46,7 +46,7 @@ OF_CLASSES = {"EX01", "PR01", "PR02"}
 
 
 def problems() -> list[str]:
-    """All problems, as `module.name: CODE text`."""
+    """Return all problems as `module.name: CODE text`."""
     from numpydoc.validate import validate  # the tests take the list of modules without it
 
     found = []

@@ -1,4 +1,4 @@
-"""Writes the Python examples of the pages to files, for a type checker.
+"""Write the Python examples of the pages to files for a type checker.
 
     python tests/support/check_examples.py FOLDER
 
@@ -19,13 +19,13 @@ TOUR = ROOT / "docs" / "tour.ipynb"
 
 
 def blocks_of(section: str) -> list[str]:
-    """The Python code in a section: indented blocks that import or call something."""
+    """Return the Python code in a section: indented blocks with imports or calls."""
     blocks = re.findall(r"(?:^    .*\n(?:\n(?=    ))?)+", section, re.MULTILINE)
     return [block for block in map(textwrap.dedent, blocks) if is_python(block)]
 
 
 def is_python(block: str) -> bool:
-    """Whether a block is code in Python, and not in a shell or in Fortran."""
+    """Return whether a block is Python code and not shell or Fortran."""
     try:
         nodes = [*ast.walk(ast.parse(block))]
     except SyntaxError:
@@ -34,7 +34,7 @@ def is_python(block: str) -> bool:
 
 
 def examples_of(page: str) -> list[str]:
-    """The programs on a page."""
+    """Return the programs on a page."""
     found: list[str] = []
     for section in re.split(r"^#+ ", page, flags=re.MULTILINE):
         code = "\n".join(blocks_of(section))
@@ -46,7 +46,7 @@ def examples_of(page: str) -> list[str]:
 
 
 def cells_of(notebook: str) -> str:
-    """The code of a notebook as one program."""
+    """Return the code of a notebook as one program."""
     cells = json.loads(notebook)["cells"]
     code = ["".join(cell["source"]) + "\n" for cell in cells if cell["cell_type"] == "code"]
     return "\n".join(["from IPython.display import display", *code])
