@@ -37,8 +37,9 @@ running:
 
 Member NAME writes FOLDER/NAME.h5 and FOLDER/NAME.log.  The same command again continues: a finished
 member (with NAME.h5) is left out, a member with NAME.h5.part resumes, and a member that failed or
-was interrupted without data starts again (with Slurm only with --retry).  TERM or Ctrl-C stops all
-members after a checkpoint.  Copies of the command on one folder share the work.  The program is
+was interrupted without data starts again (with Slurm only with --retry).  With a later stop or
+another sampling schedule it extends finished members.  TERM or Ctrl-C stops all members after a
+checkpoint.  Copies of the command on one folder share the work.  The program is
 that of RICOCHET, or ricochet in the folder of this command (in a clone build/ricochet).  All
 machines need the same folders.
 
@@ -175,11 +176,22 @@ put() {
 # Prints the last line of the log of member NAME.
 last_words() { ! may_be_ours "$folder/$1.log" || tail -n 1 -- "$folder/$1.log" 2>/dev/null || true; }
 
+is_finished=': is a finished run, ' # the answer to --resume if a stop rule is met already
 goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line in the log of a member that has not failed
 
 # Succeeds if member NAME has data: a finished output or one from which it can continue. The log of a member that failed states the
 # reason.
 has_data() { [[ -e $folder/$1.h5 || -e $folder/$1.h5.part && $(last_words "$1") =~ $goes_on ]]; }
+
+# A finished file that is older than the input, or that is being extended, is not what the present settings ask for.
+is_done() { [[ -e $folder/$1.h5 && ! -e $folder/$1.h5.part && ! $folder/input.nml -nt $folder/$1.h5 ]]; }
+
+# NAME OVERRIDES: does the program continue the data of a member with these settings?
+may_continue() {
+  local arguments=("$input" -o "$folder/$1.h5" --resume --check --quiet) said
+  add_overrides "$2"
+  said=$("$program" "${arguments[@]}" 2>&1 </dev/null) || [[ $said == *"$is_finished"* ]]
+}
 
 has_failed() { [[ ! -e $folder/$1.h5 && ! $(last_words "$1") =~ $goes_on ]]; }
 
@@ -194,7 +206,7 @@ forget_failure() {
 # Checks that the members of an earlier command in this folder have the same settings, because results are identified by their
 # names.
 remember() {
-  local line name k door='' changed='' mended=''
+  local line name k door='' changed='' mended='' extended=() found=()
   local -A before=() linked=()
   if { exec {door}<"$folder"; } 2>/dev/null; then # one command at a time, if the file system supports locks
     flock -w 60 -E 75 "$door" 2>/dev/null || (($? != 75)) ||
@@ -207,14 +219,17 @@ remember() {
   if [[ -e $folder/manifest.txt ]]; then
     while IFS= read -r line; do before[x${line%%$'\t'*}]=${line#*$'\t'}; done <"$folder/manifest.txt"
   fi
+  [[ -e $folder/input.nml ]] || found=("${names[@]}") # results from elsewhere are left as they are
   if [[ -e $folder/input.nml ]] && ! cmp -s -- "$input" "$folder/input.nml"; then
     [[ -e $folder/manifest.txt ]] ||
       fail 3 "$folder/input.nml is not the input of an ensemble: choose another folder"
     mended=1
     for name in "${!before[@]}"; do
-      ! has_data "${name#x}" ||
+      has_data "${name#x}" || continue
+      may_continue "${name#x}" "${before[$name]}" ||
         die "$folder holds members of another input, or of $input before a change (see $folder/input.nml):" \
           "choose another folder, or remove this one"
+      break
     done
   fi
   for k in "${!names[@]}"; do
@@ -223,8 +238,10 @@ remember() {
     [[ ! -e $folder/$name.log || -n ${before[x$name]+known} && -z ${linked[x$name.log]:-} ]] ||
       fail 3 "$folder/$name.log is not a log of this ensemble: remove it, or choose another folder"
     if [[ ${before[x$name]-${overrides[k]}} != "${overrides[k]}" ]] && has_data "$name"; then
-      die "$folder holds a member '$name' with other settings (${before[x$name]}):" \
-        "choose another folder or name"
+      may_continue "$name" "${overrides[k]}" ||
+        die "$folder holds a member '$name' with other settings (${before[x$name]}):" \
+          "choose another folder or name"
+      extended+=("$name")
     fi
     [[ ${before[x$name]-none} == "${overrides[k]}" ]] || changed=1
     [[ -z $mended && ${before[x$name]-${overrides[k]}} == "${overrides[k]}" ]] || forget_failure "$name"
@@ -234,14 +251,16 @@ remember() {
   [[ -z $changed ]] ||
     for name in "${!before[@]}"; do printf '%s\t%s\n' "${name#x}" "${before[$name]}"; done | sort |
     put "$folder/manifest.txt" || exit 3
+  for name in "${found[@]}"; do [[ ! -e $folder/$name.h5 ]] || touch -- "$folder/$name.h5"; done
+  for name in "${extended[@]}"; do [[ ! -e $folder/$name.h5 ]] || touch -d @1 -- "$folder/$name.h5"; done
   [[ -z $door ]] || exec {door}<&-
 }
 
 # --- workers ---
 
-# Appends the overrides of member k to `arguments`. A value in quotes may contain ' --set '.
+# Appends the overrides of a member to `arguments`. A value in quotes may contain ' --set '.
 add_overrides() {
-  local rest=${overrides[$1]} pair quotes more
+  local rest=$1 pair quotes more
   while [[ $rest == '--set '* ]]; do
     rest=${rest#--set }
     pair=${rest%% --set *}
@@ -262,9 +281,9 @@ run_member() {
   local base=$folder/${names[$1]} status resume='' said
   said=$(last_words "${names[$1]}")
   local arguments=("$input" -o "$base.h5" --quiet)
-  add_overrides "$1"
+  add_overrides "${overrides[$1]}"
   [[ -z $said ]] || echo >&"$lock" # from an earlier attempt
-  [[ ! -e $base.h5.part ]] || resume=--resume
+  [[ ! -e $base.h5.part && ! -e $base.h5 ]] || resume=--resume
   while :; do
     "$program" "${arguments[@]}" $resume >"/dev/fd/$lock" 2>&1 </dev/null {events}>&- &
     child=$!
@@ -280,6 +299,9 @@ run_member() {
   done
   # The member was stopped while it started, or while bash waited for it a second time (-1: bash has lost the exit status).
   if [[ -n $stopping ]] && ((status >= 127 || status < 0)); then status=75; fi
+  if ((status == 3)) && [[ -e $base.h5 && $(last_words "${names[$1]}") == *"$is_finished"* ]]; then
+    touch -- "$base.h5" && status=0
+  fi
   ((status <= 128)) || tell_kill "$status" "$said" >&"$lock"
   printf '%s %s\n' "$1" "$status" >&"$events"
 }
@@ -311,13 +333,13 @@ work() {
   for k in "${!names[@]}"; do
     if [[ -n $stopping ]] || ! kill -0 $$ 2>/dev/null; then break; fi
     base=$folder/${names[k]}
-    if [[ -e $base.h5 ]] || ! mkdir "$claims/$k" 2>/dev/null; then continue; fi
+    if is_done "${names[k]}" || ! mkdir "$claims/$k" 2>/dev/null; then continue; fi
     if ! open_log "$base.log"; then
       printf '%s closed\n' "$k" >&"$events"
       continue
     elif ! flock -n "$lock"; then
       printf '%s busy\n' "$k" >&"$events"
-    elif [[ -e $base.h5 ]]; then
+    elif is_done "${names[k]}"; then
       printf '%s 0\n' "$k" >&"$events"
     elif [[ -n $share ]] && has_failed "${names[k]}"; then
       printf '%s failed before\n' "$k" >&"$events" # because this task was requeued
@@ -426,7 +448,7 @@ announce() {
 
 summarise() {
   finished=0
-  for name in "${names[@]}"; do [[ ! -e $folder/$name.h5 ]] || finished=$((finished + 1)); done
+  for name in "${names[@]}"; do ! is_done "$name" || finished=$((finished + 1)); done
   announce "$1"
   ((failed == 0)) || exit 1
   ((finished < total)) || return 0
@@ -443,7 +465,7 @@ prepare_shares() {
   local most=$1 k here left=0
   here=$(cd -- "$folder" && pwd)
   for k in "${!names[@]}"; do
-    [[ -e $folder/${names[k]}.h5 ]] || has_failed "${names[k]}" || printf '%s\t%s\n' "${names[k]}" "${overrides[k]}"
+    is_done "${names[k]}" || has_failed "${names[k]}" || printf '%s\t%s\n' "${names[k]}" "${overrides[k]}"
   done | put "$folder/left.txt" || exit 3
   left=$(wc -l <"$folder/left.txt")
   shares=$((left < most ? left : most))
@@ -455,8 +477,8 @@ prepare_shares() {
 judge_by_files() {
   local name said=''
   for name in "${names[@]}"; do
-    [[ -e $folder/$name.h5 ]] || said=$(last_words "$name")
-    [[ -e $folder/$name.h5 || $said =~ $goes_on && $said != killed* ]] || failure "$name" '' "$said"
+    is_done "$name" || said=$(last_words "$name")
+    is_done "$name" || [[ $said =~ $goes_on && $said != killed* ]] || failure "$name" '' "$said"
   done
 }
 
@@ -487,9 +509,9 @@ check_inputs() {
   for k in "${!names[@]}"; do
     kind="x${overrides[k]} "
     while [[ $kind =~ ^(.*)'--set run.seed='[^\ ]*' '(.*)$ ]]; do kind=${BASH_REMATCH[1]}${BASH_REMATCH[2]}; done
-    if [[ -n ${seen[$kind]:-} || -e $folder/${names[k]}.h5 ]] || has_failed "${names[k]}"; then continue; fi
+    if [[ -n ${seen[$kind]:-} ]] || is_done "${names[k]}" || has_failed "${names[k]}"; then continue; fi
     seen[$kind]=1 arguments=("$input" --check --quiet)
-    add_overrides "$k"
+    add_overrides "${overrides[k]}"
     reason=$("$program" "${arguments[@]}" 2>&1 </dev/null) || failure "${names[k]}" " (exit $?)" "${reason##*$'\n'}"
   done
   ((failed == 0)) || summarise 'nothing is submitted: correct the members that failed, or leave them out: '
@@ -627,7 +649,7 @@ program=${RICOCHET:-$program}
 if [[ -n $dry ]]; then
   for k in "${!names[@]}"; do printf '%s\t%s\n' "${names[k]}" "${overrides[k]}"; done
   arguments=("$input" --check --quiet) status=0
-  add_overrides 0
+  add_overrides "${overrides[0]}"
   reason=$("$program" "${arguments[@]}" 2>&1 </dev/null) || status=$?
   ((status != 2)) || die "member ${names[0]} cannot run: ${reason##*$'\n'}"
   ((status == 0)) || printf '%s: note: member %s cannot run yet: %s\n' "$me" "${names[0]}" "${reason##*$'\n'}" >&2
@@ -639,7 +661,7 @@ reason=$(mkdir -p -- "$folder" 2>&1) || fail 3 "cannot make $folder: ${reason##*
 
 total=${#names[@]} finished=0 failed=0 busy=0 ended=0 next_line=30 stopped='' claims=''
 workers=() failures=()
-for name in "${names[@]}"; do [[ ! -e $folder/$name.h5 ]] || finished=$((finished + 1)); done
+for name in "${names[@]}"; do ! is_done "$name" || finished=$((finished + 1)); done
 skipped=$finished
 if ((finished < total)); then
   [[ -w $folder ]] || fail 3 "cannot write into $folder"

@@ -24,7 +24,7 @@ SCRIPT = ROOT / "runs" / "ensemble.sh"
 
 # Notes each start in OUT.starts; waits until the file HOLD is gone; TERM makes a checkpoint.
 # `outcome.exit=N` fails with N, 2 with --check, too; 9 is a kill; after 4 it has broken off, and
-# does not resume.
+# does not resume.  No member can be continued with other settings.
 PROGRAM = """while (($#)); do
   case $1 in
   -o) out=${2%.h5} && shift ;;
@@ -34,6 +34,7 @@ PROGRAM = """while (($#)); do
   esac
   shift
 done
+[[ -z ${check:-} || -z ${resumed:-} ]] || exit 2
 [[ -z ${check:-} || ${outcome:-} == 2 ]] || exit 0
 out=${out:-$1.check}
 trap 'echo TERM >>"$out.signals"; touch "$out.h5.part"; exit 75' TERM INT

@@ -72,6 +72,39 @@ def test_finished_members_are_extended_with_the_same_bits(program, tmp_path):
 
 
 @pytest.mark.usefixtures("_tools")
+def test_the_script_extends_finished_members_with_the_same_bits(tmp_path):
+    """By another input or --set; a stop that is reached leaves them, other changes are refused."""
+    (tmp_path / "gas.nml").write_text(GAS)
+
+    def run(folder, *words):
+        script = [ROOT / "runs/ensemble.sh", tmp_path / "gas.nml", "-d", tmp_path / folder]
+        return ran(*script, "--seeds", "1-3", *words)
+
+    last = "stop.collisions_per_disk="
+    assert run("whole", "--set", f"{last}9").returncode == 0
+    assert run("set").returncode == run("input").returncode == 0
+    told = run("set", "--set", f"{last}9")
+    assert told.returncode == 0 and "3 of 3 members finished, 0 failed" in told.stderr
+    (tmp_path / "gas.nml").write_text(GAS.replace("disk = 5", "disk = 9"))
+    told = run("input")
+    assert told.returncode == 0 and "3 of 3 members finished, 0 failed" in told.stderr
+    for folder in ("set", "input"):
+        for name in ("seed_1", "seed_2", "seed_3"):
+            runs = [read_run(tmp_path / place / f"{name}.h5") for place in ("whole", folder)]
+            assert np.array_equal(*(one.position[-1] for one in runs))
+            assert np.array_equal(*(one.velocity[-1] for one in runs))
+    (tmp_path / "gas.nml").write_text(GAS)
+    before = (tmp_path / "input/seed_1.h5").read_bytes()
+    told = run("input")
+    assert told.returncode == 0 and "3 of 3 members finished" in told.stderr
+    assert (tmp_path / "input/seed_1.h5").read_bytes() == before
+    assert "3 of them before" in run("input").stderr
+    assert run("set", "--set", "species.a.count=31").returncode == 2
+    (tmp_path / "gas.nml").write_text(GAS.replace("count = 30", "count = 31"))
+    assert run("input").returncode == 2
+
+
+@pytest.mark.usefixtures("_tools")
 def test_what_a_member_would_refuse_is_refused_before_any_runs(tmp_path):
     with pytest.raises(ProgramError, match="from 0 to 1"):
         sweep(GAS, {"contact.restitution": [1, 2]}, tmp_path)

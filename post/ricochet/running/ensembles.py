@@ -236,8 +236,11 @@ def remember_alone(folder: Path, text: str, overrides: Mapping[str, str]) -> Non
             raise RunError(
                 f"{folder}: holds a member '{name}' with other settings ({before[name]})"
             )
+    from_elsewhere = [] if path.is_file() else [files_of(folder, name)[0] for name in overrides]
     if not path.is_file() or old != text:
         put(path, text)  # newer than the members that are finished: `run_member` extends them
+    for result in filter(None, from_elsewhere):
+        result.touch()  # it is left as it is
     lines = sorted(f"{name}\t{rest}\n" for name, rest in {**before, **overrides}.items())
     put(folder / "manifest.txt", "".join(lines))
 
