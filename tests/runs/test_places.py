@@ -1,4 +1,4 @@
-"""Objects in the places where a run reads and writes: links, pipes, devices, files of others."""
+"""Links, pipes, devices and foreign files at paths that a run reads or writes."""
 
 import os
 import shutil
@@ -24,7 +24,7 @@ PAUSE = "static int n; if (!n++) raise(SIGSTOP); return 0;"
 
 
 def everything_in(folder) -> dict[str, object]:
-    """Paths below a folder with what they hold, or where they lead."""
+    """Return the paths below a folder with the contents of files and targets of links."""
     return {str(path): what_stands(path) for path in Path(folder).rglob("*")}
 
 
@@ -35,7 +35,7 @@ def everything_in(folder) -> dict[str, object]:
 def test_what_no_run_has_made_is_neither_written_through_nor_removed(
     ricochet, tmp_path, place, kind
 ):
-    """By a new run, with --force or without, and by one that goes on."""
+    """This holds for new runs, with or without --force, and for continued runs."""
     write_input(tmp_path, SHORT)
     precious = tmp_path / "home" / "precious"
     precious.parent.mkdir()
@@ -78,7 +78,7 @@ def test_what_a_killed_run_has_half_made_is_in_nobodys_way(ricochet, tmp_path):
 
 
 def test_a_run_that_was_killed_before_its_first_checkpoint_goes_on(ricochet, started, tmp_path):
-    """From its start; it is deleted by --force only."""
+    """The run starts again; only --force deletes the file."""
     write_input(tmp_path, ENDLESS)
     process = started(*COMMAND)
     wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > 10)
@@ -163,7 +163,7 @@ EARLY = ["--set", "stop.time=0.5"]
 
 @pytest.fixture(params=BEGINNINGS)
 def beginning(request, ricochet, tmp_path):
-    """The options of a run, in whose place an earlier end of it is, or nothing."""
+    """Return the options of a run with or without an earlier result at its path."""
     write_input(tmp_path, SHORT)
     if BEGINNINGS[request.param]:
         assert ricochet(*COMMAND, *EARLY).returncode == FINISHED
@@ -171,7 +171,7 @@ def beginning(request, ricochet, tmp_path):
 
 
 def put(kind, place, other):
-    """Puts something where the result is to come."""
+    """Create an object at the path of the result."""
     if kind == "another run":
         shutil.copy(other, place.with_name("copy"))
         place.with_name("copy").replace(place)
@@ -196,7 +196,7 @@ def put(kind, place, other):
 
 
 def what_stands(place):
-    """The object of a name, so that it can be compared."""
+    """Return the object with a name in a form that can be compared."""
     return place.readlink() if place.is_symlink() else place.is_file() and place.read_bytes()
 
 
@@ -211,7 +211,7 @@ def what_stands(place):
 def test_what_has_come_since_the_run_began_is_left(
     ricochet, started, tmp_path, beginning, kind, moment
 ):
-    """The results stay in the .part, and take their name when the place is free."""
+    """The results stay in the .part file, which is renamed when the path is free."""
     other, place = tmp_path / "other.h5", tmp_path / "gas.h5"
     assert ricochet("gas.nml", "-o", other, *EARLY, "--set", "run.seed=2").returncode == FINISHED
     if moment == "while it runs":
@@ -238,7 +238,7 @@ def test_what_has_come_since_the_run_began_is_left(
 
 
 def test_a_copy_of_the_earlier_result_is_another_file(ricochet, tmp_path, beginning):
-    """In another folder the run goes on where no result is, and leaves one that is there."""
+    """In another folder the run continues if there is no result, and keeps an existing one."""
     assert ricochet(*COMMAND, *beginning, *AT_ONCE).returncode == STOPPED
     folder = tmp_path / "elsewhere"
     folder.mkdir()
@@ -271,7 +271,7 @@ def test_force_means_what_is_there_when_it_is_said(ricochet, tmp_path):
 
 
 def test_a_lock_that_was_removed_and_taken_anew_stays(started, tmp_path):
-    """The first run's end must not unlock the second."""
+    """The end of the first run must not unlock the second run."""
     write_input(tmp_path, ENDLESS)
     process = started(*COMMAND)
     wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > 10)

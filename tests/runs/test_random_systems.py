@@ -1,4 +1,4 @@
-"""Random systems, each run in many ways: the same bits by all of them, and the laws of every run.
+"""Random systems, run with many methods: results are bit-identical and satisfy general laws.
 
 Each runs plainly; on several threads; with another search and queue; in parts, that end by the
 clock, by TERM and by kill -9, each resumed in another way; to an earlier end, from which it is
@@ -33,15 +33,15 @@ from whole_runs import BROKEN, FINISHED, PATIENCE, STOPPED
 from whole_runs import contents, executable, ran, unlike, within
 
 SEEDS = [f"{os.environ.get('SEED', '1')} {k}" for k in range(int(os.environ.get("SYSTEMS", "60")))]
-SECONDS = 200  # of processor time: only something endless takes them
+SECONDS = 200  # of processor time, which only endless runs exceed
 PARTS = 5
 BYTES = os.environ.get("BYTES", "4000000000")  # of address space
 LATEST = 1e100  # that an input can name
 KILLED = (STOPPED, -signal.SIGTERM, -signal.SIGKILL)
 NOT_THE_END = ("placing disks:", "warning:", "note:", "stopped; the run is finished")
-#: How a system is refused whose disks do not fit into its box.
+#: Message for systems whose disks do not fit into the box.
 NO_ROOM = re.compile(r"species\.(radius|placement|file|position): ")
-#: Data that describe how the results were computed.
+#: Data that describe the computation and not the results.
 ASIDE = re.compile(
     r"^/parameters(/run@(search|queue)|/overrides|/output@checkpoint_every|/stop@wall_clock)$"
 )
@@ -51,17 +51,17 @@ MOVING_SIDE = re.compile(r"/observables/sides/\w+/(position|velocity)/value")
 
 
 class End(NamedTuple):
-    """Exit code and last message of a run; its processor time was over if it was `endless`."""
+    """Exit code and last message of a run; `endless` if it exceeded its processor time."""
 
     code: int
     message: str
 
 
 class Case:
-    """One system in a folder of its own."""
+    """A random system with its folder."""
 
     def __init__(self, program: Path, folder: Path, seed: str):
-        """Draws until a system is not refused, and writes its input."""
+        """Draw systems until one is accepted, and write its input."""
         self.program, self.folder, self.rng = program, folder, random.Random(seed)
         self.system = accepted(program, folder, self.rng)
 
@@ -74,12 +74,12 @@ class Case:
         return end_of(self.begin(name, *options, **more))
 
     def result(self, name: str) -> Path:
-        """The file that a run left: finished, or of a run that broke off."""
+        """Return the output file of a run, finished or not."""
         path = self.folder / f"{name}.h5"
         return path if path.exists() else Path(f"{path}.part")
 
     def way(self) -> list[str]:
-        """Random options that must not change a bit."""
+        """Return random options that must not change the results."""
         searches = ["pairs"] if self.system.disks <= 300 else []
         searches += ["rescan"] if self.system.disks <= 40 else []
         search = f"--set=run.search={self.rng.choice(['cells', 'cells', *searches])}"
@@ -96,7 +96,7 @@ class Case:
         return self.whole(name, *self.way())
 
     def in_parts(self, name: str, seconds: float) -> End:
-        """Stopped at its first look at the clock, then by signals at random moments."""
+        """Run in parts that are stopped at once and then by signals at random times."""
         end, options = End(STOPPED, ""), ["--set=output.checkpoint_every=1e-3"]
         for part in range(PARTS):
             first = ["--set=stop.wall_clock=1e-9"] if part == 0 else ["--resume"]
@@ -108,17 +108,17 @@ class Case:
             if end.code not in KILLED or (self.folder / f"{name}.h5").exists():
                 break
         if before.code == -signal.SIGKILL and "broke off" in end.message:
-            return end_of(self.begin(name, "--force"))  # killed when it had said so
+            return end_of(self.begin(name, "--force"))  # killed after its last message
         return End(FINISHED, "") if end.code == -signal.SIGKILL else end
 
     def continued(self, name: str, _seconds: float) -> End:
-        """Lets a run end early, by its time or by collisions, and later, and continues it."""
+        """End a run early, by time or by collisions, and continue it to a later end."""
         with h5py.File(self.result("plain")) as file:
             last = float(file["particles/disks/position/time"][-1])
             collisions = int(file["observables/collisions/value"][-1])
         times = sorted({min(self.rng.uniform(0, 0.99) * last, LATEST) for _ in "12"})
         ends = [f"time={time!r}" for time in times if last > 0]
-        in_steps = "'steps'" in self.system.text  # which end with all collisions of a step
+        in_steps = "'steps'" in self.system.text  # a step ends with all its collisions
         if collisions > 2 and not in_steps and self.rng.random() < 0.5:
             numbers = self.rng.sample(range(1, collisions), 2)
             ends = [f"collisions={number}" for number in sorted(numbers)]
@@ -131,7 +131,7 @@ class Case:
         return self.whole(name, *self.way(), *resume)
 
     def in_memory(self, name: str, _seconds: float) -> End:
-        """In slices of time in this process, saved and loaded; to its end by the program."""
+        """Run in this process in parts, save and load, and end the run with the program."""
         with h5py.File(self.result("plain")) as file:
             last = float(file["particles/disks/position/time"][-1])
         pairs = (word.removeprefix("--set=").split("=") for word in self.way())
@@ -159,7 +159,7 @@ class Case:
         return self.whole(name, *self.way(), *self.samples(self.rng.randint(3, 20)))
 
     def samples(self, count: int) -> list[str]:
-        """Options for about so many samples, whatever the input wants."""
+        """Return options for about the given number of samples."""
         tracks = ("frames_every", "observables_every")
         names = [f"{track}_{kind}" for track in tracks for kind in CADENCES]
         words = [f"{name}=" for name in names if name in self.system.text]
@@ -167,7 +167,7 @@ class Case:
         return [f"--set=output.{word}" for word in words]
 
     def nearly_stands_still(self) -> bool:
-        """Whether walls stop disks or spins until their squares vanish: then units matter."""
+        """Return whether disks or spins are so slow that squares underflow: then units matter."""
         self.whole("often", *self.samples(500), "--set=output.precision='double'")
         found = contents(self.result("often"))
         moving = [found[p] for p in found if p.endswith(("velocity/value", "orientation/value"))]
@@ -175,7 +175,7 @@ class Case:
         return any(np.any((value != 0) & (np.abs(value) < least)) for value in moving)
 
     def in_other_units(self, name: str, _seconds: float) -> End:
-        """Lengths, velocities and masses times powers of two, which change no digit."""
+        """Return the input with lengths, velocities and masses multiplied by powers of two."""
         length, speed, mass = (2.0 ** self.rng.randint(-30, 30) for _ in range(3))
         self.units = {"length": length, "velocity": speed, "mass": mass, "s": 1}
         self.units |= {"time": length / speed, "energy": mass * speed**2}
@@ -189,7 +189,7 @@ class Case:
         return self.whole(name, *self.way(), text="other.nml")
 
 
-#: Units of what a frame and the observables have, and of columns of starting files.
+#: Units of the data of frames, observables and columns of starting files.
 UNITS = {
     "/particles/disks/position/value": "length",
     "/particles/disks/position/time": "time",
@@ -207,12 +207,12 @@ COLUMNS |= {"mass": "mass", "omega": "1 / time", "angle": "1"}
 
 @functools.cache
 def table_of(program: Path) -> dict:
-    """The program's own table of variables."""
+    """Return the table of variables of the program."""
     return json.loads(ran(program, "--print-variables", check=True).stdout)
 
 
 def rescaled(line: str, units: dict, table: dict) -> str:
-    """A group of the input in other units; sizes that are relative to others have none."""
+    """Return a group of the input in other units; relative sizes are dimensionless."""
     group = re.match(r"&?(\w*)", line)[1]
 
     def value(match: re.Match) -> str:
@@ -226,7 +226,7 @@ def rescaled(line: str, units: dict, table: dict) -> str:
 
 
 def end_of(process: subprocess.Popen) -> End:
-    """How a process ends."""
+    """Return the end of a process."""
     try:
         lines = process.communicate(timeout=PATIENCE)[1].splitlines()
     except subprocess.TimeoutExpired:
@@ -237,7 +237,7 @@ def end_of(process: subprocess.Popen) -> End:
 
 
 def accepted(program: Path, folder: Path, rng: random.Random, **options: int) -> System:
-    """The first system that the program does not refuse, with its files."""
+    """Return the first system that the program accepts, with its files."""
     for _ in range(20):
         system = random_system(rng, **options)
         if is_accepted(program, folder, system):
@@ -257,7 +257,7 @@ def is_accepted(program: Path, folder: Path, system: System) -> bool:
 
 
 def last_samples(found: dict) -> dict:
-    """All that the last samples say, but not how many came before.
+    """Return the values of the last samples without their numbers.
 
     A run in which nothing will ever happen ends at its last sample, whenever that is. Sides that
     move depend on this time, and on nothing else.
@@ -272,7 +272,7 @@ def last_samples(found: dict) -> dict:
 
 
 def faults(program: Path, folder: Path, seed: str) -> str:
-    """Faults of a random system; empty if there are none."""
+    """Return the faults of a random system; empty without faults."""
     case = Case(program, folder, seed)
     began = time.monotonic()
     plain = case.whole("plain")
@@ -291,7 +291,7 @@ def faults(program: Path, folder: Path, seed: str) -> str:
             said.append(f"ends otherwise: {name} {end}, plain {plain}")
             continue
         own, other = found, contents(case.result(name))
-        # Of a collapse the number of collisions: times have other units.
+        # For a collapse the number of collisions is compared, because times have other units.
         notes = {bytes(file["/provenance@note"]).split(b", the first")[0] for file in (own, other)}
         nearly = way == case.in_other_units and case.nearly_stands_still()
         if len(notes) > 1 and not nearly:
@@ -315,11 +315,11 @@ def test_all_ways_end_alike_and_the_laws_hold(program, tmp_path, seed):
 
 # --- what the harness itself promises ---
 
-#: Variables that say how a run is done, or need another run.
+#: Variables of the execution of a run, or that require another run.
 NOT_DRAWN = {"run.title", "run.search", "run.queue", "run.threads", "stop.wall_clock"}
 NOT_DRAWN |= {"species.scale_positions", "obstacle.file"}
 NOT_DRAWN |= {"wall.file"}
-#: Features that are refused together, or of which a system has only one.
+#: Features that are refused together, or that exclude each other in a system.
 APART = [
     ("box.shear_rate", r"obstacle|wall|side|box\.gravity|run\.d|stop\.energy"),
     (
@@ -341,7 +341,7 @@ APART = [
 
 
 def test_the_systems_draw_every_variable(program, tmp_path):
-    """If chance leaves one out, another SEED has it."""
+    """If a variable is missing by chance, use another SEED."""
     table = table_of(program)
     known = {f"{group}.{name}" for group in table for name in table[group]}
     rngs = (random.Random(seed) for seed in SEEDS)
@@ -350,7 +350,7 @@ def test_the_systems_draw_every_variable(program, tmp_path):
 
 
 def test_many_systems_draw_every_pair_of_features_that_goes_together(program, tmp_path):
-    """And the program accepts them."""
+    """The program accepts these systems."""
     pairs, features = set(), set()
     for seed in range(6000):
         system = random_system(random.Random(seed))

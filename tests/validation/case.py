@@ -12,19 +12,19 @@ from ricochet.analysis.statistics import Estimate, SeriesMean
 
 @dataclass(frozen=True)
 class Member:
-    """One run of the program. Its input may be made from runs that come before it."""
+    """One run of the program, whose input may depend on the results of earlier runs."""
 
     text: str | Callable[..., str]
     after: tuple["Member", ...] = ()
-    exit_codes: tuple[int, ...] = (0,)  # a run that breaks off on purpose is read from its .part
+    exit_codes: tuple[int, ...] = (0,)  # read the .part file of a run that stops early
 
 
 class Tolerance(NamedTuple):
-    """How far a measured value may be from the reference."""
+    """Allowed deviation of a measured value from the reference."""
 
     text: str
     allowed: Callable[[np.ndarray, np.ndarray], np.ndarray]  # of reference and standard error
-    one_sided: int = 0  # +1: only too large is wrong, -1: only too small
+    one_sided: int = 0  # +1: only larger values fail, -1: only smaller values fail
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,13 @@ class Case:
 
 
 class Verdict(NamedTuple):
-    """The value, of several the one that comes nearest to its tolerance, and whether all pass."""
+    """The value (of several, the one nearest to its tolerance), and whether all values pass."""
 
     case: Case
     values: int
     reference: float
     measured: float
-    error: float  # standard error, zero if there is none
+    error: float  # standard error, zero without an error
     used: float  # deviation over allowed deviation
     problem: str = ""
 
@@ -57,18 +57,18 @@ class Verdict(NamedTuple):
 
 
 def within(deviation: float) -> Tolerance:
-    """An absolute tolerance."""
+    """Return an absolute tolerance."""
     return Tolerance(f"{deviation:g}", lambda ref, _: np.full_like(ref, deviation))
 
 
 def relative(deviation: float) -> Tolerance:
-    """A relative tolerance."""
+    """Return a relative tolerance."""
     text = f"{100 * deviation:.3g} %" if deviation >= 1e-4 else f"{deviation:g} relative"
     return Tolerance(text, lambda ref, _: deviation * np.abs(ref))
 
 
 def sigmas(count: float, deviation: float = np.inf) -> Tolerance:
-    """So many standard errors of the measurement, and a relative tolerance."""
+    """Return a tolerance of `count` standard errors of the measurement plus a relative one."""
     text = f"{count:g} sigma" + (f" and {100 * deviation:.3g} %" if deviation < np.inf else "")
     return Tolerance(text, lambda ref, error: np.minimum(count * error, deviation * np.abs(ref)))
 
@@ -79,7 +79,7 @@ AT_LEAST = Tolerance("at least", lambda ref, _: np.zeros_like(ref), -1)
 
 
 def judge(case: Case, runs: list) -> Verdict:
-    """Measure a case; whatever goes wrong in that is a failed case, not the end of the others."""
+    """Measure a case; an error fails this case but does not stop the other cases."""
     try:
         result = case.measure(*runs)
     except Exception as problem:
@@ -103,7 +103,7 @@ def judge(case: Case, runs: list) -> Verdict:
 def shares(
     tolerance: Tolerance, measured: np.ndarray, reference: np.ndarray, error: np.ndarray
 ) -> np.ndarray:
-    """Deviation over allowed deviation; infinite where none is allowed, NaN (no pass) for NaN."""
+    """Return deviations over allowed ones; infinite if none is allowed, NaN (failed) for NaN."""
     same = measured == reference  # infinite values too
     with np.errstate(invalid="ignore", divide="ignore"):
         deviation = np.where(same, 0.0, measured - reference)
@@ -113,5 +113,5 @@ def shares(
 
 
 def failed(case: Case, problem: str) -> Verdict:
-    """A case that could not be measured."""
+    """Return the verdict of a case that could not be measured."""
     return Verdict(case, 0, np.nan, np.nan, np.nan, np.inf, problem)

@@ -24,7 +24,7 @@ def rate(eta: float) -> float:
 
 
 def watched(seeds: int, eta: float, step: float, frames: int) -> tuple[Member, ...]:
-    """Frames `step` mean free times apart."""
+    """Return an input with frames `step` mean free times apart."""
     interval = step / rate(eta)
     return gases(
         seeds, N, packing_fraction=eta, periodic=True, temperature=1.0,
@@ -34,12 +34,12 @@ def watched(seeds: int, eta: float, step: float, frames: int) -> tuple[Member, .
 
 
 def mean_free_time(run: Run) -> float:
-    """1 / w of this run: its energy is its own."""
+    """Return 1 / w of a run at its energy."""
     return run.n_disks * run.time[-1] / (2 * run.observable("collisions").value[-1])
 
 
 def found(run: Run, free_times: np.ndarray) -> dict:
-    """The curves of a run without its start, at these lags."""
+    """Return the time correlations of a run, without its start, at the given lags."""
     time, unit = run.time[later(run)], mean_free_time(run)
     step = time[1] - time[0]
     lags = step * np.round(free_times * unit / step)
@@ -47,14 +47,14 @@ def found(run: Run, free_times: np.ndarray) -> dict:
 
 
 def half_and_one(run: Run) -> list[float]:
-    """The psi at w t = 1/2 and 1, interpolated between frames."""
+    """Return psi at w t = 1/2 and 1, interpolated between frames."""
     t, vacf, _ = found(run, np.arange(6) / 4)["vacf"]
     psi = vacf[1:] / vacf[0]
     return list(np.exp(np.interp((0.5, 1.0), t[1:] / mean_free_time(run), np.log(psi))))
 
 
 def enskog_ratio(run: Run) -> float:
-    """Slope of <dx^2> / 4 between w t = 8 and 28, over the Enskog value."""
+    """Return the slope of <dx^2> / 4 between w t = 8 and 28, divided by Enskog's value."""
     t, msd, _ = found(run, np.array([8, 28]))["msd"]
     kt = np.sum(run.kinetic_energy(0)) / (run.n_disks - 1)
     eta = 0.05

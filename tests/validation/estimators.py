@@ -1,4 +1,4 @@
-"""Measurements that several sections share: pure functions of a run."""
+"""Measurements that several sections use, as pure functions of a run."""
 
 from collections.abc import Callable
 
@@ -17,22 +17,22 @@ from ricochet.analysis.thermodynamics import steps
 
 
 def each(measure: Callable[[Run], ArrayLike]) -> Callable[..., np.ndarray]:
-    """A measurement of each run, as a function of all of them."""
+    """Return a function that measures each of several runs."""
     return lambda *runs: np.ravel([measure(run) for run in runs])
 
 
 def over(measure: Callable[[Run], ArrayLike]) -> Callable[..., Estimate]:
-    """The mean of a measurement over independent runs, with the error from their scatter."""
+    """Return a function for the mean of a measurement over runs, and the error of the mean."""
     return lambda *runs: estimate([measure(run) for run in runs])
 
 
 def pooled(measure: Callable[[Run], SeriesMean]) -> Callable[..., SeriesMean]:
-    """The mean over runs whose own means have errors."""
+    """Return a function for the mean over runs whose means have errors."""
     return lambda *runs: combine_runs([measure(run) for run in runs])
 
 
 def middle(measure: Callable[[Run], ArrayLike]) -> Callable[..., np.ndarray]:
-    """The median over independent runs.
+    """Return a function for the median over independent runs.
 
     For tests that reject one right sample in a hundred: the median of three runs is rejected once
     in some 3000; a wrong law shows in all of them.
@@ -41,28 +41,28 @@ def middle(measure: Callable[[Run], ArrayLike]) -> Callable[..., np.ndarray]:
 
 
 def several(means: list[SeriesMean]) -> Estimate:
-    """Several means as one with vectors."""
+    """Return several means as a mean with vector values."""
     return Estimate(*np.array([(one.mean, one.error) for one in means]).T)
 
 
 def angular_momentum(run: Run) -> np.ndarray:
-    """About the origin, in all frames."""
+    """Return the angular momentum about the origin in all frames."""
     x, v = run.position[:], run.velocity[:]
     return np.sum(run.mass * (x[..., 0] * v[..., 1] - x[..., 1] * v[..., 0]), axis=1)
 
 
 def at_collisions(run: Run, name: str, tau: np.ndarray) -> np.ndarray:
-    """An observable after so many collisions per disk."""
+    """Return an observable after a number of collisions per disk."""
     return np.interp(tau, run.collisions_per_disk.value, run.observable(name).value)
 
 
 def hit_rate(run: Run) -> SeriesMean:
-    """Hits of all sides per time."""
+    """Return the rate of collisions with all sides."""
     s = steps(run)
     return correlated_mean(s.hits, s.time)
 
 
 def force(run: Run) -> SeriesMean:
-    """Mean force on one side."""
+    """Return the mean force on a side."""
     s = steps(run)
     return correlated_mean(s.impulse.mean(axis=1), s.time)

@@ -12,18 +12,18 @@ ROOT_2 = 1.4142135623730951  #: speed at which K = m, so kT = 1
 
 
 def namelist(**groups: dict | list[dict]) -> str:
-    """Groups of variables; a list of dictionaries is a group that is repeated."""
+    """Return groups of variables as text; a list of dictionaries is a repeated group."""
     return program.namelist(groups)
 
 
 def ensemble(seeds: int | Iterable[int], *, run: dict = {}, **groups) -> tuple[Member, ...]:  # noqa: B006
-    """Runs of one input with these seeds; a number stands for those from 1 on."""
+    """Return runs of one input with the given seeds; a number n stands for 1 to n."""
     seeds = range(1, seeds + 1) if isinstance(seeds, int) else seeds
     return tuple(Member(namelist(run={"seed": seed} | run, **groups)) for seed in seeds)
 
 
 def gases(seeds: int | Iterable[int], count: int, *, periodic=False, **more) -> tuple[Member, ...]:
-    """`count` equal disks, speeds sqrt 2, so kT = 1 between walls.
+    """Return an input of `count` equal disks with speeds sqrt 2, so that kT = 1 between walls.
 
     `more` goes to the group of that name, such as stop or contact, or else to the species.
     """
@@ -36,12 +36,12 @@ def gases(seeds: int | Iterable[int], count: int, *, periodic=False, **more) -> 
 
 
 def light_and_heavy(seeds: int | Iterable[int], radius: float, **groups) -> tuple[Member, ...]:
-    """A gas of equal sizes and speeds, half of it with four times the mass of the others."""
+    """Return a gas of equal sizes and speeds; half of the disks have four times the mass."""
     disks = {"count": 500, "radius": radius, "speed": 1.0}
     species = [{"name": "light", **disks}, {"name": "heavy", "mass": 4.0, **disks}]
     return ensemble(seeds, species=species, **groups)
 
 
 def disk(position: tuple, velocity: tuple, radius: float, mass: float = 1.0) -> dict:
-    """A species of one disk, or of several: coordinates one after the other."""
+    """Return a species of one disk, or of several disks with successive coordinates."""
     return {"position": position, "velocity": velocity, "radius": radius, "mass": mass}
