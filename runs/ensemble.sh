@@ -116,6 +116,7 @@ generate_members() {
   done
 }
 
+# Reads the members of the manifest from standard input.
 read_manifest() {
   local line rest
   while IFS= read -r line || [[ -n $line ]]; do
@@ -131,10 +132,10 @@ read_manifest() {
     rest=${rest#"${rest%%[![:blank:]]*}"}
     rest=${rest%"${rest##*[![:blank:]]}"}
     [[ -z $rest || $rest == '--set '* ]] ||
-      die "$1: member '${names[-1]}': '$rest' does not begin with --set"
+      die "$manifest: member '${names[-1]}': '$rest' does not begin with --set"
     overrides+=("$rest")
-    ((${#names[@]} <= most)) || die "$1: more than $most members"
-  done <"$1"
+    ((${#names[@]} <= most)) || die "$manifest: more than $most members"
+  done
 }
 
 check_names() {
@@ -618,7 +619,12 @@ done
 if [[ -n $manifest ]]; then
   [[ -z $seeds && ${#scans[@]} == 0 ]] || die "--manifest cannot be combined with --seeds or --scan"
   [[ -f $manifest && -r $manifest ]] || die "cannot read $manifest, or it is not an ordinary file"
-  read_manifest "$manifest"
+  if [[ -n $share ]]; then # a share reads its own lines: a long list takes seconds
+    read_manifest < <(awk -v k="${share%/*}" -v m="${share#*/}" 'NR % m == k % m' "$manifest")
+    ((${#names[@]} > 0)) || exit 0
+  else
+    read_manifest <"$manifest"
+  fi
 else
   [[ -n $seeds || ${#scans[@]} -gt 0 ]] || die "no members are given: use --seeds, --scan or --manifest"
   [[ -z $seeds ]] || scan_seeds "$seeds"
@@ -630,12 +636,12 @@ for k in "${!overrides[@]}"; do
   overrides[k]=${common:+$common${overrides[k]:+ }}${overrides[k]}
 done
 
-# The K-th of M shares consists of the members K, K + M, K + 2M, ...
+# The K-th of M shares consists of the members K, K + M, K + 2M, ..., or of the lines with these numbers in a manifest.
 if [[ -n $share ]]; then
   task=${SLURM_ARRAY_JOB_ID:+${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID:-}}
   task=${task:-share $share}
   for k in "${!names[@]}"; do
-    (((k + 1 - ${share%/*}) % ${share#*/} == 0)) || unset "names[k]" "overrides[k]"
+    [[ -n $manifest ]] || (((k + 1 - ${share%/*}) % ${share#*/} == 0)) || unset "names[k]" "overrides[k]"
   done
   names=("${names[@]}") overrides=("${overrides[@]}")
   ((${#names[@]} > 0)) || exit 0

@@ -342,6 +342,17 @@ def processes_of(folder) -> dict[int, list[str]]:
     return found
 
 
+@pytest.mark.parametrize("shares", [1, 2, 3, 9])
+def test_each_member_of_a_manifest_is_in_one_share(lab, shares):
+    """Also if lines are no members, and if there are more shares than members."""
+    manifest = lab / "members.txt"
+    manifest.write_text("# members\na\nb\t--set run.seed=2\n\nc\nd\ne")
+    for k in range(1, shares + 1):
+        done = ensemble(lab, "--manifest", str(manifest), "--share", f"{k}/{shares}")
+        assert done.returncode == 0, done.stderr
+    assert {name: len(lines) for name, lines in starts(lab).items()} == dict.fromkeys("abcde", 1)
+
+
 def test_two_copies_share_the_members(lab):
     copies = [started(lab, "--seeds", "1-12", "-j", "4", members=4) for _ in range(2)]
     (lab / "hold").unlink()
