@@ -101,8 +101,8 @@ def destination(path: Path) -> Path:
 class TemporaryFolder:
     """Folder of a run without output, removed when nothing that reads its file is alive any more.
 
-    A run that a worker process returns is removed by the process that receives it; a run that is
-    sent to workers, when this process ends.
+    If a worker process returns a run, the receiving process removes its files.  If a run is sent to
+    workers, its files are removed when this process ends.
     """
 
     def __init__(self, path: Path | None = None):
@@ -124,7 +124,7 @@ class TemporaryFolder:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Hand the folder over."""
+        """Transfer the responsibility for removing the folder."""
         in_worker = multiprocessing.parent_process() is not None
         self.removal.cancel() if in_worker else self.keep()
         return received, (self.path, in_worker)
