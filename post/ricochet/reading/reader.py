@@ -159,7 +159,7 @@ class Run:
     parameters: dict[str, Any]  # group -> variable -> value used in the run
     provenance: dict[str, Any]
     units: Units = field(default=UNNAMED, kw_only=True)  # names of the units for labels of axes
-    folder: object = field(default=None, kw_only=True, repr=False)  # keeps a temporary file
+    _folder: object = field(default=None, kw_only=True, repr=False)  # keeps a temporary file
 
     def __repr__(self) -> str:
         """Return one line for any number of disks."""
@@ -946,7 +946,7 @@ def run_of(path: Path, file: h5py.File, folder: object = None) -> Run:
         walls=walls_of(parameters),
         parameters=parameters,
         provenance=tree(file["provenance"]),
-        folder=folder,
+        _folder=folder,
     )
 
 
