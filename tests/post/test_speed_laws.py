@@ -56,10 +56,14 @@ def test_p_values_are_uniform_where_the_law_holds(tmp_path, rng, system):
 
 def test_a_wrong_law_has_a_tiny_p_value(tmp_path, rng):
     """Wrong laws are equal speeds, and a2 = 0.1 as in a gas with white-noise driving."""
-    angle = rng.uniform(0, 2 * np.pi, (20, 500))
-    equal = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    noisy = rng.normal(size=(20, 500, 2)) * rng.gamma(10, 1 / 10, (20, 500, 1)) ** 0.5
-    for k, v in enumerate((equal, noisy)):
-        run = written(tmp_path / f"{k}.h5", 0 * v, v)
-        test = speed_laws.speed_test([run], [range(20)], run.names[0])
-        assert test.ks_p < (1e-12 if k == 0 else 1e-4) and test.chi2_p < 0.01
+    for law, most in (("equal", 1e-12), ("noisy", 1e-4)):
+        tests = []
+        for k in range(5):  # in one of them chance may lessen the number of independent speeds
+            angle = rng.uniform(0, 2 * np.pi, (20, 500))
+            v = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+            if law == "noisy":
+                v = rng.normal(size=v.shape) * rng.gamma(10, 1 / 10, (20, 500, 1)) ** 0.5
+            run = written(tmp_path / f"{law}{k}.h5", 0 * v, v)
+            tests.append(speed_laws.speed_test([run], [range(20)], run.names[0]))
+        assert np.median([test.ks_p for test in tests]) < most
+        assert np.median([test.chi2_p for test in tests]) < 0.01

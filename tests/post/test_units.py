@@ -38,7 +38,7 @@ def test_units_are_made_of_length_time_and_mass():
         ("lenght=m", "'lenght' is not one of length, time, mass, energy; did you mean length?"),
         ("time", "'time' has no name of a unit, as length=cm has"),
         ("time=", "'time=' has no name of a unit, as length=cm has"),
-        ("time=s,time=h", "time is there twice"),
+        ("time=s,time=h", "time is given twice"),
     ],
 )
 def test_what_is_no_name_of_a_unit_is_refused(capsys, text, problem):

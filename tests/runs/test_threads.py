@@ -104,7 +104,7 @@ def test_too_little_memory_for_domains_is_said(program, gas):
     """As on a machine that has enough of it for one core, and not for several."""
     facts = Path("/proc/meminfo").read_text().splitlines()
     facts = [line for line in facts if not line.startswith("MemAvailable")]
-    (gas / "meminfo").write_text("\n".join(["MemAvailable: 29500 kB", *facts]))
+    (gas / "meminfo").write_text("\n".join(["MemAvailable: 14000 kB", *facts]))
     script = f"mount --bind meminfo /proc/meminfo && exec {program} gas.nml -o many.h5"
     command = ["unshare", "-m", "sh", "-c", f"{script} --set run.threads=2"]
     done = ran(*command, cwd=gas)
