@@ -12,7 +12,8 @@ from textwrap import dedent
 
 from input_page import GROUPS, LAW, said, variables, written
 
-#: Section of the manual page for each paragraph of --help, by the word before its colon.
+#: Section of the manual page for each paragraph of --help.  The key is the word with which the
+#: paragraph begins, if a colon follows this word.
 SECTIONS = {
     "usage": "SYNOPSIS",
     "members": "OPTIONS",

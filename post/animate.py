@@ -59,7 +59,7 @@ def film_path(wish: Path | None, run: Run) -> Path:
 def animate(
     run: Run, frames: list[int], colour: str | None = None, fps: float = 25
 ) -> animation.FuncAnimation:
-    """Write a film of these frames, `fps` of them per second.
+    """Write a film of these frames at `fps` frames per second.
 
     `colour` is "species" or a word of `COLOURINGS`.
     """

@@ -9,8 +9,9 @@ estimated from the numbers of disks. The row below compares all xi on a logarith
 the kinetic energy per disk of each species in units of the initial mean over all disks; bands are
 errors of the means.  The lowest row shows the temperature of the heaviest species over that of the
 lightest, which is 1 in equilibrium; it is omitted if all masses are equal.  With fewer than four
-runs its band is twice the scatter of single runs.  The table contains all curves: those against
-collisions per disk in these reduced units, and those against time in the units of the input.
+runs the half-width of its band is twice the standard deviation over single runs.  The table
+contains the energies against collisions per disk in these reduced units, and the energies against
+time in the units of the input.
 """
 
 from itertools import chain, cycle
@@ -84,9 +85,10 @@ def draw_overview(figure: plt.Figure, places: tuple, runs: list[Run], found: lis
 
 
 def randomised(run: Run, kind: Species, tau: np.ndarray) -> np.ndarray:
-    """Return the variance of the energies of a species' disks over their squared mean.
+    """Return the variance of the energies of one species, divided by the squared mean energy.
 
-    Collisions change it from its initial value to 1, the value of an exponential distribution.
+    Collisions change this ratio from its initial value to 1, the value of an exponential
+    distribution.
     """
     first = run.kinetic_energy(0)[kind.disks]
     start = float(np.var(first) / np.mean(first) ** 2) if np.any(first) else 1.0
@@ -94,7 +96,7 @@ def randomised(run: Run, kind: Species, tau: np.ndarray) -> np.ndarray:
 
 
 def expected_scatter(run: Run, energies: dict[str, np.ndarray], tau: np.ndarray) -> dict:
-    """Return the expected scatter between runs of the mean energy of each species and of "all".
+    """Return the expected scatter of the mean energies of each species and of "all" disks.
 
     The scatter is the standard deviation over single runs.
 
@@ -117,7 +119,8 @@ def expected_scatter(run: Run, energies: dict[str, np.ndarray], tau: np.ndarray)
 def scatter(runs: list[Run], found: Curves) -> dict[str, np.ndarray]:
     """Return the standard deviation of each energy over single runs, against time.
 
-    It is measured if there are at least four runs; otherwise it is the expected scatter.
+    The standard deviation is measured if there are at least four runs; otherwise the expected
+    scatter is returned.
     """
     names = ("all", *runs[0].names)
     if len(runs) >= FEWEST_RUNS:
@@ -129,7 +132,7 @@ def scatter(runs: list[Run], found: Curves) -> dict[str, np.ndarray]:
 
 
 def ratio_band(runs: list[Run], found: Curves) -> np.ndarray:
-    """Return the error of the temperature ratio; for few runs, twice a single run's scatter."""
+    """Return the error of the temperature ratio or, for few runs, twice its scatter over runs."""
     if len(runs) >= FEWEST_RUNS:
         return found["ratio"].error
     both = [runs[0].by_species[k] for k in lightest_and_heaviest(runs[0])]

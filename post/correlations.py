@@ -8,14 +8,14 @@ means over the runs, bands are errors.  Frames may be spaced equally or logarith
 mean diameter.  Equilibrium begins after --equilibration or, without that option, when no observable
 drifts any longer.  Earlier frames are used for a2 only.  For gases that cool or flow, only a2 and
 the structure are computed.  The structure is an average over the frames after --equilibration;
-without that option it is an average over the frames without drift or, in a gas that cools, over
-those later than 15 collisions per disk.  Dashed lines show the species of a mixture.
+without that option it is an average over the frames without drift or, in a gas that cools, over the
+frames later than 15 collisions per disk.  Dashed lines show the species of a mixture.
 
 The time correlations are those of the package's `correlations`, whose docstring explains how pairs
 of frames are chosen: the velocity autocorrelation <v(0) v(t)>, in theory exp(-w t) at short times
 and 1/t at long times (mode coupling); the mean square displacement; F_s(k, t) = <exp(i k r)> at
---wavenumber; the non-Gaussian parameter alpha2 = <r^4> / (2 <r^2>^2) - 1.  The table also has the
-share of disks within 0.3 diameters of their first position (overlap).
+--wavenumber; the non-Gaussian parameter alpha2 = <r^4> / (2 <r^2>^2) - 1.  The table also contains
+the overlap, which is the fraction of the disks within 0.3 diameters of their first position.
 
 D(t) is a quarter of the slope of the mean square displacement between neighbouring lags.  It is
 also half the integral of <v(0) v(s)> from 0 to t.  This integral is computed as half of <v(0) (x(t)
@@ -23,9 +23,9 @@ also half the integral of <v(0) v(s)> from 0 to t.  This integral is computed as
 between collisions, only the first definition applies.  Enskog's D_E is shown for equal smooth disks
 of fixed energy.  In two dimensions the long-time tail makes D(t) grow as the logarithm of t without
 limit: a value of D applies to one time and one box, because the size of the box matters once sound
-has crossed it.  The table contains D from both definitions, averaged between half of `D_time` and
-`D_time`; the two values must agree.  `D_time` is the time in which sound crosses the box, or an
-eighth of the run if that is shorter.  D requires a periodic box and equally spaced frames.
+has crossed it.  The table contains D from both definitions, averaged over the lags from `D_time` /
+2 to `D_time`; the two values must agree.  `D_time` is the time in which sound crosses the box, or
+an eighth of the run if that is shorter.  D requires a periodic box and equally spaced frames.
 
 a2 = <v^4> / (2 <v^2>^2) - 1, the second Sonine coefficient with each species at its own
 temperature, is 0 in equilibrium and -1/2 for equal speeds.  S(k) = <|sum of exp(i k x)|^2> / N.

@@ -4,8 +4,8 @@
 
 The script reads the collisions per second of processor time that each run records, and uses the
 fastest of several equal runs.  The lines are powers of N fitted to the points with N in --fit.
-Below that range the cost of the collision itself is not small compared with the search; above it
-disks no longer fit into the caches.
+Below that range the cost of the collision itself is not small compared with the search; above that
+range the data of the disks no longer fit into the caches.
 """
 
 from ricochet import Run
@@ -48,7 +48,7 @@ def fits(measured: dict, low: float, high: float) -> dict[str, PowerLaw]:
 def draw(
     runs: list[Run], measured: dict, laws: dict[str, PowerLaw], low: float, high: float
 ) -> plt.Figure:
-    """Draw on logarithmic axes; the fits are dotted outside their range."""
+    """Draw times and fits on logarithmic axes; fits are dotted outside their range."""
     figure, axes = plt.subplots(figsize=(7, 5.5))
     for search, colour, marker in zip(LABELS, COLOURS, "osD", strict=False):
         if search in measured:

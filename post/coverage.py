@@ -5,9 +5,9 @@
 The input is a set of many runs that differ only by their seed, at one or more packing fractions.  Z
 is computed from the virial of each run, with an error that is half the width of the 68 % interval.
 The true value is taken as the mean over all runs of a packing fraction.  If the errors are correct,
-68 of 100 intervals contain the true value, and the errors equal the scatter of the means.  For
-comparison the script also computes the error that treats all samples of the observables as
-independent.
+68 of 100 intervals contain the true value, and the errors equal the standard deviation of the means
+of single runs.  For comparison the script also computes the error that treats all samples of the
+observables as independent.
 """
 
 from ricochet import Run, RunError

@@ -5,13 +5,13 @@
 
 The projectile is the species 'projectile', or else the only disk that moves at the start.  All
 other disks form the bed.  The sizes are: `hit`, the number of bed disks that collided at least
-once; `displaced`, the number of bed disks that are now further than one radius from their first
-position; `width` and `depth`, the extent of the first positions of the displaced ones, from the rim
-of the bed downwards; `hole_width` and `hole_depth`, the extent of the hole, where more than half of
-the bed's packing is gone, smoothed over a few disks.  Runs in which the bed moves without a
-projectile, for example under gravity, are refused.  A crater is marked if the walls affect it
-(their collisions exceed 1 % of the number of disks), or if the run ended with more energy left than
-`stop.energy_fraction`.
+once; `displaced`, the number of bed disks that are further than one radius from their first
+position in the last frame; `width` and `depth`, the extent of the first positions of the displaced
+disks, where the depth is measured downwards from the surface of the bed; `hole_width` and
+`hole_depth`, the extent of the hole, in which the packing fraction, smoothed over a few disks, is
+below half of that of the bed.  Runs in which the bed moves without a projectile, for example under
+gravity, are refused.  A crater is marked if the walls affect it (their collisions exceed 1 % of the
+number of disks), or if the run ended with more energy left than `stop.energy_fraction`.
 """
 
 from ricochet import Run, crater, drawing

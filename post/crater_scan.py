@@ -9,9 +9,10 @@ printed notes and on the figure.  Points are means over the runs, with error bar
 weighted fits of size = A x^p.  For the restitution, x = 1 - xi^2 is the fraction of the normal
 energy lost in a collision.  The exponents are printed with chi^2 per degree of freedom, and a note
 marks each fit that does not describe its points.  If a point has fewer than four runs, all points
-have equal weights and the error follows from their scatter about the fit.  Points with open symbols
-are not fitted: there the walls affect the crater (their collisions exceed 1 % of the number of
-disks), or some of the runs reached `stop.time` with more energy left than `stop.energy_fraction`.
+have equal weights and the error follows from the deviations of the points from the fit.  Points
+with open symbols are not fitted: there the walls affect the crater (their collisions exceed 1 % of
+the number of disks), or some of the runs reached `stop.time` with more energy left than
+`stop.energy_fraction`.
 """
 
 from itertools import chain
@@ -49,13 +50,13 @@ AXES = {
     "radius": ("radius of the projectile / radius of a bed disk, $R$", "number"),
     "restitution": ("restitution ξ", "number"),
 }
-SYMBOLS = {"mass": "M", "speed": "v", "radius": "R", "restitution": "(1-ξ^2)"}  # fitted against
+SYMBOLS = {"mass": "M", "speed": "v", "radius": "R", "restitution": "(1-ξ^2)"}  # in fits
 SIZES = {"hit": "disks hit", "displaced": "displaced by more than r"}
 EXTENTS = {"width": "width of the displaced", "depth": "depth of the displaced"}
 EXTENTS |= {"hole_width": "width of the hole", "hole_depth": "depth of the hole"}
 ALL = SIZES | EXTENTS
 MARKERS = "osDv"
-FEWEST_POINTS = 3  # of a fit
+FEWEST_POINTS = 3  # smallest number of points that is fitted
 
 
 class Point(NamedTuple):
@@ -102,7 +103,7 @@ def others(axis: str, curve: list[Point]) -> dict[str, float]:
 
 
 def scanned(points: list[Point]) -> Scans:
-    """Return the curves with at least two points; without any, the curve with most points."""
+    """Return the curves with at least two points or, if there are none, the longest curve."""
     scans = {}
     for axis in AXES:
         families = grouped(points, lambda p, axis=axis: tuple(others(axis, [p]).values()))
@@ -124,7 +125,7 @@ def unused(points: list[Point], scans: Scans) -> list[str]:
 
 
 def fitted_values(curve: list[Point], axis: str) -> int:
-    """Return the number of different parameters of the points that a fit can use."""
+    """Return the number of different parameter values among the points that are fitted."""
     return len({p.values[axis] for p in curve if p.free})
 
 
@@ -166,7 +167,7 @@ def abscissa(axis: str, x: np.ndarray) -> np.ndarray:
 
 
 def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
-    """Fit a power law to a size; points of fewer than four runs have equal weights."""
+    """Fit a power law to a size; weights are equal if any point has fewer than four runs."""
     free = [p for p in curve if p.free]
     x = abscissa(axis, [p.values[axis] for p in free])
     y, error = np.array([p.sizes[name] for p in free]).reshape(-1, 2).T

@@ -4,32 +4,40 @@
     python post/driven.py runs/demon/*.h5 --show share -o demon.png
     python post/driven.py runs/constant_pressure/*.h5 --show width -o width.png
 
---show temperature: kT about the mean velocity u.  For all N disks kT is m <(v - u)^2> / 2 times N /
-(N - 1).  The table also contains the components kT_x and kT_y, and kT of each species.  The dashed
+--show temperature: kT about the mean velocity u. For all N disks kT is m <(v - u)^2> / 2 times N /
+(N - 1). The table also contains the components kT_x and kT_y, and kT of each species. The dashed
 line is for equal disks with white-noise driving in a periodic box, where driving and dissipation
-balance (van Noije and Ernst 1998).  For equal elastic disks in a box with one side that moves at a
+balance (van Noije and Ernst 1998). For equal elastic disks in a box with one side that moves at a
 constant velocity, the line is instead the adiabat of the equation of state including the layers at
-the walls (`hard_disks.adiabat`), which applies to slow compression and expansion.  This comparison
-requires several runs, because the temperature of a single run has no error once the side is at
-rest. --show width: width of the box with a piston (motion = 'piston').  The dashed lines are a
-prediction for equal elastic disks: the mean width, and the mean plus and minus a standard
-deviation, from the equation of state at constant enthalpy (docs/theory.md).  The script also prints
-the measured standard deviation and the largest relative changes of two conserved quantities: the
-enthalpy, and the momentum of disks and piston. --show share: fraction of the disks in the left half
-of the box.  The dashed lines show the steady fractions of a dilute gas above a sawtooth floor, in
-two halves that are connected by a hole above the floor (after Eggers 1999). --show height: mean
-height of the disks of each species. --show viscosity: -P_xy over the shear rate of a sheared box
-(box.shear_rate).  P_xy is an average between samples of the observables and includes the kinetic
-and the collisional part.  The disks may be inelastic. --show cluster: fraction of the disks in the
-largest cluster.  Disks belong to one cluster if the gaps between them are below a tenth of the mean
-diameter.
+the walls (`hard_disks.adiabat`), which applies to slow compression and expansion. This comparison
+requires several runs. Once the side is at rest, the temperature of a single run is constant, so
+that no error can be determined from its fluctuations.
+
+--show width: width of the box with a piston (motion = 'piston'). The dashed lines are a prediction
+for equal elastic disks: the mean width, and the mean plus and minus a standard deviation, from the
+equation of state at constant enthalpy (docs/theory.md). The script also prints the measured
+standard deviation and the largest relative changes of two conserved quantities: the enthalpy, and
+the momentum of disks and piston.
+
+--show share: fraction of the disks in the left half of the box. The dashed lines show the steady
+fractions of a dilute gas above a sawtooth floor, in two halves that are connected by a hole above
+the floor (after Eggers 1999).
+
+--show height: mean height of the disks of each species.
+
+--show viscosity: -P_xy over the shear rate of a sheared box (box.shear_rate). P_xy is an average
+between samples of the observables and includes the kinetic and the collisional part. The disks may
+be inelastic.
+
+--show cluster: fraction of the disks in the largest cluster. Disks belong to one cluster if the
+gaps between them are below a tenth of the mean diameter.
 
 There is a curve for each run, and a colour for each input and species.  Each point is a mean over a
-sixtieth of the time (of a width, over a thousandth).  The script prints the mean over the second
-half of the time with its error, and the ratio of this mean to the theory.  For a `share` the mean
-is that of the half that contains more disks; this half is chosen at a different time. Pictures show
-the end of the first run of each input, or the start and the end of a single input; the smallest
-disks are enlarged.
+sixtieth of the time or, for the width, over a thousandth.  The script prints the mean over the
+second half of the time with its error, and the ratio of this mean to the theory.  For `share` it is
+the mean fraction in the half that contains more disks.  This half is determined from another part
+of the run, so that the choice does not bias the mean. Pictures show the end of the first run of
+each input, or the start and the end of a single input; the smallest disks are enlarged.
 """
 
 from collections.abc import Callable
@@ -120,7 +128,7 @@ def widths(run: Run, side: int) -> np.ndarray:
 
 
 def adiabat(run: Run, side: int, widths: np.ndarray) -> np.ndarray:
-    """Return the adiabatic temperatures at the widths (W,), divided by that at the first width."""
+    """Return the temperature on the adiabat at the widths (W,) over that at the first width."""
     height, walled = float(run.edges[1 - side // 2]), not run.periodic[1 - side // 2]
     return hard_disks.adiabat(widths, height, run.n_disks, float(run.radius[0]), walled)
 
@@ -177,11 +185,11 @@ def share(run: Run) -> Curves:
 
 
 def fuller(share: np.ndarray) -> np.ndarray:
-    """Return the fractions (T,) of disks in the fuller half, from those in one half.
+    """Return the fractions (T,) of disks in the fuller half, given the fractions in one half.
 
     For the first third of the time, the fuller half is determined from the last third, and the
     other way round.  If the same frames determined it, the fraction would exceed 1/2 by chance
-    alone.  The middle third separates the two, so that they are independent.
+    alone.  The middle third separates the first third from the last, so that these are independent.
     """
     third = max(1, len(share) // 3)
     ends = share[:third], share[-third:]
@@ -236,8 +244,8 @@ def viscosity(run: Run) -> Curves:
     return {"": (time[1:], -stress / (run.shear_rate * np.prod(run.edges)))}
 
 
-#: Quantities that are drawn: words and dimension of the label, curves, the conservation law, and
-#: the mean that is compared with it.
+#: Quantities that can be drawn: text and dimension of the label; functions that return the curves,
+#: the prediction, and the values whose mean is compared with the prediction.
 QUANTITIES = {
     "width": (("width of the box", "length"), width, width_law, np.asarray),
     "temperature": (("kT", "energy"), temperature, temperature_law, np.asarray),

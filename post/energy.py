@@ -13,9 +13,9 @@ Smaller time steps do not improve the conservation of energy: a step moves disks
 parabolas and every collision conserves energy, so that all changes are rounding errors.  Larger
 steps miss collisions instead; missed.py counts them.
 
-The table has three numbers for each run, relative to the total energy at the start, or to the
-largest one if that is 0: the drift, which is the change over the whole run along a fitted line; the
-spread, which is the standard deviation from that line; and the largest change.
+The table has three numbers for each run, relative to the total energy at the start or, if that
+energy is 0, to the largest total energy: the drift, which is the change over the whole run along a
+fitted line; the spread, which is the standard deviation from that line; and the largest change.
 """
 
 from collections.abc import Callable

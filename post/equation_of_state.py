@@ -7,12 +7,12 @@ and from the force on the sides (walls).  Means are taken in equilibrium, which 
 --equilibration or, without that option, when no observable drifts any longer. Errors include the
 autocorrelation of the pressure; `samples` is the effective number of independent samples of the
 virial. Runs at equal packing fraction are combined.  The gases must be elastic and without gravity.
-Thermal walls and driving are allowed if all have the same temperature; kT is then a mean whose
-error is included.  Walls exclude disks from a layer, so that the density in the interior is higher:
-the wall pressure therefore refers to the area accessible to the centres, and differs from the bulk
-pressure by a fraction of about 1/sqrt(N).  For disks of many radii r the curves are the equation of
-state of a fluid by Santos, Yuste and Lopez de Haro 1999.  It depends on the radii through <r>^2 /
-<r^2> only, which must be the same for all runs.
+Thermal walls and driving are allowed if they all impose the same temperature; in this case kT is a
+measured mean whose error is included.  Walls exclude disks from a layer, so that the density in the
+interior is higher: the wall pressure therefore refers to the area accessible to the centres, and
+differs from the bulk pressure by a fraction of about 1/sqrt(N).  For disks of many radii r the
+curves are the equation of state of a fluid by Santos, Yuste and Lopez de Haro 1999.  This equation
+depends on the radii only through <r>^2 / <r^2>, a ratio that must be the same for all runs.
 """
 
 from ricochet import Run, RunError, hard_disks
@@ -60,7 +60,7 @@ def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
 
 
 def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
-    """Draw Z in the upper panel and its deviation from the reference in the lower one."""
+    """Draw Z in the upper panel and its deviation from the reference in the lower panel."""
     figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(8, 8), height_ratios=(2, 1))
     alike, fluid, solid = likeness(runs), np.linspace(0, 0.72, 200), np.linspace(0.715, 0.86, 100)
     laws = (hard_disks.henderson(fluid), hard_disks.simulated(fluid))

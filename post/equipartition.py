@@ -4,12 +4,12 @@
 
 Runs are combined by the width v0 of the start velocities; energies are means over the runs and over
 windows of --window.  T_therm is the time at which the relative difference of the energies falls
-below --within and stays there for three windows.  Its limits are the times at which the difference
-minus its error and the difference plus its error do so.  For a single run, the error is the
-fluctuation of the ratio of the energies in the second half of the time.  With 30 + 30 disks this
-error is 26 %, which is too large to determine T_therm: use many runs or many disks.  K_light and
-K_heavy in the table are means in equilibrium, which begins after --equilibration or, without that
-option, when no observable drifts any longer.
+below --within and stays there for three windows.  Its limits are the corresponding times for the
+difference minus its error and for the difference plus its error.  For a single run, the error is
+the fluctuation of the ratio of the energies in the second half of the time.  With 30 + 30 disks
+this error is 26 %, which is too large to determine T_therm: use many runs or many disks.  K_light
+and K_heavy in the table are means in equilibrium, which begins after --equilibration or, without
+that option, when no observable drifts any longer.
 """
 
 from functools import reduce
@@ -44,7 +44,7 @@ class Approach(NamedTuple):
 def entry(time: np.ndarray, gap: np.ndarray, within: float = 0.1, lasting: int = 3) -> float:
     """Return the time at which a difference (W,) falls below `within`, by interpolation.
 
-    It must stay below `within` for at least `lasting` windows.
+    The difference must stay below `within` for at least `lasting` windows.
     """
     close = gap <= within
     for k in range(len(time) - lasting + 1):

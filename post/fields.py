@@ -9,10 +9,10 @@ per accessible area (the area that centres can reach), the flow u (the mass-weig
 mean of I omega^2, for disks that can rotate), the kinetic part of the stress (the sum of m c_a c_b
 per area) and the kinetic part of the heat flux (the sum of m c^2 c / 2 per area).  The collisional
 parts of stress and heat flux are not included.  Within a cell u is interpolated linearly from the
-neighbouring cells.  The frames after --equilibration are used, by default those in the second half
-of a run.  Errors follow from the scatter of blocks of time over all runs of one input
-(docs/theory.md).  A cell that contained disks in fewer than two blocks has a density only.  A cell
-has kT, stress and heat flux if at least three disks remain whichever block is left out.  With
+neighbouring cells.  The frames after --equilibration are used; by default this is the second half
+of each run.  Errors follow from the differences between blocks of time, taken from all runs of one
+input (docs/theory.md).  A cell that contained disks in fewer than two blocks has a density only.  A
+cell has kT, stress and heat flux if at least three disks remain whichever block is left out.  With
 --species the fields are those of one species, relative to the mean flow of that species.
 
 --grid also draws the stream function psi of the flux j = n u, j_x = d psi / dy and j_y = -d psi /
@@ -104,7 +104,7 @@ def draw_fields(axes: plt.Axes, units: Units, x: np.ndarray, found: dict, *names
 
 
 def with_ends(run: Run, axis: int, x: np.ndarray) -> np.ndarray:
-    """Return the positions x completed by the first and the last one that centres can reach."""
+    """Add to the positions x the smallest and the largest position that centres can reach."""
     reach = run.radius[0]
     return np.concatenate([[run.lower[axis] + reach], x, [run.upper[axis] - reach]])
 
@@ -155,7 +155,7 @@ def flow_of(run: Run, cells: tuple[int, int], found: dict[str, Estimate]) -> Flo
 
 
 def draw_arrows(axes: plt.Axes, run: Run, cells: tuple[int, int], flow: Flow, colour: str) -> None:
-    """Draw the flow as arrows; those of cells without significant flow are pale.
+    """Draw the flow as arrows; arrows of cells without significant flow are pale.
 
     The arrow of the largest significant flow is as long as a cell.  If no flow is significant, the
     largest flow sets the scale.

@@ -4,17 +4,18 @@
 
 kT is the mean of the kinetic energy in equilibrium.  Equilibrium begins after --equilibration or,
 without that option, when no observable drifts any longer; the figure and the second table state why
-earlier frames are left out. The solid laws are P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~
+earlier frames are left out. The solid lines are P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~
 exp(-m g h / kT) for the height h of the centre above its lowest position.  They apply to many point
-particles.  The dashed laws include two effects.  N disks that share a fixed energy have (1 - e / (2
-N kT))^(2 N - 2) instead of exp(-e / kT).  A disk of species j excludes the area pi s_ij^2 for the
-centre of a disk of species i, which multiplies the density of species i by exp(-sum_j pi s_ij^2
-n_j(h)) to first order, a few per cent near the floor.  No law of the heights is drawn if that sum,
-computed for point particles, exceeds 0.5.
+particles.  The dashed lines include two corrections.  If N disks share a fixed energy, (1 - e / (2
+N kT))^(2 N - 2) replaces exp(-e / kT) for the energy e of a disk.  A disk of species j excludes the
+area pi s_ij^2 for the centre of a disk of species i, which multiplies the density of species i by
+exp(-sum_j pi s_ij^2 n_j(h)) to first order, a few per cent near the floor.  No line is drawn for
+the heights if this sum, computed for point particles, exceeds 0.5.
 
-Slopes are those of weighted lines through the logarithm of the histograms, from 0 to 5 kT in the
-kinetic energy and from 1 to 5 kT in m g h, above the layer that the size of the disks flattens;
-their errors are from ten blocks of time.
+Slopes are those of weighted lines fitted to the logarithm of the histograms, from 0 to 5 kT in the
+kinetic energy and from 1 to 5 kT in m g h.  The heights below 1 kT are left out, because the finite
+size of the disks flattens the distribution there.  The errors of the slopes follow from ten blocks
+of time.
 """
 
 from typing import NamedTuple
@@ -134,7 +135,7 @@ def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, li
 
 
 def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[dict]:
-    """Return the fitted slopes divided by those of the exponential laws and of the dashed laws."""
+    """Return the fitted slopes divided by the slopes of the solid and of the dashed lines."""
     temperature = kt[0]
     grid, crowded = heights(run, species, temperature)
     rows = []

@@ -12,17 +12,17 @@ is measured from the first collisions.  Both laws assume that all species have t
 which is wrong for very different masses.
 
 The cooling rate is -d ln K / d tau, where tau is the number of collisions per disk.  The
-homogeneous state ends where the rate, averaged over two collisions per disk and over the runs,
-stays below 90 % of the law.  Beyond this tau the curves are pale; for several runs its value is
-printed with an error. `rate` is the slope of a line fitted to ln K from tau = 2 to half of the tau
-at which the homogeneous state ends, or to the end of the run if it stays homogeneous.  Its error
-follows from the scatter of the runs.
+homogeneous state ends at the tau beyond which the rate, averaged over two collisions per disk and
+over the runs, remains below 90 % of the predicted rate.  Beyond this tau the curves are pale; for
+several runs this tau is printed with an error. `rate` is the slope of a line fitted to ln K from
+tau = 2 to half of the tau at which the homogeneous state ends, or to the end of the run if it stays
+homogeneous.  The error of `rate` follows from the scatter of the runs.
 
 Disks with velocity-dependent restitution (contact.restitution_law) follow another law, which
-assumes Maxwell's velocities (docs/theory.md).  For these the table contains, instead of the rate,
-the `exponent` p of K ~ t^-p in the last decade of time, which tends to 5/3.  If K differs from the
-law by more than 10 % at the end of a run that stays homogeneous, a note states by how much a
-slightly smaller rate would change K.
+assumes Maxwell's velocities (docs/theory.md).  For such disks the table contains, instead of the
+rate, the `exponent` p of K ~ t^-p in the last decade of time, which tends to 5/3.  If K differs
+from the law by more than 10 % at the end of a run that stays homogeneous, a note states by how much
+a slightly smaller cooling rate would change K.
 """
 
 from ricochet import Run
@@ -117,7 +117,7 @@ def rates(groups: list, results: list) -> list[dict]:
 
 
 def apart(xi: Restitution, found: dict, end: float) -> list[str]:
-    """Return the final ratio of K to the law that a slightly smaller cooling rate causes."""
+    """Return the final K over its prediction if the cooling rate were slightly smaller."""
     ratio, tau = found["K"].mean[-1] / found["law"][-1], found["collisions_per_disk"][-1]
     if not np.isnan(end) or abs(ratio - 1) < 1 - SLOW:
         return []

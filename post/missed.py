@@ -5,9 +5,10 @@
 The script requires event-driven runs and time-stepped runs with the same seeds.  For each time step
 dt it computes the fraction of pair collisions that are missing relative to the event-driven run of
 the same seed.  The first --equilibration collisions per disk are left out, and the fraction is
-averaged over the seeds.  It is compared with the fraction expected from the rule below. With a
-single pair of runs the error follows from the fluctuations of both collision rates in time.  These
-exceed the fraction that small steps miss: use several seeds.
+averaged over the seeds.  The result is compared with the fraction P that is derived below. With a
+single pair of runs the error follows from the fluctuations of both collision rates in time.  For
+small time steps these fluctuations exceed the fraction of missed collisions, and several seeds are
+required.
 
 Two disks with the relative speed g and the impact parameter b overlap on a chord of length 2 l,
 l = sqrt(s^2 - b^2), where s is their diameter.  They approach on the first half of the chord only,

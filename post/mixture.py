@@ -3,11 +3,11 @@
     python post/mixture.py runs/mixture/*.h5 -o mixture.png --csv mixture.csv
 
 Equilibrium begins after --equilibration or, without that option, when no observable drifts any
-longer.  Of the frames selected by --frames only those are used that are at least --min-separation
+longer.  The frames selected by --frames are thinned out until they are at least --min-separation
 collisions per disk apart.  Errors follow from the scatter of the runs or, for a single run, from
 the autocorrelation over its frames.  In theory each species has <K> = kT and <v> = sqrt(pi kT / 2
 m).  In a periodic box <K> is smaller by the ratio of the disk's mass to the total mass.  kT is
-exact if the kinetic energy is conserved.  With thermal walls, driving or rotation it is the
+exact if the kinetic energy is conserved.  With thermal walls, driving or rotation kT is the
 measured mean over all disks in equilibrium, with an error.
 """
 

@@ -143,9 +143,9 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
 def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[str, np.ndarray]]:
     """Return collisions per disk in each frame, events and paths, if the log is not too long.
 
-    An event consists of its time and its two partners.  A path consists of velocity changes: their
-    number in each interval between frames, and for each of them the disk, the fraction of the
-    interval that has passed, and the new velocity.
+    An event consists of its time and its two partners.  The paths consist of the number of velocity
+    changes in each interval between frames and, for each velocity change, the disk, the fraction of
+    the interval that has passed, and the new velocity.
     """
     exact, facts = run.n_disks <= FEW_DISKS, {"known": False, "events": False}
     try:
@@ -296,7 +296,7 @@ def texts(facts: dict, blocks: dict) -> dict:
 
 
 def page(run: Run, film: dict | None) -> str:
-    """Return the complete page; without a film, the page requests it from the server of --live."""
+    """Return the complete page; without a film, the server of --live sends a film."""
     title = str(run.parameter("run", "title", "")) or run.path.stem
     commit = run.provenance.get("git_commit", "unknown")
     words = {

@@ -36,7 +36,8 @@ import numpy as np
 
 BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
 BLOCKS = 8  # number of blocks of frames of a single run
-#: Properties that leave free flights straight, of constant speed, and equal everywhere in the box.
+#: Traits with which free flights are straight, have a constant speed, and have the same
+#: distribution of lengths everywhere in the box.
 STRAIGHT = {
     "walls",
     "mixture",
@@ -82,7 +83,7 @@ def over_all(runs: list[Run], skip: float | None, notes: list[str]) -> dict[str,
 
 
 def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
-    """Return the pressure against time, averaged over the runs, from virial and sides."""
+    """Return the mean pressure of the runs against time: from the virial, and on the sides."""
     cuts = np.linspace(0, min(run.collisions_per_disk.time[-1] for run in runs), FINE + 1)
 
     def growth(*parts: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -169,7 +170,7 @@ def draw_pressure(axes: plt.Axes, curves: dict[str, Curve], mean: SeriesMean, st
 
 
 def draw_paths(axes: plt.Axes, paths: tuple[Estimate, Estimate], equal: bool) -> None:
-    """Draw the distribution of free paths and the one expected for molecular chaos."""
+    """Draw the measured distribution of free paths and that expected for molecular chaos."""
     mean, height = paths
     label = f"measured, $\\ell$ = {' ± '.join(statistics.rounded_to_error(*mean))}"
     bars(axes, height, BINS, color=COLOURS[0], label=label)
@@ -182,7 +183,7 @@ def draw_paths(axes: plt.Axes, paths: tuple[Estimate, Estimate], equal: bool) ->
 
 
 def table(runs: list[Run], start: float, means: dict, path: Estimate | None) -> list[dict]:
-    """Return a row for each quantity: first the exact ones, then those with an error."""
+    """Return a row for each quantity: first exact quantities, then those with an error."""
     begin = "equilibrium_from" if means else "from_time"
     exact = {"packing": td.packing(runs[0]), begin: start}
     momentum = np.mean([td.drift(run) * run.mass.sum() for run in runs], axis=0)

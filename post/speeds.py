@@ -6,20 +6,21 @@ The reduced speed is u = v / sqrt(2 kT / m), where kT is the mean kinetic energy
 that the equilibrium distribution is P(u) = 2 u exp(-u^2) for any mass.  If m = 1 and all initial
 speeds are 1, u equals v.  --unscaled draws v in units of the input.  Runs of the same N are
 combined.  Equilibrium, or the steady state of a driven gas, begins after --equilibration or,
-without that option, when no observable drifts any longer.  Of the frames selected by --frames only
-those are used that are at least --min-separation collisions per disk apart, with their mean kT. In
-a sheared box speeds are relative to the flow.  A gas that only loses energy has no steady state.
-Its histogram contains the frames after --equilibration (by default after 15 collisions per disk),
-and the speeds of each frame are scaled with kT of that frame. The same scaling is used for a gas
-whose sides move or whose kT drifts; `kT_first` and `kT_last` show the change. Each species of a
-mixture has its own row and curve, with its kT and the temperatures kT_x and kT_y of both velocity
-components.  Kolmogorov-Smirnov (KS) and chi-square tests compare the speeds, scaled by the energy
-of their own frame, with the expected distribution: that of N disks that share a fixed kinetic
-energy if this energy is conserved, otherwise Maxwell's.  The p-values follow from random samples
-that are scaled in the same way (docs/theory.md).  Frames that are close in time have a smaller
-weight: the number of `independent` speeds follows from the statistical inefficiency.  The tests do
-not apply if disks conserve their angular momentum in a round container. a2 = <v^4> / (2 <v^2>^2) -
-1.
+without that option, when no observable drifts any longer.  The frames selected by --frames are
+thinned out until they are at least --min-separation collisions per disk apart; kT is the mean over
+the remaining frames. In a sheared box speeds are relative to the flow.  A gas that only loses
+energy has no steady state. Its histogram contains the frames after --equilibration (by default
+after 15 collisions per disk), and the speeds of each frame are scaled with kT of that frame. The
+same scaling is used for a gas whose sides move or whose kT drifts; `kT_first` and `kT_last` show
+the change. Each species of a mixture has its own row and curve, with its kT and the temperatures
+kT_x and kT_y of both velocity components.  Kolmogorov-Smirnov (KS) and chi-square tests compare the
+speeds with the expected distribution after the speeds of each frame are divided by the thermal
+speed in that frame.  If the kinetic energy is conserved, the expected distribution is that of N
+disks that share a fixed kinetic energy; otherwise it is Maxwell's distribution.  The p-values
+follow from random samples that are scaled in the same way (docs/theory.md).  Frames that are close
+in time have a smaller weight: the number of `independent` speeds follows from the statistical
+inefficiency.  The tests do not apply if disks conserve their angular momentum in a round container.
+a2 = <v^4> / (2 <v^2>^2) - 1.
 """
 
 from typing import NamedTuple
@@ -53,7 +54,8 @@ from ricochet.script import command_line, grouped, late_frames, launch, measured
 import numpy as np
 
 BINS = np.linspace(0, 3, 51)  # u = 1 is the centre of a bin
-#: Titles for the possible states of the late frames of all runs; the first two have one kT.
+#: Titles for the possible states of the late frames of all runs.  In the first two states all late
+#: frames have the same mean kT.
 EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
 COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each frame at its own kT"
 UNSTEADY = "No steady kT yet: each frame at its own"
@@ -81,7 +83,7 @@ def state_of(run: Run) -> str:
 def temperature(
     runs: list[Run], picked: list[list[int]], species: str | None = None
 ) -> tuple[SeriesMean, list[float], bool]:
-    """Return the mean kT over these frames, kT of the first and the last one, and if it drifts."""
+    """Return the mean kT of these frames, kT in the first and the last, and whether kT drifts."""
     tracks = tracks_of(runs, picked, species)
     kt = combine_runs([correlated_mean(track) for track in tracks])
     alone = species is None or len(runs[0].names) == 1
@@ -135,7 +137,7 @@ def pooled(
 
 
 class Scale(NamedTuple):
-    """Value at which the reduced speed u = 1 is drawn, and label of the axis."""
+    """Axis of speeds: the thermal speed in the units of the axis, and the label."""
 
     thermal: float = 1.0  # sqrt(2 kT / m), or 1
     label: str = "speed $u = v\\,/\\,\\sqrt{2kT/m}$"

@@ -9,11 +9,11 @@ For mixtures only the viscosities are computed: the diffusion of the species als
 and D differs between species (see correlations.py).
 
 The small panels show half the slope of the mean square of a moment between neighbouring lags,
-divided by Enskog's coefficient; for D they show half the integral of <v(0) v(s)> from 0 to t.
-Bands are errors over the runs.  The right panel and the table contain means over the lags between
-half of a lag t and t, with errors that include the autocorrelation.  This lag t is 20 mean free
-times, longer if heavy disks decorrelate slowly, and at most an eighth of the run.  For D it is the
-time in which sound crosses the box, as in correlations.py.
+divided by Enskog's coefficient; for D they show half the integral of <v(0) v(s)> from 0 to t. Bands
+are errors over the runs.  The right panel and the table contain means over the lags from t/2 to t,
+with errors that include the autocorrelation.  For viscosities and conductivity t is 20 mean free
+times, or longer if heavy disks decorrelate slowly, but at most an eighth of the run.  For D, t is
+the time in which sound crosses the box, as in correlations.py.
 
 Enskog's coefficients (Gass 1971; for mixtures after Lopez de Haro, Cohen and Kincaid 1983) use the
 pair correlation at contact of Henderson or, for mixtures, of Jenkins and Mancini 1987.  In the

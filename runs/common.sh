@@ -1,7 +1,7 @@
 # shellcheck shell=bash
-# Common part of the scripts of the systems, which each script sources in its first line. It defines the variables python, data
-# (folder of the runs) and figures (folder of the figures), and the function `replace`. Options of ensemble.sh, such as -j 4, are
-# passed on.
+# Common part of the scripts that simulate the systems of this folder: each of these scripts sources this file in its first line.
+# This file defines the variables python, data (folder of the runs) and figures (folder of the figures), and the function `replace`.
+# Options of ensemble.sh, such as -j 4, are passed on.
 set -euo pipefail
 if [[ " $* " == *' -h '* || " $* " == *' --help '* ]]; then
   sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"

@@ -184,10 +184,10 @@ goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line
 # reason.
 has_data() { [[ -e $folder/$1.h5 || -e $folder/$1.h5.part && $(last_words "$1") =~ $goes_on ]]; }
 
-# A finished file that is older than the input, or that is being extended, is not what the present settings ask for.
+# A finished file that is older than the input, or that is being extended, is not the result of the present settings.
 is_done() { [[ -e $folder/$1.h5 && ! -e $folder/$1.h5.part && ! $folder/input.nml -nt $folder/$1.h5 ]]; }
 
-# NAME OVERRIDES: does the program continue the data of a member with these settings?
+# NAME OVERRIDES: succeeds if the program can continue the data of a member with these settings.
 may_continue() {
   local arguments=("$input" -o "$folder/$1.h5" --resume --check --quiet) said
   add_overrides "$2"
@@ -437,8 +437,8 @@ failure() {
   tell "$1" "failed$2: ${3:-no message in its log}"
 }
 
-# Prints a summary, with TEXT for the members of earlier commands. A share prints no summary, because it has printed a line for each
-# member.
+# announce TEXT: prints a summary of the members, which begins with TEXT. A share prints no summary, because it has printed a line
+# for each member.
 announce() {
   [[ -z $share ]] || return 0
   printf '%s: %s%d of %d members finished' "$folder" "$1" "$finished" "$total" >&2

@@ -27,8 +27,8 @@ function lookAtAll() {
   Object.assign(camera, { zoom: 1, x: film.lower[0] + film.edges[0] / 2, y: film.lower[1] + film.edges[1] / 2, follow: -1 });
 }
 
-// Zooms by a factor. The position of the box that is shown at the point (px, py) of the canvas
-// stays there.
+// Zooms by a factor about the point (px, py) of the canvas: the position in the box that this point
+// shows does not change.
 function zoom(factor, px = page.width / 2, py = page.height / 2) {
   const x = backAcross(px), y = backUp(py);
   camera.zoom = Math.max(1, Math.min(mostZoom(), camera.zoom * factor));

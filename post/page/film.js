@@ -61,7 +61,7 @@ function cross(frame, moved) {
 // at the events of the log. Each flight is straight, or a parabola under gravity. Without an event
 // log disks are shown at their positions in the last frame. Frames of a worker need no log, because
 // their intervals are short enough.
-let ways;    // velocity changes: the first one after each frame (start); of each its disk, its share of the interval and the new velocity (turns)
+let ways;    // velocity changes: index of the first change after each frame (start); disk, fraction of the interval and new velocity of each change (turns)
 let events;  // events of the log: time (when), partners (i, j), number of collisions of two disks so far (pairs)
 
 function move(time) {

@@ -5,7 +5,7 @@ const [ground, disksBrush, marks] = layers.map((layer, k) => layer.getContext('2
 let ink;                       // the colours of the theme
 let picture, pixels, palette, paper;  // image of the disks; its pixels as integers; colours of disks and of the ground as such integers
 let radii;                     // of each size [pixels]
-let groundShown, marked;       // the view that the ground was drawn for; whether the layer of marks has any
+let groundShown, marked;       // the view for which the ground was drawn; whether the layer of marks contains marks
 
 const dark = () => document.documentElement.dataset.theme === 'dark';
 const cssColour = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();

@@ -26,7 +26,7 @@ class Aliases(MetaPathFinder, Loader):
     """Import finder for short names, which Python calls after all other finders."""
 
     def __init__(self) -> None:
-        """Store the names of the modules; a process has a single finder."""
+        """Determine the short names and the modules to which they refer."""
         self.modules = modules()
 
     def find_spec(

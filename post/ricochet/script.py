@@ -151,7 +151,7 @@ def finished(paths: list[Path]) -> list[Path]:
 
 
 def distinct(runs: list[Run]) -> list[Run]:
-    """Return the runs without duplicates, which are runs with identical final states."""
+    """Return the runs without duplicates; duplicates are runs with identical final states."""
     found: dict[bytes, list[Run]] = {}
     for run in runs:
         parts = run.time[-1:], run.position[-1], run.velocity[-1], run.mass, run.radius
@@ -176,12 +176,13 @@ def joined(words: Iterable[str]) -> list[str]:
 def command_line(
     doc: str, output: str, one: bool = False, csv: bool = True, repeated: bool = False, **defaults
 ) -> Parser:
-    """Return a parser with this default output, whose help is the docstring of the script.
+    """Return a parser whose help is the docstring `doc` of the script.
 
-    The parser opens a single run (`one`) or any number of runs as `runs`.  Duplicates of a run are
-    left out unless they are allowed (`repeated`), and unfinished runs are left out unless the runs
-    form pairs (`paired`).  There is an option --csv if the script writes numbers.  The keyword
-    arguments name the shared `OPTIONS` of the script and their defaults (None: no default).
+    The script accepts a single run (`one`) or any number of runs, and `output` is the default
+    output file.  Duplicates of a run are left out unless they are allowed (`repeated`), and
+    unfinished runs are left out unless the runs form pairs (`paired`).  There is an option --csv if
+    the script writes numbers.  The keyword arguments name the shared `OPTIONS` of the script and
+    their defaults (None: no default).
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
@@ -330,7 +331,7 @@ def measured(
 ) -> dict[str, float | None]:
     """Return two cells of a row: a mean and its error, from a point of a curve or a number.
 
-    Both are None without an estimate.
+    Without an estimate, both cells are None.
     """
     parts = (None, None) if estimate is None else (estimate.mean, estimate.error)
     values = [part if part is None else float(np.asarray(part)[at]) for part in parts]

@@ -221,8 +221,8 @@ def haff(
     Returns
     -------
     curves : dict of str to numpy.ndarray or Estimate
-        (points,) K / K0 against time and against collisions, each with its law, and the cooling
-        rate
+        (points,) K / K0 against time and against collisions, each with its predicted curve, and the
+        cooling rate
     rate : Estimate
         the cooling rate per collision or, if `soft` is given, the `exponent`
     end : float
@@ -298,7 +298,7 @@ def exponent(time: np.ndarray, energy: np.ndarray) -> float:
 
 
 def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray) -> float:
-    """Return the tau after which the rate stays below `SLOW` times the law, or NaN."""
+    """Return the tau after which the rate stays below `SLOW` times its prediction, or NaN."""
     slow = rate < SLOW * law
     if not slow[-1]:
         return float("nan")

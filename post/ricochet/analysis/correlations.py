@@ -4,8 +4,8 @@
     found = correlations.measured([read_run("runs/glass.h5")], waves=[5.2], skip=0)
     found["small"]["msd"]                # a Curve: lags x, means y, errors
 
-They are means over pairs of samples at times t0 and t, against the lag t - t0, for each species and
-for "all" disks; r is the displacement of a disk from t0 to t:
+The functions are means over pairs of samples at times t0 and t, against the lag t - t0, for each
+species and for "all" disks; r is the displacement of a disk from t0 to t:
 
     msd        <r^2>
     vacf       <v(t0) v(t)>, which is the mean square speed at lag 0 diffusion  <v(t0) r> / 2, half
@@ -20,10 +20,10 @@ conserved, or performs a random walk that noise drives (drive.keep_momentum = .f
 Lags are chosen logarithmically: in each twelfth of a power of ten, the lag that occurs for most
 pairs of samples.  This works for samples at equal steps, in logarithmic steps, in bursts, and for
 mixtures of these.  Every sample that has a partner serves as an origin t0.  If this would take too
-long, only the first sample in each sixteenth of a lag is an origin.  Correlations of displacements
-are equally accurate in this case; those of velocities are less accurate at lags of many free times.
-This is the multiple-tau correlator of Ramirez et al., J. Chem. Phys. 133, 154103 (2010), without
-its means over neighbouring samples, so that each lag is exact.
+long, only the first sample in each sixteenth of a lag is an origin.  This does not make
+correlations of displacements less accurate, but it makes correlations of velocities less accurate
+at lags of many free times. This is the multiple-tau correlator of Ramirez et al., J. Chem. Phys.
+133, 154103 (2010), without its means over neighbouring samples, so that each lag is exact.
 
 Errors follow from the scatter of the runs.  For a single run they follow from the scatter of
 sixteenths of its time, for lags up to an eighth of this time; longer lags have no error (NaN).
@@ -103,7 +103,7 @@ def lags_of(times: np.ndarray) -> np.ndarray:
 
 
 def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
-    """Return times of samples in bursts, which provide pairs at all lags with many origins.
+    """Return sampling times in bursts, which contain many pairs of samples at every lag.
 
     Each burst has ten samples in each power of ten from `first` to `last` after its start.
 

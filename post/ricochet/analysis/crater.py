@@ -148,7 +148,7 @@ def enough_disks(mass_ratio: float, restitution: float, fraction: float) -> floa
     Returns
     -------
     float
-        number of disks; infinite for elastic disks, or if the run does not end by its energy
+        number of disks; infinite if disks are elastic or `fraction` is 0
 
     Examples
     --------
@@ -287,7 +287,7 @@ def crater(run: Run) -> Crater:
 
 
 def hole(run: Run) -> np.ndarray:
-    """Return the outline of the largest region with less than half of the bed's packing.
+    """Return the outline of the largest region below half of the bed's packing fraction.
 
     Parameters
     ----------

@@ -4,7 +4,8 @@ The docstring of post/fields.py defines the fields.  Errors are computed by the 
 blocks of time of all runs.  A block is so long that its start and its end are independent.  The
 jackknife also removes a bias: if the flow is estimated from the same n values as the temperature,
 the temperature relative to this flow is too small by the fraction 1 / n.  Blocks of unequal weight
-are treated as in Busing, Meijer and van der Leeden, Stat. Comput. 9, 3 (1999).  C cells, G blocks.
+are treated as in Busing, Meijer and van der Leeden, Stat. Comput. 9, 3 (1999).  Shapes refer to C
+cells and G blocks.
 """
 
 from collections.abc import Callable
@@ -290,9 +291,9 @@ BY_FRAMES = np.array([name.startswith(("density", "stress", "heat")) for name in
 def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
     """Return the fields (12, C) that follow from `sums`; NaN in cells without disks.
 
-    In cells with fewer than `FEWEST_DISKS` disks, kT, stress and heat flux are NaN.  A flow that
-    changes by g h across a cell contributes m (g h)^2 / 12 to m v v; this contribution is
-    subtracted.
+    In cells with fewer than `FEWEST_DISKS` disks, kT, stress and heat flux are NaN.  If the flow
+    has the gradient g, it changes by g h across a cell of width h and contributes m (g h)^2 / 12 to
+    m v v; this contribution is subtracted.
     """
     frames, n, dense, mass, mx, my, xx, xy, yy, qx, qy, turning = total
     u, v, density = mx / mass, my / mass, dense / frames
@@ -349,7 +350,7 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     Raises
     ------
     RunError
-        if a run has too few frames, or a side that moves away from its position
+        if a run has too few frames, or if a side moves away from its initial position
 
     Examples
     --------

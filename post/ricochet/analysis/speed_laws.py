@@ -1,11 +1,12 @@
 """Tests of the speeds of disks against the expected distribution.
 
 The speeds of each frame are scaled by the energy of the frame, so that conserved and slowly
-fluctuating energies do not influence the test.  Scaled speeds are closer to their distribution than
-independent values (Lilliefors, J. Am. Stat. Assoc. 62, 399 (1967)).  The p-values therefore follow
-from random frames with the same numbers of disks that are scaled in the same way: velocities are
-uniform on the sphere of constant energy, relative to the centre of mass along the `comoving` axes.
-Correlated frames are weighted according to their statistical inefficiency.
+fluctuating energies do not influence the test.  Scaled speeds deviate less from the expected
+distribution than independent values would (Lilliefors, J. Am. Stat. Assoc. 62, 399 (1967)).  The
+p-values therefore follow from random frames that have the same numbers of disks and are scaled in
+the same way.  The velocities in these frames are uniformly distributed on the sphere of constant
+energy, relative to the centre of mass along the `comoving` axes. Correlated frames are weighted
+according to their statistical inefficiency.
 """
 
 from collections.abc import Sequence
@@ -25,7 +26,7 @@ __all__ = ["SpeedTest", "speed_test"]
 BINS = 30  # of equal probability
 DRAWN = 4000  # drawn samples
 MOST = 1000  # speeds of a drawn sample; more have the same distribution of the scaled statistics
-MANY = 2000  # disks, among whom the motion of the centre of mass does not matter
+MANY = 2000  # number of disks above which the motion of the centre of mass is negligible
 #: Excess of an inefficiency times the root of the frames: one standard deviation of the noise of
 #: cumulative counts, of which two are independent, and two of the counts in all bins.
 LEAST_DISTANCE, LEAST_CHI2 = 1.4, 4 / np.sqrt(BINS - 1)

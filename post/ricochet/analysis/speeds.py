@@ -21,7 +21,7 @@ __all__ = [
 def kt_of_frames(
     run: Run, frames: Index, species: str | None = None, component: int | None = None
 ) -> np.ndarray:
-    """Return kT of the given frames from the degrees of freedom that are not conserved.
+    """Return kT of the given frames, without any conserved motion of the centre of mass.
 
     Parameters
     ----------

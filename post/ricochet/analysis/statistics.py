@@ -77,9 +77,9 @@ class PowerLaw(NamedTuple):
     free: int = 0  # degrees of freedom
 
     def misses(self, runs: int) -> bool:
-        """Return whether the points deviate more than errors from this number of runs explain.
+        """Return whether the points deviate from the law by more than their errors explain.
 
-        The test is that of Welch (1951).
+        The test, that of Welch (1951), allows for errors that were estimated from `runs` runs.
         """
         if self.free < 1 or runs < FEWEST_RUNS:
             return False
@@ -199,8 +199,9 @@ def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estim
     Returns
     -------
     Estimate
-        mean and half the difference of two numbers: those of the curve minus its error and of the
-        curve plus its error; NaN if one of these is NaN, or if the curve has no error
+        the number for the mean curve, and half the difference between the numbers for the curve
+        plus its error and for the curve minus its error; NaN if one of these numbers is NaN, or if
+        the curve has no error
 
     Examples
     --------
@@ -237,7 +238,7 @@ class SeriesMean(NamedTuple):
 
 
 def cells(series: np.ndarray, count: int) -> np.ndarray:
-    """Return the means over `count` equal parts of a series (T,), without the rest at its start."""
+    """Return the means of `count` equal parts of a series (T,); a rest at its start is left out."""
     width = max(1, len(series) // count)
     return series[len(series) % width :].reshape(-1, width).mean(axis=1)
 
@@ -560,7 +561,7 @@ def binned(values: np.ndarray, bins: np.ndarray, independent: int | None = None)
     bins : numpy.ndarray
         (B + 1,) edges of the bins
     independent : int, optional
-        number of independent values in the sample [all of them]
+        number of independent values in the sample [all values]
 
     Returns
     -------
@@ -662,7 +663,7 @@ def fit_power_law(
     Parameters
     ----------
     x, y : numpy.ndarray
-        (P,) the points; those that are not positive are left out
+        (P,) the points; points with a coordinate that is not positive are left out
     y_error : numpy.ndarray, optional
         (P,) errors of y [equal weights; the error follows from the scatter of the points]
 

@@ -1,6 +1,6 @@
 """Structure of a run: pair correlation, structure factor, clusters and bond order.
 
-The functions are short with SciPy; available libraries support periodic boxes but not walls.
+The functions use SciPy only, because the available libraries support periodic boxes but not walls.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -57,7 +57,7 @@ def pair_correlation(
     edges : numpy.ndarray
         (B + 1,) edges of the bins of r, in mean diameters
     pair : tuple of str, optional
-        two species: the density of the second around disks of the first [all disks]
+        two species: g(r) is the density of the second species around disks of the first [all disks]
 
     Returns
     -------
@@ -201,7 +201,8 @@ def averaged(
     Parameters
     ----------
     of : callable
-        function such as `pair_correlation` of run, frames, edges and `more`, with values (B,)
+        function, such as `pair_correlation`, that takes a run, frames, edges and `more`, and
+        returns an array (B,)
     runs : sequence of Run
         (R,) runs that differ by their seed
     frames : sequence of Index

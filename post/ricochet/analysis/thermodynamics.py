@@ -2,8 +2,9 @@
 
 The pressure can be measured in three independent ways: by the virial of the pair collisions, by the
 collision rate (equal disks), and by the force on the sides.  Z = P / (n kT).  kT is exact where the
-kinetic energy is conserved, otherwise a mean over time.  `skip` is the equilibration in collisions
-per disk, which is left out at the start; with None it is determined from the data.
+kinetic energy is conserved, otherwise a mean over time.  `skip` is the duration of the
+equilibration in collisions per disk; earlier samples are left out.  With None this duration is
+determined from the data.
 """
 
 from collections.abc import Sequence
@@ -40,15 +41,16 @@ __all__ = [
 ]
 
 TIMED = ("every_time", "at", "per_decade")  # samples are taken at times, not after collisions
-SPEEDS_FORGET = 15.0  # collisions per disk: speed distributions are independent of the start
+SPEEDS_FORGET = 15.0  # collisions per disk after which speeds are independent of the start
 ALONG_WALLS = {
     "thermal_walls",
     "rough",
     "rotating",
     "inelastic",
-}  # walls may change the momentum along them
-MANY = 1e8  # disks above which the effect of a fixed energy is negligible
-#: Traits of fluids in an empty box, besides equal smooth disks with conserved energy.
+}  # with these traits walls may change the momentum along them
+MANY = 1e8  # number of disks above which the effect of a fixed energy is negligible
+#: Traits that a run with an equation of state may have.  A run without traits has equal smooth
+#: disks with conserved energy in a periodic box.
 FLUID = ("walls", "thermal_walls", "thermostatted", "rough", "rotating", "mixture")
 
 
@@ -71,7 +73,7 @@ def refuse_others(runs: Sequence[Run]) -> None:
 
 
 def all_settle(runs: Sequence[Run]) -> bool:
-    """Return whether all runs have an equilibrium, or raise an error if only some have one."""
+    """Return whether the runs relax to equilibrium; raise an error if only some of them do."""
     settled = [run.nature.in_equilibrium for run in runs]
     if any(settled) and not all(settled):
         one, other = runs[settled.index(False)], runs[settled.index(True)]
@@ -148,7 +150,7 @@ def explained_start(run: Run, skip: float | None = None) -> tuple[float, str]:
 def examined(run: Run) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return times (T,) and, by name, the series (T - 1,) that are tested for drifts.
 
-    There are no series if samples are few.
+    If there are only few samples, no series are returned.
     """
     few = has_few_observables(run)
     time = run.time if few else run.collisions_per_disk.time
@@ -239,9 +241,10 @@ def frames_from(
 
 
 def later(run: Run, skip: float | None = None) -> slice:
-    """Return the frames in the steady state or, for a cooling gas, those after the start.
+    """Return the frames in the steady state or, for a cooling gas, after `after_start`.
 
-    The last frame is left out, because its distance from the previous frame may differ.
+    The last frame is left out, because its interval from the previous frame may differ from the
+    other intervals.
     """
     first = int(np.searchsorted(run.time, start_of_steady_state(run, skip)))
     if run.n_frames - 1 - first < 2:

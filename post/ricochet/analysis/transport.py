@@ -42,8 +42,9 @@ __all__ = [
 
 PER_FREE_TIME = 4  # sufficient number of samples of the moments
 SUMS = ("helfand_stress", "virial_tensor", "helfand_heat", "heat_virial")
-#: In mean free times: the decay time of the heat flux, longest in a dilute gas of equal disks; and
-#: the lag of the slope, which from half of it on lacks less than 0.2 % of the conductivity.
+#: In mean free times: the decay time of the heat flux, which is longest in a dilute gas of equal
+#: disks; and the lag t of the result.  The mean slope between t / 2 and t is less than 0.2 % below
+#: the conductivity.
 HEAT, MEMORY = 2.06, 20.0
 CLOSE = 1e-6  # relative difference of steps that are regarded as equal
 UNLIKE = 0.05  # largest relative difference of Enskog's viscosity between runs of one group
@@ -98,10 +99,11 @@ def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
 def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean]:
     """Estimate D between the lags `lag` / 2 and `lag` from displacements and from velocities.
 
-    The two estimates are means over these lags of d<r^2>/dt / 4 and of half the integral of <v(0)
-    v(t)>. Each origin in time contributes one value, so that the error includes all correlations.
-    Between frames the integral is a cubic curve with the known slopes <v(0) v(t)>: its error is at
-    most 0.2 % of D for an exponential correlation, and far less once D(t) is constant.
+    The first estimate is the mean of d<r^2>/dt / 4 over these lags, and the second is the mean of
+    half the integral of <v(0) v(t)>. Each origin in time contributes one value, so that the error
+    includes all correlations. Between frames the integral is a cubic curve with the known slopes
+    <v(0) v(t)>: its error is at most 0.2 % of D for an exponential correlation, and far less once
+    D(t) is constant.
     """
     step, half = float(run.time[1] - run.time[0]), lag // 2
     x, v = motion(run, frames)
@@ -185,8 +187,8 @@ class Found(NamedTuple):
 
     members: list[SeriesMean]  # values of the runs
     curve: Curve  # against the lag, in mean free times
-    lag: float  # at which they were taken [mean free times]
-    memory: float  # at which they should be; 0 of a coefficient that has its own time
+    lag: float  # at which the values were measured [mean free times]
+    memory: float  # lag required by the decay times; 0 for D
     enskog: float  # in units of the mean mass, the mean diameter and kT
 
 

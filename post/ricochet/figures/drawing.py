@@ -72,7 +72,7 @@ def listed(values: set[float]) -> str:
 
 
 def numbers_of(run: Run) -> dict[str, float]:
-    """Return the input parameters that identify a system, except those in every caption."""
+    """Return the input parameters that identify a system and are not in every caption."""
     found = {**run.parameters.get("box", {}), **run.parameters.get("contact", {})}
     if found.get("wall_restitution") == run.restitution:
         del found["wall_restitution"]
@@ -124,7 +124,7 @@ def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
 
 
 def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
-    """Return the upper end of a colour scale for a film; the few largest values exceed it.
+    """Return the upper end of a colour scale for a film; a few values exceed this end.
 
     The end is computed from some of the frames or, for displacements, which grow, from the last
     frame.

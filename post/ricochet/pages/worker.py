@@ -1,17 +1,17 @@
 """Worker process of the laboratory, which simulates and sends frames to a page.
 
 Requests are lines of JSON on standard input.  An answer on standard output consists of a letter,
-the length in four bytes, and a text in JSON (letter t) or a frame (letter b).  The key `is`
-contains the kind of a text: scene (constant part of a picture), numbers, events (next events),
-state, problems, file, scan.  The worker waits when the page has not yet confirmed two frames as
-drawn (`got`).
+the length in four bytes, and a text in JSON (letter t) or a frame (letter b).  Each text is an
+object with a member called "is", which contains its kind: scene (constant part of a picture),
+numbers, events (next events), state, problems, file, scan.  The worker waits while there are two
+frames that the page has not yet confirmed as drawn (request `got`).
 
 A frame contains, in this order and in the byte order of the machine: time, collisions per disk and
 the positions of the left, right, bottom and top side as 8-byte floats; then as 4-byte floats x and
 y of all disks, their velocities, and their angles if they rotate.
 
-A change is applied at a time at which all events are complete, so that the run of `script` is
-bit-identical.
+A change is applied at a time at which all events are complete, so that the script written by
+`script` repeats the run bit for bit.
 """
 
 import base64

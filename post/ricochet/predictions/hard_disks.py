@@ -107,7 +107,7 @@ def henderson(eta: Number) -> Number:
 def simulated(eta: ArrayLike) -> np.ndarray:
     """Return Z = P / (n kT) of the fluid, interpolated between simulations.
 
-    The simulations are published ones, except between the packing fractions 0.648 and 0.698.
+    The simulations are published, except for those between the packing fractions 0.648 and 0.698.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def adiabat(
     the kinetic energy is -F dw, where the force F on the side is P h minus the tension of the two
     walls parallel to the motion.  According to scaled particle theory a wall has the tension kT n r
     / (1 - eta) and a deficit of n r (1 - eta) / (1 + eta) disks per length: Helfand, Frisch and
-    Lebowitz, J. Chem. Phys. 34, 1037 (1961).  P is that of `simulated`.
+    Lebowitz, J. Chem. Phys. 34, 1037 (1961).  P follows from `simulated`.
     """
     area = count * math.pi * radius**2
     eta = np.geomspace(1e-12, FREEZING[-1, 0], 50001)  # far from the walls

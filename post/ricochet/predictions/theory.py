@@ -108,8 +108,8 @@ def finite_n_cdf(count: int, periodic: bool = False) -> Law:
 def path_density(x: np.ndarray) -> np.ndarray:
     """Return the density of free paths under molecular chaos.
 
-    nu(v) / w follows from the mean relative speed of a disk of speed v in a gas with Maxwell's
-    velocities.
+    The collision rate nu(v) of a disk of speed v, divided by its mean w, follows from the mean
+    relative speed of such a disk in a gas with Maxwell's velocities.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def rough_rates(xi: float, beta: float, inertia: float) -> tuple[float, float, f
 
 
 def rough_ratio(xi: float, beta: float, inertia: float) -> float:
-    """Return the ratio R / T of the two temperatures that is approached by cooling rough disks.
+    """Return the ratio R / T that the two temperatures of cooling rough disks approach.
 
     Luding, Huthmann, McNamara and Zippelius, Phys. Rev. E 57, 3416 (1998), for Maxwell's
     velocities.

@@ -13,7 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-PRIORITY = 10  # of the removal of folders among what is done when a process ends
+PRIORITY = 10  # order of the removal of folders among the actions at the end of a process
 
 
 class RunError(Exception):
@@ -99,7 +99,7 @@ def destination(path: Path) -> Path:
 
 
 class TemporaryFolder:
-    """Folder of a run without output, removed when nothing that reads its file is alive any more.
+    """Folder of a run without output, removed with the last object that reads its file.
 
     If a worker process returns a run, the receiving process removes its files.  If a run is sent to
     workers, its files are removed when this process ends.

@@ -62,7 +62,7 @@ UNSETTLED = {*SOURCES, "unequal_temperatures", "inelastic", "soft_contacts", "ro
     "thermal_walls",
     "piston",
 }
-#: Traits of runs whose velocities do relax to it.
+#: Traits of runs whose velocities relax to Maxwell's distribution.
 SETTLED = TRAITS.keys() - UNSETTLED
 
 

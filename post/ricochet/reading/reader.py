@@ -233,7 +233,7 @@ class Run:
 
     @property
     def _offsets(self) -> np.ndarray:
-        """(4,) inward displacements of the sides from those of the box at the start of motion."""
+        """(4,) inward displacements of the initial positions of sides from the edges of the box."""
         ends = [end[axis] for axis in (0, 1) for end in (self.lower, self.upper)]
         starts = [side.get("position", end) for side, end in zip(self.sides, ends, strict=True)]
         return (np.array(starts, dtype=float) - ends) * [1, -1, 1, -1]
@@ -393,7 +393,8 @@ class Run:
         Parameters
         ----------
         name : str
-            name in the file, such as "angular_velocity" or "orientation"; `disk_data` has them all
+            name in the file, such as "angular_velocity" or "orientation"; `disk_data` contains all
+            of these quantities
 
         Returns
         -------
@@ -435,7 +436,8 @@ class Run:
         Parameters
         ----------
         name : str
-            name in the file, such as "total_energy" or "sides/left/impulse"; `observables` has all
+            name in the file, such as "total_energy" or "sides/left/impulse"; `observables` lists
+            all names
 
         Returns
         -------

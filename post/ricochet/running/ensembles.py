@@ -323,7 +323,7 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
         resume = ["--resume"] * bool(finished or unfinished)
         code = finished_with([*command, *resume], mark, **pipes)
         if finished and FINISHED in last_words(folder, name):
-            finished.touch()  # the new input does not ask for more than it has
+            finished.touch()  # the run already satisfies the new stop rules
             return 0
         if unfinished and BROKE_OFF in last_words(folder, name):
             code = finished_with(command, mark, **pipes)  # the member starts from the beginning

@@ -5,7 +5,8 @@
         gas.position, gas.observable("all/kinetic_energy"), gas.next_events(3)
 
 The library (`make library`) contains the engine of the program.  The state of a simulation is
-bit-identical to that of `build/ricochet` with the same input, whatever the calls of `advance`.
+bit-identical to that of `build/ricochet` with the same input, and does not depend on the
+intermediate times at which `advance` returns.
 """
 
 import ctypes
@@ -232,9 +233,9 @@ class Simulation:
     def copy(self) -> Self:
         """Return an independent simulation in the same state.
 
-        Both continue with the same bits.  `copy.copy`, `copy.deepcopy` and `pickle` work, too.  A
-        pickle contains a checkpoint, so it may be loaded by another process or later; a starting
-        file that the input names must exist there.
+        The copy and the original continue bit-identically.  `copy.copy`, `copy.deepcopy` and
+        `pickle` work, too.  A pickle contains a checkpoint, so it may be loaded by another process
+        or later; a starting file that the input names must exist there.
 
         Returns
         -------
@@ -292,8 +293,8 @@ class Simulation:
             number of events (collisions of any kind); simultaneous events are never separated
         on_event : callable, optional
             function of an `Event` that is called after each event, while the simulation is in the
-            state of that moment and may be changed; a true result ends the advance after the
-            events of this moment.  Each event takes about 20 us then
+            state of that moment and may be changed; a true result ends the advance after the events
+            of this moment.  With this function each event takes about 20 us
 
         Returns
         -------
@@ -303,9 +304,10 @@ class Simulation:
         Raises
         ------
         ValueError
-            if one of the values is past, or if neither a value nor the input says how far
+            if a limit has already been passed, or if neither an argument nor the input contains a
+            limit
         RunError
-            if nothing will ever happen again, so that none of the values can be reached
+            if no further event can occur, so that no limit can be reached
         ProgramError
             if the simulation cannot continue, for example after an inelastic collapse
 
@@ -615,7 +617,8 @@ class Simulation:
     def position(self) -> np.ndarray:
         """(N, 2) positions [length] within the box where an axis is periodic; a read-only copy.
 
-        All can be set at once: disks must not overlap, and the change of energy counts as work.
+        All positions can be set at once: disks must not overlap, and the change of energy counts as
+        work.
         """
         return self._column("position")
 
@@ -626,7 +629,7 @@ class Simulation:
 
     @property
     def velocity(self) -> np.ndarray:
-        """(N, 2) velocities [length/time]; a read-only copy.  All can be set at once."""
+        """(N, 2) velocities [length/time]; a read-only copy; all can be set at once."""
         return self._column("velocity")
 
     @velocity.setter
