@@ -140,7 +140,7 @@ contains
     integer(c_int), intent(out) :: code
     type(error_t), allocatable, intent(out) :: error
     type(limits_t) :: limits
-    real(real64) :: began, looked                     ! wall-clock time after which the procedure returns [s]
+    real(real64) :: began, looked                     ! wall-clock times: start of the call, start of the present step [s]
 
     code = going_on
     if (ieee_is_nan(rule%limits%time)) then

@@ -43,7 +43,7 @@ contains
     if (.not. allocated(error)) call input_from_text(text, path, overrides, input, error, printed)
   end subroutine read_input
 
-  !> The same for the text of an input; `path` is used only in messages. All problems are collected in one error.
+  !> Like `read_input`, but for a text instead of a file; `path` is used only in messages. All problems are collected in one error.
   subroutine input_from_text(text, path, overrides, input, error, printed, stepped)
     character(len=*), intent(in) :: text
     character(len=*), intent(in) :: path

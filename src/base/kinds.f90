@@ -10,7 +10,7 @@ module kinds
   !> The time of an event that never happens: later than any event. This time is finite, so that sums and products that contain it
   !> are finite as well.
   real(real64), parameter :: never = 1.0e150_real64
-  !> 2**53. Up to this number all integers are exact as reals, and real numbers resolve steps of 1.
+  !> 2**53, the largest number up to which real numbers represent every integer exactly.
   real(real64), parameter :: largest_exact = 2.0_real64**53
   real(real64), parameter :: pi = 3.14159265358979323846264338327950288_real64
 end module kinds

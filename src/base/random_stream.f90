@@ -17,7 +17,7 @@ module random_stream
 
   !> The state of a generator.
   type :: random_stream_t
-    integer(int64) :: word(4) = 0_int64         !! not all zero after the stream has been seeded
+    integer(int64) :: word(4) = 0_int64         !! state; at least one word is nonzero after seeding
   contains
     procedure :: seed
     procedure :: seed_draw
@@ -176,8 +176,8 @@ contains
     word = ieor(word, ishft(word, -31))
   end subroutine draw_seed
 
-  !> The number modulo 2**64, as a signed word. The result consists of the lower 64 bits, of which the highest becomes the sign. The
-  !> argument may be the product of two words, whose absolute value is at most 2**126.
+  !> The number modulo 2**64, as a signed word. The result consists of the lower 64 bits of the number; the highest of these bits is
+  !> the sign bit. The argument may be the product of two words, whose absolute value is at most 2**126.
   pure function wrapped(number) result(word)
     integer(int128), intent(in) :: number
     integer(int64) :: word

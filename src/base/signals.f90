@@ -1,8 +1,8 @@
 !> Signals that stop a run or request a checkpoint. The signal handler and the variables that it sets are in `system_calls.c`.
 !>
-!> While the files of a run are open, a sudden end could lose data. During this time a stop signal is only recorded, and the main
-!> loop responds to it by writing a checkpoint. If the signal arrives after the main loop, the file is completed nevertheless, and
-!> the run is finished.
+!> While the files of a run are open, a sudden end could lose data. During this time a stop signal is only recorded. The main loop
+!> then writes a checkpoint and ends the run. If the signal arrives after the end of the main loop, the signal has no effect: the
+!> file is completed, and the run is finished.
 module signals
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_int, c_null_char
   use system, only: talks_to_terminal

@@ -10,7 +10,7 @@ module status_line
 
   real(real64), parameter :: terminal_pause = 0.2_real64, file_pause = 30.0_real64   !! time between two updates of the line [s]
   character(len=*), parameter :: erase_rest = achar(27)//"[K", &   !! erases the rest of the line on the terminal
-    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"          !! do not wrap long lines, wrap them again
+    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"          !! switch the wrapping of long lines off and on
 
   type :: status_line_t
     logical, private :: quiet = .true.

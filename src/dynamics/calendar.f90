@@ -1,8 +1,8 @@
 !> The part of the event queue for later times. Time is divided into windows of equal length. Each of the next windows has a bucket:
-!> an array that occupies one cache line and to which entries are only appended. Later times are divided into spans of many windows,
-!> each of which has an unordered list. To append an entry accesses few cache lines, and single entries are never searched or
-!> removed. All lists share one array, which is divided into chunks. The chunks of a list are reused when its span has been
-!> processed.
+!> an array that occupies one cache line and to which entries are only appended. Times after these windows are divided into spans of
+!> many windows each, and each span has an unordered list. Appending an entry accesses few cache lines, and single entries are never
+!> searched or removed. All lists share one array, which is divided into chunks. The chunks of a list are reused when its span has
+!> been processed.
 module calendar
   use kinds, only: int32, real64
   use disks, only: tag_t
@@ -14,8 +14,8 @@ module calendar
   !> Intended mean number of events in a window. With fewer events per window, more of the windows that are processed contain no
   !> event. With more events per window, buckets are full more often and further events are stored in the heap.
   real(real64), parameter :: events_per_window = 4.0_real64
-  integer(int32), parameter :: few_disks = 5000    !! up to this number of disks nearly all events fit into buckets
-  !> Number of windows after the current one in which each stage of prefetching lists disks.
+  integer(int32), parameter :: few_disks = 5000    !! number of disks up to which nearly all events fit into buckets
+  !> For each stage of prefetching, the number of windows by which it looks ahead of the current window.
   integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]
   integer(int32), parameter :: stages = size(windows_ahead)
   integer(int32), parameter :: most_coming = windows_ahead(1)*bucket_capacity
@@ -28,7 +28,8 @@ module calendar
   end type bucket_t
 
   integer(int32), parameter :: log_chunk = 7
-  !> Number of entries in a chunk of a list, which occupies 1 KiB; the first entry is a link.
+  !> Number of entries in a chunk. A chunk is a part of a list and occupies 1 KiB. Its first entry is a link to another chunk of the
+  !> list.
   integer(int32), parameter :: chunk = shiftl(1_int32, log_chunk)
   integer(int32), parameter :: none = -1
 
@@ -48,8 +49,8 @@ module calendar
     type(filed_t), allocatable :: filed(:)
     integer(int32) :: n_chunks = 0                 !! number of chunks that have been used
     integer(int32) :: vacant = none                !! head of the list of free chunks
-    integer(int32) :: last_bucket = 0              !! a power of two minus 1, used as a bit mask for window numbers
-    integer(int32) :: last_span = 0                !! bit mask for span numbers, also a power of two minus 1
+    integer(int32) :: last_bucket = 0              !! largest index: a power of two minus 1, used as a bit mask for window numbers
+    integer(int32) :: last_span = 0                !! largest index of a span, which is also the bit mask for span numbers
     integer(int32) :: log_span = 0                 !! binary logarithm of the number of windows in a span
     integer(int32) :: ring_end = 0                 !! first window that has no bucket yet
     integer(int32) :: announced(stages) = 0        !! last window of which each stage has listed the disks
@@ -209,9 +210,9 @@ contains
     end do
   end subroutine open_span
 
-  !> Lists disks that probably have events in the next windows, separately for each stage of prefetching. Each stage lists the disks
-  !> of each window once. A later stage lists them at a later time, when fewer windows precede the window of their event. All stages
-  !> except the first list only disks whose entry is still valid.
+  !> Lists disks that probably have events in the next windows, for one stage of prefetching. Each stage lists the disks of each
+  !> window once. The first stage looks ahead by the largest number of windows, and later stages look ahead by fewer windows. All
+  !> stages except the first omit disks whose entry has become invalid.
   subroutine list_coming(self, tag, window, stage, n, disks)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)

@@ -17,8 +17,8 @@ module changes
 
 contains
 
-  !> Replaces the box, the contact law and the drive of a simulation by those of an input with the same disks. The new ones apply
-  !> from the present time on. The positions of moving sides must be continuous.
+  !> Replaces the box, the contact law and the drive of a simulation by those of an input with the same disks. The new box, contact
+  !> law and drive apply from the present time on. The positions of moving sides must be continuous.
   subroutine change_system(sim, system, problem)
     type(simulation_t), intent(inout) :: sim
     type(system_t), intent(in) :: system
@@ -58,8 +58,8 @@ contains
     call book(sim, before)
   contains
 
-    !> Sets the number of kicks to the number in a run that has had the new driving from its start. This number determines the time
-    !> and the random numbers of the next kick.
+    !> Sets the number of kicks to the value that it would have if the new driving had acted since the start of the run. This number
+    !> determines the time and the random numbers of the next kick.
     subroutine count_kicks()
       if (.not. sim%drive%is_on()) return
       sim%kicks = int(min(sim%time()/sim%drive%interval, 2.0_real64**62), int64)
@@ -129,7 +129,7 @@ contains
     end do
   end subroutine advance_all
 
-  !> Adds the energy change to the work. The exact sums use the same unit as a run that has had the new system from its start.
+  !> Adds the energy change to the work. The exact sums use the same unit as in a run that starts with the new system.
   subroutine book(sim, before)
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: before                       !! total energy before the change [energy]

@@ -17,7 +17,8 @@ module epochs
   integer(int64), parameter :: epoch_length = 24
   !> Significant bits of the length of an epoch; with so few bits, sums of lengths are exact.
   integer, parameter :: significant_bits = 20
-  !> A collapse is reported after this number of events, and at least this number per disk, that do not advance the time.
+  !> A collapse is reported when the number of events since the last advance of the time reaches the first number, and the number of
+  !> these events per disk reaches the second number.
   integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
   real(real64), parameter :: shortest = 2.0_real64**(-20)  !! shortest epoch in units of `negligible_time`
   real(real64), parameter :: last_time = 0.5_real64*never
@@ -79,8 +80,8 @@ contains
   end subroutine begin_epoch
 
   !> Ends the epoch and moves the origin of time to about the present time, so that times stay small and keep their precision. As
-  !> all events have to be predicted again, the disks are also sorted by cells. The end of the next epoch is a time and not a
-  !> number of events, so that domains that run independently of each other agree on it.
+  !> all events have to be predicted again in any case, the disks are also sorted by cells. The end of the next epoch is defined by
+  !> a time and not by a number of events, so that it is the same in domains that run independently of each other.
   subroutine move_epoch(sim)
     type(simulation_t), intent(inout) :: sim
     real(real64) :: shift, length
@@ -130,8 +131,8 @@ contains
     end do
   end subroutine move_origin
 
-  !> Number of events at which an epoch ends before its time. The epoch reaches this number only if the event rate is far higher
-  !> than expected, as before a collapse.
+  !> Number of events in an epoch at which the epoch ends earlier than planned. This number is reached only if the event rate is far
+  !> higher than expected, as before a collapse.
   pure function most_events(sim) result(n)
     type(simulation_t), intent(in) :: sim
     integer(int64) :: n

@@ -34,7 +34,7 @@ module event_driven
   integer(int64), parameter :: events_ahead = 8    !! number of events between two prefetches
 
   type, extends(evolution_t) :: event_driven_t
-    !> Polymorphic, so that its rarely used procedures are not inlined into the hot path.
+    !> The search. The component is polymorphic, so that rarely used procedures of the search are not inlined into the hot path.
     class(cell_grid_t), allocatable :: search
     type(event_queue_t) :: queue
     logical :: windowed = .true.                   !! the queue uses its calendar, not only the heap
@@ -149,7 +149,7 @@ contains
         call follow_piston(self, sim)
         cycle
       end if
-      ! A stale event depends on the order of predictions, and the returned event must not.
+      ! A stale event depends on the order of predictions. The returned event must not depend on this order.
       if (is_stale()) then
         call predict(self, sim, event%disk)
         cycle
@@ -173,7 +173,7 @@ contains
       if (yes) yes = sim%disk(event%partner)%collision_counter /= sim%tag(event%disk)%partner_counter
     end function is_stale
 
-    !> The number of events before which no check is due.
+    !> The number of executed events at which the next check is due.
     pure function next_pause() result(events)
       integer(int64) :: events
 

@@ -9,7 +9,8 @@ module event_heap
   private
   public :: event_heap_t, need_order, precedes
 
-  !> Children per node; compared with a binary heap, the depth is halved and no more cache lines are accessed per level.
+  !> Number of children of a node. Compared with a binary heap, the depth of the heap is halved, and the number of cache lines that
+  !> are accessed per level is the same.
   integer(int32), parameter :: arity = 4
 
   type :: event_heap_t

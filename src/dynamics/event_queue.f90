@@ -25,7 +25,7 @@ module event_queue
     !> (0:n_near) sorted list of events, the latest first; element 0 is a sentinel that is never due.
     type(event_t) :: near(0:near_capacity)
     integer(int32) :: n_near = 0
-    !> Events of the current window are added to the sorted list; otherwise to the heap.
+    !> .true.: new events of the current window are added to the sorted list; .false.: they are added to the heap.
     logical :: near_is_open = .false.
     logical :: windowed = .true.                   !! the calendar is in use, not only the heap
     integer(int32) :: window = 0                   !! index of the current window since the epoch
@@ -301,7 +301,7 @@ contains
     end associate
   end function is_valid
 
-  !> Advances by one window and sorts the events of the new window into the list, which is empty before.
+  !> Advances by one window and sorts the events of the new window into the list, which must be empty.
   subroutine open_next_window(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -357,7 +357,8 @@ contains
     end do
   end subroutine take_bucket
 
-  !> Moves the events due in this window from the heap to the sorted list; if the list overflows, moves it into the heap.
+  !> Moves the events due in this window from the heap to the sorted list. If the list overflows, all its events are moved back into
+  !> the heap.
   subroutine take_from_heap(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)

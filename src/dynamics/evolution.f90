@@ -9,7 +9,7 @@ module evolution
   private
   public :: evolution_t, limits_t
 
-  !> Limits at which the dynamics stops; the first one reached applies. The default values are never reached.
+  !> Limits of the dynamics, which stops when the first of them is reached. The default values are never reached.
   type :: limits_t
     real(real64) :: time = never  !! since the start of the run; when passed to an evolution, since the epoch [time]
     integer(int64) :: collisions = huge(0_int64)
@@ -30,7 +30,7 @@ module evolution
     logical :: arrived = .false.  !! the last advance reached its time limit, and all events up to it have been executed
     integer(int64) :: iterations_left = 0  !! number of iterations that the last advance was allowed but did not use
     integer(int64) :: serial_events = 0    !! number of events executed by the serial engine of a parallel run
-    integer(int32) :: last_event(2) = 0    !! disk and partner of the last event, or of the first one beyond the time limit
+    integer(int32) :: last_event(2) = 0    !! disk and partner of the last event, or of the first event after the time limit
   contains
     procedure :: warning
     procedure :: pause_at
@@ -71,9 +71,9 @@ contains
     yes = tally%events >= self%events .or. tally%collisions >= self%collisions .or. self%outgrown(tally)
   end function reached
 
-  !> Whether a limit on a quantity that any collision may change is reached. Such a quantity must never decrease: a parallel run
-  !> detects afterwards that the limit was exceeded, and repeats the time window to find the collision at which the limit was
-  !> reached.
+  !> Whether a limit on a quantity that any collision may change is reached. Such a quantity must never decrease. A parallel run
+  !> detects only at the end of a time window that the limit was exceeded. It then repeats the window to find the collision at which
+  !> the limit was reached.
   pure function outgrown(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally

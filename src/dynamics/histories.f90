@@ -29,9 +29,10 @@ module histories
     integer(int32), allocatable :: history_of(:)   !! (slots) index of the history of each disk; 0 if it has no history
     integer(int32) :: own_low(2) = 0, own_high(2) = 0      !! first and last column and row of the domain
     integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! range of columns and rows that are not in the patch of another domain
-    !> Range of columns and rows in which all neighbouring cells are in the patch.
+    !> Range of columns and rows of the cells whose eight neighbours are all in the patch.
     integer(int32) :: safe_low(2) = 0, safe_high(2) = 0
-    !> (0:,0:) 1 if an own disk that has left the domain was in this cell or in one of the eight cells around it.
+    !> (0:,0:) 1 if a disk that is owned by the domain but has left it was in this cell or in one of the eight cells around this
+    !> cell.
     integer(int8), allocatable :: reached(:, :)
     logical :: left_patch = .false.                !! a disk that the domain owns has reached the edge of the patch
   contains
@@ -168,7 +169,8 @@ contains
     end associate
   end subroutine record_cell
 
-  !> Records that an own disk in this cell has left the domain: the disk may touch any disk in the nine cells around its position.
+  !> Records that a disk owned by the domain is in this cell, outside of the domain. The disk may touch any disk in this cell and
+  !> the eight cells around it.
   subroutine reach(self, cell)
     class(histories_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)

@@ -14,7 +14,7 @@ module kicks
 
 contains
 
-  !> Applies the next kick to the disks at the present time, and lists those affected.
+  !> Applies the next kick to the disks at the present time, and lists the affected disks.
   subroutine kick(sim, kicked)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable, intent(out) :: kicked(:)
@@ -63,7 +63,7 @@ contains
   end subroutine kick
 
   !> Sets a new velocity of disk i; in a sheared box the velocity is relative to the velocity profile. Erases the last partner of
-  !> the disk, because the two disks may now collide again immediately. A kick does not count as a collision.
+  !> the disk, because the disk and this partner may now collide again immediately. A kick does not count as a collision.
   subroutine kick_disk(sim, i, is_hit, z)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

@@ -34,7 +34,7 @@ contains
     call move_in_order(sim, order)
   end subroutine renumber
 
-  !> Permutes the disks in place, without a second copy of them. Most of them are already near their new position.
+  !> Permutes the disks in place, without a second copy of them. Most disks are already near their new position.
   subroutine move_in_order(sim, order)
     type(simulation_t), intent(inout) :: sim
     !> in: index of the disk that belongs at each position; out: the identity permutation.

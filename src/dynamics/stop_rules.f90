@@ -1,9 +1,9 @@
 !> Determines when a run ends: when one of the stop rules in the input is met, or when rounding errors dominate.
 !>
-!> In a periodic box inelastic disks cool until all of them move with the common velocity that results from rounding errors. The
-!> temperature loses its precision long before this state, and the run ends when it does. The test is made at the start of each
-!> epoch, so that the end of the run depends on the trajectory alone. The energy is compared with the energy at the time when
-!> velocities were last set, because this sets the scale of the rounding errors.
+!> In a periodic box inelastic disks cool until only a common velocity that results from rounding errors remains. Long before this
+!> state is reached, rounding errors dominate the temperature, and the run then ends. The test is made at the start of each epoch,
+!> so that the end of the run depends on the trajectory alone. The energy is compared with the energy at the time when the
+!> velocities were last set, because that energy determines the magnitude of the rounding errors.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use epochs, only: is_at_rest, stands_still
@@ -64,7 +64,8 @@ contains
       .and. .not. sim%is_driven()
   end function new_stop_rule
 
-  !> The smallest integer that is not less than a real number of collisions, apart from rounding errors; huge if there is none.
+  !> The smallest integer that is not less than a real number of collisions, apart from rounding errors. The result is huge if the
+  !> number exceeds the range of 64-bit integers.
   pure function whole_collisions(number) result(n)
     real(real64), intent(in) :: number
     integer(int64) :: n
@@ -138,7 +139,8 @@ contains
     end do
   end function relative_energy
 
-  !> Completed fraction of the run, from 0 to 1. It is the largest of the fractions that the stop rules define.
+  !> Completed fraction of the run, from 0 to 1. For each stop rule the present value is divided by the limit, and the largest of
+  !> these ratios is returned.
   pure function share(self, sim, elapsed) result(done)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

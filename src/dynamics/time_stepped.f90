@@ -267,9 +267,9 @@ contains
     inside = iand(merge(1, 0, x >= low), merge(1, 0, x <= high))
   end function between
 
-  !> Reports problems of the length of the step; the text is empty if there are none. The fastest disk may fall through the whole
-  !> box; its speed is then estimated as v0 + sqrt(2 g L). A disk that dissipates energy in every step of a lasting contact sinks by
-  !> up to g dt**2/2 per step under gravity; the TC model prevents this.
+  !> A warning about the length of the step; empty if the length is suitable. The fastest disk may fall through the whole box; its
+  !> speed is then estimated as v0 + sqrt(2 g L). A disk that dissipates energy in every step of a lasting contact sinks by up to g
+  !> dt**2/2 per step under gravity; the TC model prevents this.
   pure function warning(self, sim) result(text)
     class(time_stepped_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

@@ -48,8 +48,8 @@ contains
     if (self%known) self%from(i, :) = self%from(i, :) + dx
   end subroutine shift
 
-  !> Makes a new list, unless all disks have moved by less than half the skin since the last one. With `all_pairs` a list is made in
-  !> every step and without bins. A stop request ends this procedure early, and the list is then incomplete.
+  !> Makes a new list, unless all disks have moved by less than half the skin since the last list was made. With `all_pairs` a list
+  !> is made in every step and without bins. A stop request ends this procedure early, and the list is then incomplete.
   subroutine update(self, sim, x, step, all_pairs)
     class(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

@@ -79,8 +79,8 @@ contains
     end do
   end subroutine check_places
 
-  !> Whether a file begins with the first bytes of an HDF5 file, or is empty or contains only zeros, as a file of a run that was
-  !> killed early.
+  !> Whether a file begins with the first bytes of an HDF5 file, or is empty or contains only zeros. The last two cases occur if a
+  !> run is killed early.
   function begins_like_a_run(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes

@@ -21,7 +21,7 @@ module sample_track
   integer(int64), parameter :: growth = 4               !! factor by which the capacity increases when the file is full
 
   type :: track_t
-    !> The series; step and time are the first two if the other series share them.
+    !> The series. If all series have the same step and time, the series of step and time are the first two.
     type(series_t), allocatable :: series(:)
     character(len=:), allocatable :: counter            !! path of the counter dataset
     integer(int64) :: planned = 0                       !! number of samples of the whole run; 0 if it is unknown
@@ -168,7 +168,7 @@ contains
     self%committed = count
   end subroutine resume
 
-  !> Writes the number of complete samples. After `resume`, readers can then no longer see the samples after the first `count`.
+  !> Writes the number of complete samples. After `resume`, readers then ignore the samples after the first `count`.
   subroutine put_counter(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file

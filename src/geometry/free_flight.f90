@@ -10,7 +10,8 @@ module free_flight
   !> Speeds below this value are treated as zero, because times would overflow. [length/time]
   real(real64), parameter :: slowest = 1/never
 
-  !> Relative margin that exceeds all rounding errors. It is used in a test whose result may be wrong in one direction only.
+  !> Relative margin that exceeds all rounding errors. Because of this margin a test may fail to exclude a contact that does not
+  !> occur, but it never excludes a contact that occurs.
   real(real64), parameter :: spare = 1.0e-6_real64
   !> Largest number of times that an interval is halved to obtain a bound on the distance in each part.
   integer, parameter :: most_halvings = 3
@@ -227,7 +228,8 @@ contains
     bound = scale(2.0_real64, power)
   end function root_bound
 
-  !> The root of a cubic between lo and hi, where the cubic changes its sign once. The root is found by bisection to the last bit.
+  !> The root of a cubic in the interval from lo to hi. The cubic must have exactly one change of sign in this interval. The root is
+  !> found by bisection to the last bit.
   pure function root_between(cubic, lo, hi) result(s)
     real(real64), intent(in) :: cubic(0:3), lo, hi
     real(real64) :: s, left, right

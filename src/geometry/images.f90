@@ -57,11 +57,12 @@ contains
     end associate
   end function moving_images
 
-  !> Splits a number into a sum of two numbers, each with half of its digits. Products of such numbers are exact.
+  !> Splits a number into two numbers that add up to it. Each of the two has at most 27 significant binary digits, so that the
+  !> product of two such numbers is exact.
   pure function halves(x)
     real(real64), intent(in) :: x
     real(real64) :: halves(2)
-    integer, parameter :: half = 26             ! half of the 53 binary digits of a double
+    integer, parameter :: half = 26             ! significant digits of the first part
 
     halves(1) = scale(aint(scale(fraction(x), half)), exponent(x) - half)
     halves(2) = x - halves(1)
@@ -111,8 +112,8 @@ contains
     displacement = rows*(self%offset + self%velocity*now)
   end function displacement
 
-  !> Time until which it is sufficient to consider the images that are in reach now, and images displaced from these by up to
-  !> `distance`.
+  !> Time at which the image above the box will have moved by `distance` from its present position; `never` if it does not move.
+  !> Until this time a search can use the images that are in reach now, if the search covers displacements of up to `distance`.
   pure function valid_until(self, now, distance) result(t)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: now             !! [time]

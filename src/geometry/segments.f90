@@ -1,4 +1,4 @@
-!> Straight walls between two points, impenetrable from both sides. Disks also collide with their ends.
+!> Straight walls between two points, impenetrable from both sides. Disks also collide with the ends of a wall.
 !>
 !> A disk touches the wall when its centre reaches the stadium around it: two straight sides at the distance of the radius, and two
 !> half circles around the ends. The stadium is convex. The centre of a disk can therefore reach a straight side only from outside.

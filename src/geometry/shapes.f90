@@ -7,7 +7,8 @@ module shapes
   private
   public :: shape_t, magnitude, spare
 
-  !> Relative margin that exceeds all rounding errors. It is used in tests whose result may be wrong in one direction only.
+  !> Relative margin that exceeds all rounding errors. Tests with this margin return the safe result if rounding errors make the
+  !> exact result uncertain.
   real(real64), parameter :: spare = 1.0e-6_real64
 
   !> The outline of an obstacle. Points are given relative to its middle.
@@ -37,7 +38,7 @@ module shapes
       real(real64), intent(in) :: v(2)          !! [length/time]
       real(real64), intent(in) :: g(2)          !! [length/time**2]
       real(real64), intent(in) :: radius        !! radius of the disk [length]
-      real(real64), intent(in), optional :: within   !! contacts later than this may come out as `never` [time]
+      real(real64), intent(in), optional :: within   !! if the contact is later than this time, the result may be `never` [time]
       real(real64) :: s
     end function contact_time
 

@@ -1,5 +1,5 @@
-!> Motion of a side of the box, and the time when it touches a disk in free flight. All quantities are components along the inner
-!> normal of the side.
+!> Motion of a side of the box, and the time when the side touches a disk in free flight. All quantities are components along the
+!> inner normal of the side.
 !>
 !> While the acceleration of a disk relative to the side has a constant sign, the gap between them is a convex or concave function
 !> of time, whose first zero can be bracketed. A period of the motion consists of a few such intervals. No contact can therefore be
@@ -168,7 +168,7 @@ contains
     end if
   end function acceleration
 
-  !> Displacement of the side from the time tau on, during the time s.
+  !> Displacement of the side between the times tau and tau + s.
   elemental function displacement(self, tau, s) result(distance)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -196,7 +196,8 @@ contains
     end if
   end function is_short
 
-  !> Displacement relative to an imaginary side that continues with the velocity at the time tau, in full precision.
+  !> Difference between the displacement of the side and that of an imaginary side with constant velocity, between the times tau and
+  !> tau + s. The two sides have the same velocity at the time tau. The difference is computed without cancellation.
   elemental function excess_displacement(self, tau, s) result(distance)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -213,7 +214,7 @@ contains
     end if
   end function excess_displacement
 
-  !> Change of the velocity of the side from the time tau on, during the time s.
+  !> Change of the velocity of the side between the times tau and tau + s.
   elemental function velocity_change(self, tau, s) result(v)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -230,8 +231,8 @@ contains
     end if
   end function velocity_change
 
-  !> Duration, from the time tau, for which the gap to a disk with the acceleration g stays convex or concave. It ends when the
-  !> acceleration of the side equals g, and is at most half a period.
+  !> Duration of the interval, starting at the time tau, in which the gap to a disk with the acceleration g is convex or concave.
+  !> The interval ends when the acceleration of the side equals g, and its length is at most half a period.
   elemental function curvature_interval(self, tau, g) result(s)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! time as returned by `local_time` [time]

@@ -10,7 +10,7 @@ module input_problems
   integer, parameter :: whole_file = 1000000000 !! larger than any line number
 
   type :: problem_t
-    integer :: line                             !! > 0: line of the file; 0: the whole file; -k: override k
+    integer :: line                             !! line of the file (> 0), 0 for the whole file, or -k for override k
     character(len=:), allocatable :: text
   end type problem_t
 

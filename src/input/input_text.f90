@@ -38,7 +38,7 @@ module input_text
     character(len=:), allocatable :: where       !! group.variable, for messages
     integer :: element = 0                       !! index of an element: the 2 in name(2) = value; 0 if there is no index
     type(token_t), allocatable :: tokens(:)      !! tokens of the values of the assignment
-    logical :: sound = .true.                    !! .false. if problems of the assignment have been reported
+    logical :: sound = .true.                    !! .false. if a problem of this assignment has been reported
   end type assignment_t
 
 contains

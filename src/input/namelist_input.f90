@@ -445,8 +445,8 @@ contains
       if (element > 0) name = name(:bracket - 1)
     end subroutine split_element
 
-    !> Removes the sampling interval that the file contains for the same samples as an interval in an override, because the override
-    !> replaces it.
+    !> Removes a sampling interval that the file sets, if an override sets another interval for the same samples. The interval of
+    !> the override replaces that of the file.
     subroutine replace_cadence(group, name)
       type(group_t), intent(inout) :: group
       character(len=*), intent(in) :: name                !! name of the variable that is set

@@ -1,5 +1,6 @@
-!> The radii of the disks of a species: equal, or drawn from a distribution. The largest possible radius is ten times the smallest
-!> one. A radius beyond these limits is drawn again. A distribution with many radii beyond the limits is not allowed.
+!> The radii of the disks of a species: equal, or drawn from a distribution. Drawn radii have limits, and the upper limit is ten
+!> times the lower limit. A radius beyond the limits is drawn again. A distribution with many radii beyond the limits is not
+!> allowed.
 module radii
   use kinds, only: int64, real64
   use random_stream, only: random_stream_t

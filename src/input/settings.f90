@@ -14,7 +14,8 @@ module settings
   private
   public :: run_input_t, settings_t, run_settings_t, sampling_t, species_settings_t, output_settings_t, disks_in_file_t
 
-  !> Smallest number of disks for which domains that fit into the cache save time on one core.
+  !> Number of disks from which a division into domains saves time even on one core, because the data of one domain fit into the
+  !> cache.
   integer, parameter :: many_disks = 500000
 
   type :: run_settings_t
@@ -24,7 +25,7 @@ module settings
     real(real64) :: dt                                !! time step of 'steps' [time]
     character(len=:), allocatable :: search           !! 'cells', 'pairs' or 'rescan'
     character(len=:), allocatable :: queue            !! 'calendar' or 'heap'
-    !> Number of threads; in: 0 for the value of the environment; later the number that is used.
+    !> Number of threads. The value 0 in the input is replaced by the value of the environment when the threads are started.
     integer :: threads
     integer :: threads_asked = 1                      !! number of threads that was requested
   end type run_settings_t
@@ -82,12 +83,12 @@ module settings
     real(real64) :: every(4) = never                  !! interval for each of `sampled_by`
     real(real64), allocatable :: at(:)                !! given sampling times in ascending order [time]
     integer :: per_decade = 0                         !! number of logarithmic sampling times per decade; 0 if there are none
-    real(real64) :: from = never                      !! first logarithmic sampling time [time]
+    real(real64) :: from = never                      !! the first of the logarithmic sampling times [time]
   end type sampling_t
 
   type :: output_settings_t
     type(sampling_t) :: sampling(2)                   !! schedule for each of `sampled`
-    !> Columns of frames in addition to positions; not allocated for all columns.
+    !> Columns of frames in addition to positions. If this array is not allocated, frames contain all columns.
     character(len=text_length), allocatable :: frame_columns(:)
     logical :: single_precision                       !! frames are stored in single precision
     logical :: event_log

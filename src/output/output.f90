@@ -292,7 +292,8 @@ contains
     log%n = 0
   end subroutine take_events
 
-  !> Adds samples to a track. If the samples do not fit into the file, a larger file first replaces it.
+  !> Adds samples to a track. If the file has no space for these samples, a larger file replaces the file before the samples are
+  !> added.
   subroutine add(self, track, samples, sim)
     class(output_t), intent(inout) :: self
     integer, intent(in) :: track

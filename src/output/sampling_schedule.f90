@@ -18,7 +18,7 @@ module sampling_schedule
   type :: schedule_t
     !> Intervals of time, of collisions and of events; the intervals of collisions and events need not be integers.
     real(real64) :: every(3) = never
-    type(sampling_t) :: chosen                    !! the sampling rules of the input, for the given times
+    type(sampling_t) :: chosen                    !! the sampling rules of the input, with the given times
     integer(int64) :: count = 0                   !! number of samples taken; the first sample is due at the start
     real(real64) :: next(3) = never               !! time, collisions and events at which the next samples are due
     real(real64) :: last_time = -1.0_real64       !! time of the last sample [time]

@@ -49,7 +49,7 @@ contains
           found = found + 1
           associate (history => mine%history(mine%history_of(s)))
             same = history%digest == theirs%history(r)%digest .and. same_state() &
-              .and. self%patch%holds(self%sim%tag(s)%cell)  ! a copy that has left the patch stays wrong
+              .and. self%patch%holds(self%sim%tag(s)%cell)  ! a copy that has left the patch is not corrected
             if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
             near = came_near(theirs%history(r), met)
             if (.not. met) met = mine%could_have_met(int(history%low, int32), int(history%high, int32))

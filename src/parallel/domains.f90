@@ -19,7 +19,7 @@ module domains
   private
   public :: advance_domain, correction_t, domain_t, forever, list_copies, load, merge_logs, next_time, slot_of_copy, write_back
 
-  real(real64), parameter :: forever = 2.0e150_real64      !! later than any event
+  real(real64), parameter :: forever = 2.0e150_real64      !! a time later than the time of any event
   !> Longest wall time for a window of one domain, after which the window is given up [s]
   real(real64), parameter :: longest_window = 5.0_real64
   !> Number of iterations between two checks of signals and of the clock.
@@ -28,7 +28,8 @@ module domains
   !> spare_at_least.
   integer(int32), parameter :: spare = 32, spare_at_least = 200
 
-  !> Correction: the true state of a disk whose copy in this domain is wrong or missing, or has to be removed.
+  !> The true state of a disk, with which a domain updates a wrong copy of the disk or adds a missing copy. If the disk has left the
+  !> patch, the domain removes its copy.
   type, extends(whole_disk_t) :: correction_t
     integer(int32) :: global_index = 0             !! index of the disk in the whole simulation
     !> Column and row relative to the patch of this domain; the cell may be outside the patch.

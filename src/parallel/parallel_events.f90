@@ -19,8 +19,8 @@ module parallel_events
 
   integer, parameter :: most_windows = 24                      !! largest number of windows in one call of `run_domains`
   real(real64), parameter :: shortest = 0.1_real64             !! shortest window that is tried, relative to the usual length
-  !> Smallest remaining numbers of events per disk, before a count reaches its limit, for which domains are continued and for which
-  !> domains are started.
+  !> If a count will reach its limit after fewer events per disk than these numbers, the serial engine is used. The first number
+  !> applies while domains are in use, and the second number applies before domains are started.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
   ! Shortest and longest periods of the serial engine [events per disk]:
   integer(int64), parameter :: brief(2) = 5                         !! used in a situation that domains cannot handle
@@ -203,9 +203,9 @@ contains
       call use_serial_engine(after_failures)
     end subroutine shorten_windows
 
-    !> Selects the serial engine for a period. The period is twice as long as the last one, unless domains have been successful for
-    !> longer than the last period since then. A run for which domains are unsuitable therefore costs hardly more than with the
-    !> serial engine alone.
+    !> Selects the serial engine for a period. The period is twice as long as the last one, unless domains have worked for longer
+    !> than the last period in the meantime. A run for which domains are unsuitable therefore costs hardly more than with the serial
+    !> engine alone.
     subroutine use_serial_engine(periods)
       integer(int64), intent(in) :: periods(2)      !! shortest and longest period [events per disk]
 

@@ -1,6 +1,6 @@
 !> A simulation that is divided into domains, which advance together by time windows. The domains contain the predicted events. The
-!> simulation itself keeps its old state until the states of the domains are copied back. After an invalid window the domains cannot
-!> be continued and have to be loaded again.
+!> simulation itself keeps its old state until the states of the domains are copied back. After an invalid window the states in the
+!> domains are wrong, and the domains have to be loaded again.
 module partition
   use kinds, only: int16, int32, int64, real64
   use cell_faces, only: patch_t
@@ -21,7 +21,7 @@ module partition
   !> Wall-clock time after which the caller can check signals and clocks [s]
   real(real64), parameter :: longest_call = 1.0_real64
   real(real64), parameter :: averaging_time = 0.1_real64       !! averaging time for the number of active cores [s]
-  !> Remaining number of events before a limit below which the domains advance one event at a time.
+  !> If fewer events than this number remain before a limit is reached, the domains advance one event at a time.
   real(real64), parameter :: few_events = 20.0_real64
 
   !> The next step of all threads. One thread determines this step while the other threads wait.
@@ -63,7 +63,7 @@ module partition
 
 contains
 
-  !> Divides a simulation and loads the domains. `cut` is .false. if it cannot be divided into at least two.
+  !> Divides a simulation and loads the domains. `cut` is .false. if the simulation cannot be divided into at least two domains.
   subroutine fill(self, sim, listing, cut)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

@@ -232,8 +232,8 @@ contains
     highest = maxval(self%surface%law%temperature)
   end function highest_temperature
 
-  !> Highest of these speeds: the tangential speed of a surface, the speed of a moving side, and the speed of the periodic image
-  !> above a sheared box.
+  !> The highest speed at which any boundary moves: the maximum of the tangential speeds of surfaces, the speeds of moving sides,
+  !> and the speed of the periodic image above a sheared box.
   pure function highest_speed(self) result(highest)
     class(box_t), intent(in) :: self
     real(real64) :: highest                     !! [length/time]
@@ -257,7 +257,7 @@ contains
     yes = self%highest_temperature() > 0 .or. self%does_work()
   end function gives_energy
 
-  !> Largest outward displacements of moving sides from their mean positions. Disks can be in this range as well.
+  !> Largest outward displacement of each moving side from its mean position. Disks can follow a side into this range.
   pure function side_excursion(self) result(length)
     class(box_t), intent(in) :: self
     real(real64) :: length(2, 2)                !! (axis, lower or upper) [length]
@@ -289,9 +289,9 @@ contains
     end associate
   end function side_velocity
 
-  !> Finds the first contact of a disk with the listed obstacles, if it is earlier than a known event. A disk stays in the box until
-  !> it passes a periodic side. Images of an obstacle that are shifted by at most one period are therefore sufficient. An obstacle
-  !> that encloses the disks has no images.
+  !> Finds the first contact of a disk with some obstacles, if this contact is earlier than a known event. A disk stays in the box
+  !> until it passes a periodic side. Images of an obstacle that are shifted by at most one period are therefore sufficient. An
+  !> obstacle that encloses the disks has no images.
   pure subroutine next_obstacle(box, disk, last, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -311,9 +311,9 @@ contains
     end do
   end subroutine next_obstacle
 
-  !> Finds the contact of a disk with one image of an obstacle, if it is earlier than a known event. Obstacles that disks touch from
-  !> outside are convex. A disk that leaves such an obstacle on a straight line cannot return. Contacts predicted because of
-  !> rounding errors are therefore skipped.
+  !> Finds the contact of a disk with one image of an obstacle, if this contact is earlier than a known event. Obstacles that disks
+  !> touch from outside are convex. A disk that leaves such an obstacle on a straight line cannot return. Contacts predicted because
+  !> of rounding errors are therefore skipped.
   pure subroutine find_image_contact(box, disk, last, obstacle, shift, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk

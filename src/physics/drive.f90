@@ -20,7 +20,7 @@ module drive
     real(real64) :: temperature = 0.0_real64         !! kT of the velocities drawn by 'andersen', 'brownian' and 'active' [energy]
     real(real64) :: speed = 0.0_real64               !! self-propulsion speed of active disks [length/time]
     real(real64) :: rotational_diffusion = 0.0_real64   !! rotational diffusion coefficient of active disks [1/time]
-    integer :: species = 0                           !! index of the only driven species; 0: all are driven
+    integer :: species = 0                           !! index of the only driven species; 0: all species are driven
   contains
     procedure :: is_on
     procedure :: acts_on

@@ -240,7 +240,7 @@ contains
     end if
   end function impulse_between
 
-  !> Whether disk i is so much heavier than disk j that its velocity change has lost significant digits.
+  !> Whether disk i is so much heavier than disk j that the velocity change of disk i has lost significant digits.
   pure function is_far_heavier(sim, i, j) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j

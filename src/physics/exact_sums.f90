@@ -32,7 +32,8 @@ module exact_sums
 
 contains
 
-  !> Chooses a unit that is fine enough for terms up to a bound. The value of a sum that already contains terms does not change.
+  !> Sets the unit of the sum such that a term as large as `bound` is represented with 62 binary digits. If the sum already contains
+  !> terms, they are converted to the new unit.
   elemental subroutine choose_unit(self, bound)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: bound

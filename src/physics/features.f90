@@ -1,5 +1,6 @@
-!> Optional features of a run. A run without them has only free flight and collisions that change two velocities and nothing else.
-!> They determine the arrays of the disks, the observables, the version of the collision procedure, and the inputs that are refused.
+!> Optional features of a run. In a run without these features the motion of a disk consists of free flight and collisions, and a
+!> collision changes only velocities. The features determine the arrays of the disks, the observables, the version of the collision
+!> procedure, and the inputs that are refused.
 module features
   implicit none
   private

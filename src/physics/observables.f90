@@ -34,7 +34,7 @@ module observables
   integer, parameter :: kinetic = 6, potential = 7, rotational = 8         !! energies
   !> Kinetic energy and momentum relative to the velocity profile of a sheared box; the momentum has two components.
   integer, parameter :: own_kinetic = 9, own_momentum = 10
-  integer, parameter :: flux = 12               !! five components, see `tally: kinetic_flux`; also relative to the velocity profile
+  integer, parameter :: flux = 12  !! kinetic flux relative to the velocity profile, five components: see `tally: kinetic_flux`
   integer, parameter :: tensor(*) = flux + [0, 1, 1, 2]                    !! components xx, xy, yx, yy of the momentum flux
   !> Total energy and the rounding error of its sum, precise enough for an energy balance. Zero unless `is_driven`.
   integer, parameter :: energy = 17, lost = 18

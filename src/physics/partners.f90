@@ -23,7 +23,7 @@ module partners
 
 contains
 
-  !> Whether a code that does not represent a disk represents a side of the box.
+  !> Whether a code represents a side of the box. The code must not be that of a disk.
   elemental function is_side(code) result(yes)
     integer(int32), intent(in) :: code
     logical :: yes
@@ -31,7 +31,7 @@ contains
     yes = code > -n_sides
   end function is_side
 
-  !> Whether a code that does not represent a disk represents a side or an obstacle, and not the boundary of a cell.
+  !> Whether a code represents a side or an obstacle, and not the boundary of a cell. The code must not be that of a disk.
   elemental function is_wall(code) result(yes)
     integer(int32), intent(in) :: code
     logical :: yes

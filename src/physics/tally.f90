@@ -66,7 +66,7 @@ contains
     allocate (self%surface_sums(gain, n))
   end subroutine make_room
 
-  !> Chooses units that are fine enough for terms up to the given bounds.
+  !> Sets the unit of each sum according to the bound for its kind of terms (see `exact_sums: choose_unit`).
   pure subroutine choose_units(self, bound)
     class(tally_t), intent(inout) :: self
     real(real64), intent(in) :: bound(:)           !! bound for each kind of terms

@@ -16,9 +16,9 @@ module cell_contents
   integer(int32), parameter :: crowd = counted + 1           !! increment of the number of crowded cells
   integer(int32), parameter :: marked = shiftl(crowd, 8)     !! bit of the mark; the lower bits suffice to count nine crowded cells
 
-  !> The slots of a cell. Indices of disks start at 0 here, as in the kernel. The last element contains three values: the lower half
-  !> is the number of disks in the slots, and the upper half is the number of crowded cells among the cell and its eight neighbours,
-  !> plus a mark.
+  !> The slots of a cell. Indices of disks start at 0 here, as in the kernel. The last element of the array consists of bit fields.
+  !> The lower 16 bits contain the number of disks in the slots. The next 8 bits contain the number of crowded cells among the cell
+  !> and its eight neighbours. The bit above these is the mark of the cell.
   type :: cell_t
     integer(int32) :: slot(count_slot)
   contains

@@ -383,8 +383,8 @@ contains
     end if
   end subroutine next_within
 
-  !> The same for a straight path. The axis and the direction are selected without branches, because a processor cannot predict
-  !> them.
+  !> Like `next_within`, for a straight path. The axis and the direction are selected without branches, because a processor cannot
+  !> predict them.
   pure subroutine next_straight(column, row, disk, cell, t, code)
     type(line_t), intent(in) :: column(0:1, *), row(0:1, *)
     type(disk_t), intent(in) :: disk
@@ -417,7 +417,7 @@ contains
     t = merge(t, never, speed > slowest)
   end function line_time
 
-  !> The same for a parabolic path, or for a box with moving sides.
+  !> Like `next_within`, for a parabolic path, or for a box with moving sides.
   pure subroutine next_falling(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -439,7 +439,7 @@ contains
     near%time = merge(t_y, t_x, t_y < t_x)
   end subroutine next_falling
 
-  !> The same as `time_to_leave`, along one axis and without moving sides.
+  !> Like `next_falling`, along one axis and without moving sides.
   pure subroutine next_along(box, line, axis, disk, now, t, code)
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
@@ -478,7 +478,7 @@ contains
     code = line(up)%code
   end subroutine next_along
 
-  !> The same along one axis, with moving sides that may enter the cell.
+  !> Like `next_falling`, along one axis, with moving sides that may enter the cell.
   pure subroutine next_beside(box, line, axis, disk, now, t, code)
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
@@ -495,7 +495,7 @@ contains
     end if
   end subroutine next_beside
 
-  !> The same for a cell that a moving side may enter, even if that side is not a face of the cell.
+  !> Like `next_along`, for a cell that a moving side may enter, even if that side is not a face of the cell.
   pure subroutine next_moving(line, axis, box, disk, now, t, code)
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
     integer(int32), intent(in) :: axis

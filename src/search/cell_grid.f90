@@ -35,7 +35,7 @@ module cell_grid
     type(images_t) :: images                       !! images of the box in this epoch
     integer(int32) :: n_listed = 0                 !! number of disks inserted into cells
     type(neighbour_lists_t), public :: lists       !! neighbour lists of the small disks, where cells contain many of them
-    real(real64) :: plain_radius = 0.0_real64      !! radius up to which a crossing changes no list; negative with lists [length]
+    real(real64) :: plain_radius = 0.0_real64      !! largest radius of disks whose crossings change no list; -1: none [length]
   contains
     procedure :: build
     procedure :: predict
@@ -213,7 +213,7 @@ contains
     call self%cells%mark(self%cells%number(cell), special)
   end subroutine mark
 
-  !> Lists a big disk at its present position, and updates the marks of the cells that it leaves and reaches.
+  !> Updates the listed position of a big disk, and the marks of the cells that the disk leaves and reaches.
   subroutine follow_big(self, sim, number)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -229,7 +229,7 @@ contains
     end do
   end subroutine follow_big
 
-  !> Executes a crossing of disk i: changes its cell, or renews its list or listed position, and predicts its next event.
+  !> Executes a crossing of disk i: changes its cell, neighbour list or listed position, and predicts its next event.
   subroutine cross(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -243,7 +243,7 @@ contains
     call self%predict(sim, i)
   end subroutine cross
 
-  !> Lists a big disk at its present position, or renews the neighbour list of a small one.
+  !> Updates the listed position of a big disk, or renews the neighbour list of a small disk.
   subroutine cross_with_care(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -468,7 +468,7 @@ contains
     call gather(self%cells%cell, near%cell, self%cells%stride, near%disk, near%list, near%n)
   end subroutine survey
 
-  !> Stores the earliest of the events in prospect in the record of a disk.
+  !> Tests the candidates of a disk, and stores the earliest event found in the record of the disk.
   subroutine take_earliest(gravity, disk, tag, now, known, near)
     real(real64), intent(in) :: gravity(2)         !! [length/time**2]
     type(disk_t), intent(inout) :: disk(*)
@@ -480,7 +480,7 @@ contains
     call earliest_contact(disk, tag, near, now, gravity, known)
     disk(near%disk)%event_time = near%time
     disk(near%disk)%partner = near%partner
-    tag(near%disk)%partner_counter = disk(max(near%partner, 1))%collision_counter  ! avoids a branch; used only if partner > 0
+    tag(near%disk)%partner_counter = disk(max(near%partner, 1))%collision_counter  ! used only if partner > 0; needs no branch
   end subroutine take_earliest
 
   !> Prefetches data for predictions of some disks, in stages.

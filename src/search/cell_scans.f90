@@ -16,8 +16,8 @@ module cell_scans
 
 contains
 
-  !> Tests the listed candidates and empties the list. The calls have literal arguments, for which the compiler can specialise the
-  !> kernel.
+  !> Tests the candidates of a prospect, and then empties the list of candidates. The kernel is called with literal arguments, for
+  !> which the compiler can specialise the kernel.
   subroutine test_list(sim, known, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
@@ -37,7 +37,7 @@ contains
     near%n = 0
   end subroutine test_list
 
-  !> Tests the listed candidates, which are seen through an image, and empties the list.
+  !> Tests the candidates of a prospect, which are in a periodic image of the box, and then empties the list of candidates.
   subroutine test_through_image(sim, known, image, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known
@@ -55,11 +55,11 @@ contains
     near%n = 0
   end subroutine test_through_image
 
-  !> Finds contacts with given disks, which are seen through one periodic image.
+  !> Finds contacts with given disks, which are in one periodic image of the box.
   subroutine scan_disks(sim, disks, image, known, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: disks(:)
-    type(image_t), intent(in) :: image             !! periodic image through which the disk sees the candidates
+    type(image_t), intent(in) :: image             !! periodic image of the box that contains the candidates
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prospect_t), intent(inout) :: near
     integer(int32) :: first
@@ -79,7 +79,7 @@ contains
     type(images_t), intent(in) :: images
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prospect_t), intent(inout) :: near
-    integer(int32) :: e, last(2)                   ! entry; image of the listed disks
+    integer(int32) :: e, last(2)                   ! entry; image that contains the listed big disks
     real(real64) :: number(2), shift(2)            ! index of the image of an obstacle; shift to it [length]
 
     near%n = 0
@@ -103,7 +103,7 @@ contains
     call test_disks()
   contains
 
-    !> Tests the listed big disks, which are seen through one image.
+    !> Tests the big disks that have been listed, which are in one periodic image of the box.
     subroutine test_disks()
       if (all(last == 0)) then
         call test_list(sim, known, near)
@@ -138,13 +138,13 @@ contains
     end do
   end subroutine scan_list
 
-  !> Finds contacts with the disks of some cells, seen through an image.
+  !> Finds contacts with the disks of some cells, which belong to one periodic image of the box.
   subroutine scan_cells(cells, sim, c, images, number, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: c(:)             !! numbers of up to nine cells
     type(images_t), intent(in) :: images
-    real(real64), intent(in) :: number(2)          !! index of the image through which they are seen
+    real(real64), intent(in) :: number(2)          !! index of the image to which the cells belong
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prospect_t), intent(inout) :: near
     integer(int64) :: n
@@ -172,8 +172,8 @@ contains
     if (near%n > 0) call test_through_image(sim, known, images%image(number), near)
   end subroutine scan_cells
 
-  !> Finds contacts of a big disk with small disks in the cells along its boundary. Cells seen through the same image are treated
-  !> together.
+  !> Finds contacts of a big disk with small disks in the cells along its boundary. All cells that belong to the same periodic image
+  !> are searched in one call.
   subroutine scan_rim(cells, sim, rim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
@@ -219,9 +219,9 @@ contains
     end do
   end subroutine add_chains_around
 
-  !> Finds contacts of a disk if some of the nine cells around the disk are images across a periodic side. Cells of one image are
-  !> treated together. If the images above and below move along x, the search includes more columns: all columns that the disk can
-  !> reach before the images have moved by one column. Disks two columns apart cannot touch.
+  !> Finds contacts of a disk if some of the nine cells around the disk are images across a periodic side. All cells that belong to
+  !> the same periodic image are searched in one call. If the images above and below move along x, the search includes more columns:
+  !> all columns that the disk can reach before the images have moved by one column. Disks two columns apart cannot touch.
   subroutine scan_around_seam(cells, patch, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch

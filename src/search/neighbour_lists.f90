@@ -6,7 +6,8 @@
 !> list. A prediction therefore tests only a few neighbours, however many disks the cells contain (Donev, Torquato and Stillinger,
 !> J. Comput. Phys. 202, 737 (2005)).
 !>
-!> Lists are a cache. A full list counts as incomplete until its disk is listed again; until then the disk searches the cells.
+!> Neighbour lists serve only to save time. If a list has no space for a further neighbour, it is marked as incomplete until the
+!> disk receives a new list. Until then the nine cells around the disk are searched in each prediction.
 module neighbour_lists
   use, intrinsic :: iso_fortran_env, only: real32
   use kinds, only: int16, int32, int64, pi, real64
@@ -28,7 +29,8 @@ module neighbour_lists
   !> Largest number of disks with neighbour lists: 32-bit integers can then number all entries.
   integer(int32), parameter :: most_listed = image_unit/4
 
-  !> The region in which the centre of a disk stays until it is listed again.
+  !> The region around a disk for which its neighbour list is valid. When the centre of the disk leaves this region, the disk
+  !> receives a new list.
   type :: neighbourhood_t
     type(line_t) :: column(0:1), row(0:1)          !! left and right line, lower and upper line, each with the code of its event
   end type neighbourhood_t
@@ -53,7 +55,8 @@ module neighbour_lists
     integer(int32), allocatable :: first(:)
     !> (0:) all lists: each entry is the index of a disk, which starts at 0, plus image_unit times the index of the image.
     integer(int32), allocatable :: entry(:)
-    !> (0:) for each entry, the position at which the list of the other disk contains the disk that owns this list.
+    !> (0:) for each entry in the list of a disk i, which refers to a disk j, the position of the entry for disk i in the list of
+    !> disk j.
     integer(int32), allocatable :: back(:)
   contains
     procedure :: prepare
@@ -71,8 +74,8 @@ module neighbour_lists
 
 contains
 
-  !> Determines whether neighbour lists save time, and allocates them in that case. With lists the prediction after a collision
-  !> tests fewer disks, but lists have to be renewed, and the renewals are more frequent at lower densities. The limit and the
+  !> Determines whether neighbour lists save time, and allocates the lists in that case. With neighbour lists the prediction after a
+  !> collision tests fewer disks. However, the lists have to be renewed, and more frequently at lower densities. The limit and the
   !> margin were measured for polydisperse disks.
   subroutine prepare(self, disk, tag, lower, edges, patch)
     class(neighbour_lists_t), intent(inout) :: self
@@ -153,8 +156,8 @@ contains
     self%neighbourhood(i)%row = clipped(faces%row(:, cell(2)), 2)
   contains
 
-    !> The two lines that limit a neighbourhood along an axis: the faces of the cell, or the edges of the square where these are
-    !> closer.
+    !> The two lines that limit a neighbourhood along an axis. Each of them is a face of the cell or an edge of the square,
+    !> whichever is closer to the disk.
     pure function clipped(line, axis) result(nearer)
       type(line_t), intent(in) :: line(0:1)
       integer(int32), intent(in) :: axis
@@ -175,8 +178,8 @@ contains
   end subroutine lay
 
   !> Finds the disks that disk i can touch in its new neighbourhood, among the disks in the nine cells around disk i. Adds disk i to
-  !> the list of each disk found, and each disk found to the list of disk i. If the other disk has no list yet, the pair is added
-  !> when that list is made.
+  !> the list of each disk found, and each disk found to the list of disk i. If one of the disks found has no list yet, the pair is
+  !> added later, when the list of that disk is made.
   subroutine enter(self, i, cells, patch, cell)
     class(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -230,7 +233,7 @@ contains
     !> Adds the candidates that are close enough. The condition is evaluated without a branch, because a processor cannot predict
     !> it.
     subroutine test_candidates(image)
-      integer(int32), intent(in) :: image          !! image through which they are seen
+      integer(int32), intent(in) :: image          !! periodic image that contains the candidates
       integer(int32) :: j, k, found(list_capacity + 1), n_found
       real(real32) :: x, y, reach, margin, dx, dy
 
@@ -258,8 +261,8 @@ contains
     end subroutine test_candidates
   end subroutine enter
 
-  !> Adds disk j, which is seen through an image, to the list of disk i, and disk i to the list of disk j. If disk j has no list
-  !> yet, nothing is added.
+  !> Adds disk j to the list of disk i, and disk i to the list of disk j. `image` is the periodic image in which disk i can touch
+  !> disk j. If disk j has no list yet, nothing is added.
   pure subroutine add_pair(self, i, j, image)
     type(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i, j, image
@@ -343,7 +346,7 @@ contains
     end do
   end subroutine remove_disk
 
-  !> A cell and its eight neighbours, and the images through which these cells are seen.
+  !> A cell and its eight neighbours, and the periodic image to which each of these cells belongs.
   pure subroutine find_cells(cells, patch, cell, around, image)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
@@ -359,7 +362,7 @@ contains
     end do
   end subroutine find_cells
 
-  !> The image through which disk i is seen from disk j, if disk j is seen from disk i through `image`.
+  !> The image of disk i that disk j can touch, if disk i can touch the image `image` of disk j.
   elemental function reverse(image)
     integer(int32), intent(in) :: image
     integer(int32) :: reverse
@@ -395,7 +398,7 @@ contains
     end associate
   end function is_short
 
-  !> Copies the list of a disk whose neighbours are not seen through images.
+  !> Copies the list of a disk that has no neighbours across a periodic side.
   pure subroutine copy_list(self, near)
     class(neighbour_lists_t), intent(in) :: self
     type(prospect_t), intent(inout) :: near
@@ -418,7 +421,8 @@ contains
     n = max(self%entry(self%first(i)), 0)
   end function n_entries
 
-  !> The k-th neighbour in the list of disk i, counted from 0, and the index of the image through which it is seen.
+  !> The k-th neighbour in the list of disk i, counted from 0, and the index of the periodic image in which disk i can touch this
+  !> neighbour.
   pure subroutine neighbour(self, i, k, j, image)
     class(neighbour_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i, k

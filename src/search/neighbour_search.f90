@@ -37,21 +37,22 @@ contains
 
   !> Finds the earliest contact of a disk with the candidates, if it precedes the earliest event known so far.
   !>
-  !> The time is a pure function of the states of the two disks: both are advanced to the later of their clocks, and each term
-  !> keeps its value, or changes its sign, if the disks are exchanged. The result is therefore bit-identical for both disks and for
-  !> any time of the prediction. The order of simultaneous contacts is defined by `wins`. A contact time before `now` results from
-  !> rounding: after a perfectly inelastic collision two disks stay in contact to the last bits, and a shift of one disk by a period
-  !> can change these bits. The contact then occurs either now or never. The contact is predicted again right after the shift,
-  !> because a shift is an event. Later predictions do not change the result.
+  !> The time is a pure function of the states of the two disks: both are advanced to the later of their clocks. An exchange of the
+  !> two disks changes at most the signs of the terms of the formula, not their magnitudes. The result is therefore bit-identical
+  !> for both disks and for any time of the prediction. The order of simultaneous contacts is defined by `wins`. A contact time
+  !> before `now` results from rounding errors. After a perfectly inelastic collision the distance of two disks equals the sum of
+  !> their radii within rounding errors, and the shift of one disk by a period changes these errors. In this case the kernel decides
+  !> whether a contact occurs now or not at all. A shift is an event, after which the contact is predicted again. Predictions at
+  !> later times do not change the decision.
   !>
   !> The root of |dx + dv s| = sigma is c/(sqrt(disc) - b), which is free of cancellation near contact. The discriminant sigma**2
   !> dv**2 - (dx x dv)**2 is free of cancellation for distant grazing pairs. Disks that touch, or overlap by rounding, and approach
   !> collide now.
   !>
-  !> One combined test excludes most candidates. It fails if the root is not real, if the root is not earlier than the earliest
-  !> contact found so far, or if the root is not earlier than the event of the candidate. (In the last case the next event of the
-  !> candidate is predicted after its own event, and that prediction tests the disk.) A root before t requires c < -2 b (t - late),
-  !> which is tested with a margin above rounding errors.
+  !> One combined test excludes most candidates. A candidate is excluded if the root is not real, if the root is not earlier than
+  !> the earliest contact found so far, or if the root is not earlier than the next event of the candidate. (In the last case the
+  !> candidate is predicted again after this event, and the pair is tested in that prediction.) A root before t requires c < -2 b (t
+  !> - late), which is tested with a margin above rounding errors.
   pure subroutine earliest_contact(disk, tag, near, now, gravity, known, image)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, with indices that start at 0
     type(tag_t), intent(in) :: tag(*)
@@ -59,7 +60,7 @@ contains
     real(real64), value :: now                !! [time]
     real(real64), intent(in) :: gravity(2)
     integer(int32), value :: known            !! 0, `latest_clock`, `no_gravity`, or their sum
-    type(image_t), intent(in), optional :: image   !! image through which the candidates are seen
+    type(image_t), intent(in), optional :: image   !! periodic image of the box that contains the candidates
     real(real64) :: xi, yi, ui, vi, clock, ri, x, y, u, v, xj, yj, uj, vj, clock_j, rj, late, si, sj, dx, dy, du, dv
     real(real64) :: sigma2, b, c, disc, t_j, best, latest, from, margin, in_time
     integer(int32) :: k, n, j, partner
@@ -100,7 +101,7 @@ contains
       in_time = merge(in_time, disc, in_time < disc)
       if (in_time > 0 .and. b < 0) then
         t_j = late + max(c, 0.0_real64)/(sqrt(min(disc, b*b)) - b)
-        if (t_j < now .and. .not. fresh) then ! caused by rounding: the contact is over, or it occurs now
+        if (t_j < now .and. .not. fresh) then ! caused by rounding: no contact, or contact now
           t_j = merge(2*never, now, b + (du*du + dv*dv)*(now - late) >= 0)
         end if
         if (t_j < best) then
@@ -136,7 +137,7 @@ contains
     end if
   end function moved
 
-  !> A velocity component after the time s, likewise with fewer operations on a straight path.
+  !> A velocity component after the time s. On a straight path the velocity is constant and needs no operations.
   elemental function sped_up(v, g, s, falling) result(after)
     real(real64), intent(in) :: v, g, s
     logical, intent(in) :: falling

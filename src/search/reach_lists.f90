@@ -1,9 +1,9 @@
 !> Lists the objects other than small disks that reach into each cell: obstacles, and a few big disks among many small disks.
 !>
-!> The width of the cells is chosen for the small disks. A big disk is listed in each cell from which a small disk could touch it
-!> while it stays within a margin around its listed position. The search for a small disk therefore finds big disks in the list of
-!> its own cell, and the search for a big disk tests the cells along its boundary. The cost for a disk depends only on the sizes of
-!> disks near it.
+!> The width of the cells is chosen for the small disks. A big disk is listed in each cell from which a small disk could touch it.
+!> The list is valid while the big disk stays within a margin around its listed position, which is its position at the time when the
+!> list was made. The search for a small disk therefore finds big disks in the list of its own cell, and the search for a big disk
+!> tests the cells along its boundary. The cost for a disk depends only on the sizes of disks near it.
 module reach_lists
   use kinds, only: int16, int32, real64
   use cell_faces, only: cell_faces_t, patch_t
@@ -193,8 +193,8 @@ contains
     end associate
   end subroutine follow
 
-  !> Codes of the obstacles that reach into the given cells, in descending order. A point in which a big disk touches an obstacle
-  !> lies in a cell that both of them reach into.
+  !> Codes of the obstacles that reach into the given cells, in descending order. If a big disk touches an obstacle, the point of
+  !> contact is in a cell into which both of them reach.
   pure function obstacles_along(self, places) result(codes)
     class(reach_lists_t), intent(in) :: self
     type(place_t), intent(in) :: places(:)
@@ -239,8 +239,8 @@ contains
 
   contains
 
-    !> Finds such cells in a block of cells. The block is halved recursively until it is a single cell, or until the outline does
-    !> not cross the block.
+    !> Adds the cells of this kind from a block of cells. The block is halved recursively until it is a single cell, or until the
+    !> outline does not cross the block.
     recursive subroutine search_block(low, high)
       integer(int32), intent(in) :: low(2), high(2)  !! first and last column and row
       real(real64) :: lower(2), upper(2), beyond(2), half(2), d(2)

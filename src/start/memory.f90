@@ -128,7 +128,7 @@ contains
     end do
   end function numbers_in_frame
 
-  !> Number of cells of the search per disk.
+  !> Number of cells in the grid of the search, divided by the number of disks.
   pure function cells(settings) result(n)
     type(settings_t), intent(in) :: settings
     real(real64) :: n

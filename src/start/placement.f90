@@ -32,9 +32,9 @@ module placement
   public :: place_disks
 
   integer, parameter :: stream_number = 1                   !! identifies the random streams of this module
-  !> Limit of the number of disks that all attempts of 'random' place together.
+  !> Limit of the number of attempts to place a 'random' species, times the number of its disks.
   integer(int32), parameter :: many_trials = 500000
-  !> Additional tolerance, in numbers of disks, which matters for few disks.
+  !> Additional number of disks that another attempt is assumed to place at most, beyond the factor `nearly`.
   integer(int32), parameter :: few = 5
   real(real64), parameter :: nearly = 1.25_real64  !! largest factor by which another attempt is assumed to place more disks
   real(real64), parameter :: denser = 1.5_real64  !! smallest factor by which 'dense' packings are denser than 'random' packings

@@ -2,8 +2,8 @@
 !> between the previous disks. Points are drawn only from voxels (small rectangles) of the region from which no single disk excludes
 !> the centre completely. Voxels are halved along both axes when attempts fail too often. An attempt outside of these voxels would
 !> always fail. The distribution is therefore that of simple insertion, up to saturation (Zhang and Torquato, Phys. Rev. E 88,
-!> 053312 (2013)). If radii differ, the largest disks are inserted first. A voxel without space for one disk may have space for a
-!> smaller disk. In this case voxels are not eliminated, and the insertion ends when many attempts to insert a disk have failed.
+!> 053312 (2013)). If radii differ, the largest disks are inserted first. Voxels are then not eliminated, because a voxel without
+!> space for one disk may have space for a smaller disk. The insertion ends when many attempts to insert a disk have failed.
 module random_insertion
   use kinds, only: int32, real64
   use memory_hints, only: prefetch
@@ -122,8 +122,8 @@ contains
     end function place
 
     !> Prefetches data for the next attempts: the voxel of the attempt that was drawn last, and the cells and disks around the
-    !> attempts that were drawn earlier. Many disks do not fit into the cache, and consecutive attempts read different parts of
-    !> memory.
+    !> attempts that were drawn earlier. Prefetching saves time if the data of the disks do not fit into the cache, because
+    !> consecutive attempts read different parts of memory.
     subroutine load_ahead()
       associate (far => coming(modulo(attempts - 1, drawn_ahead)), near => coming(modulo(attempts + 3, drawn_ahead)), &
           next => coming(modulo(attempts + 1, drawn_ahead)))

@@ -50,7 +50,8 @@ module variable_rows
     character(len=16) :: unit = ""
     !> Allowed texts, separated by blanks; empty if any text is allowed. The module `choices` contains their meanings.
     character(len=100) :: choices = ""
-    !> Name of a choice variable, then its values for which the present variable has an effect.
+    !> Condition under which the present variable has an effect: the name of another variable, followed by those of its allowed
+    !> texts with which the present variable has an effect.
     character(len=60) :: goes_with = ""
     !> Variables of the same group that must not be given together with the present variable.
     character(len=80) :: excludes = ""
