@@ -122,7 +122,7 @@ contains
   !> The limits of an advance to the given values. If none of the values is a limit, the stop rule of the input applies.
   pure function goal_of(session, time, collisions, events) result(rule)
     type(session_t), intent(in) :: session
-    real(real64), intent(in) :: time                  !! since the start of the run [time]
+    real(real64), intent(in) :: time                  !! time since the start of the run [time]
     integer(int64), intent(in) :: collisions, events
     type(stop_rule_t) :: rule
 

@@ -22,8 +22,8 @@ module errors
 
 contains
 
-  !> Allocates `error` with an exit status and a message. The message may contain names from the input. Control characters in it are
-  !> therefore replaced, so that the message remains one legible line.
+  !> Allocates `error` with an exit status and a message. The message may contain names from the input. Control characters in the
+  !> message are therefore replaced, so that the message remains one legible line.
   pure subroutine fail(error, code, message)
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in) :: code                !! one of the `exit_` constants

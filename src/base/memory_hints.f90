@@ -1,4 +1,4 @@
-!> Hints about memory that Fortran cannot express. They affect only the speed of a run, never its results. The C file with the same
+!> Hints about memory that Fortran cannot express. Hints affect only the speed of a run, never its results. The C file with the same
 !> name contains the parts that depend on the compiler and the system. Without this file a prefetch has no effect.
 module memory_hints
   use, intrinsic :: iso_c_binding, only: c_double, c_int32_t

@@ -46,8 +46,8 @@ contains
     call fill(self, state)
   end subroutine seed
 
-  !> Starts the stream of a single draw during a run. The numbers depend only on the arguments. They do not depend on the order of
-  !> the draws, or on the procedure or thread that makes a draw.
+  !> Starts the stream of a single draw during a run. The numbers depend only on the arguments. The numbers depend neither on the
+  !> order of the draws nor on the procedure or thread that makes a draw.
   pure subroutine seed_draw(self, number, purpose, id, count)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(in) :: number        !! seed from the input

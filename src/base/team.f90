@@ -31,7 +31,7 @@ module team
     end subroutine join
 
     !> Waits at the barrier until all threads have arrived and the last one calls `release`. The last thread to arrive does not
-    !> wait. For this thread the result is .true.; it performs the serial step and then releases the other threads.
+    !> wait. For this thread the result is .true.; this thread performs the serial step and then releases the other threads.
     function is_last_at(barrier) result(yes) bind(C, name="barrier_arrive")
       import :: barrier_t, c_bool
       type(barrier_t), intent(inout) :: barrier

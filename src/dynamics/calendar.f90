@@ -19,7 +19,7 @@ module calendar
   integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]
   integer(int32), parameter :: stages = size(windows_ahead)
   integer(int32), parameter :: most_coming = windows_ahead(1)*bucket_capacity
-    !! largest number of disks listed for prefetching at once
+    !! largest number of disks that a stage of prefetching lists in a call
   integer(int32), parameter :: window_none = -1    !! value of tag%window: the event is not in the calendar
 
   type :: bucket_t                                 ! one cache line
@@ -41,9 +41,9 @@ module calendar
 
   type :: calendar_t
     type(bucket_t), allocatable :: bucket(:)       !! (0:last_bucket) buckets of windows, a circular buffer
-    !> (0:last_span) position in `filed` after the last entry in the list of each span, 0 if the list is empty. This array is a
-    !> circular buffer as well. A span contains half as many windows as there are buckets. A list may also contain events of later
-    !> spans with the same index in the circular buffer.
+    !> (0:last_span) position in `filed` after the last entry in the list of each span, 0 if the list is empty. Like `bucket`, this
+    !> array is a circular buffer. A span contains half as many windows as there are buckets. A list may also contain events of
+    !> later spans with the same index in the circular buffer.
     integer(int32), allocatable :: list_end(:)
     !> (0:) all lists, in chunks, each of which is linked to the chunk of its list that was filled before.
     type(filed_t), allocatable :: filed(:)
@@ -219,7 +219,7 @@ contains
     integer(int32), intent(in) :: window           !! current window
     integer(int32), intent(in) :: stage
     integer(int32), intent(out) :: n
-    integer(int32), intent(out) :: disks(most_coming)    !! (n) the listed disks
+    integer(int32), intent(out) :: disks(most_coming)    !! (n) disks that probably have events soon
     integer(int32) :: w, last, k
     logical :: valid
 

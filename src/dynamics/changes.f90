@@ -115,9 +115,9 @@ contains
     call book(sim, before)
   end subroutine change_positions
 
-  !> Advances all disks to the present time with the previous forces. Their clocks are equal afterwards. The last partners are
-  !> erased: after a change, as after a kick, a disk may collide with its last partner again immediately, and this collision must
-  !> not be mistaken for a rounding error of the previous collision.
+  !> Advances all disks to the present time with the previous forces. Afterwards the clocks of all disks are equal. The last
+  !> partners are erased: after a change, as after a kick, a disk may collide with its last partner again immediately, and this
+  !> collision must not be mistaken for a rounding error of the previous collision.
   subroutine advance_all(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i

@@ -2,8 +2,8 @@
 !> When this event is due, the disks involved collide, and their next events are predicted.
 !>
 !> An event becomes stale when its partner collides with another disk first. Stale events are not searched for. A stale event is
-!> recognised by the collision counter of the partner when the event is due. It is then not executed, and the next event of the disk
-!> is predicted.
+!> recognised by the collision counter of the partner when the event is due. A stale event is not executed; instead the next event
+!> of the disk is predicted.
 module event_driven
   use kinds, only: int32, int64, never, real64
   use box_sides, only: side_time
@@ -199,7 +199,7 @@ contains
   subroutine run_events(self, sim, t_limit, iterations, event, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: t_limit            !! since the epoch [time]
+    real(real64), intent(in) :: t_limit            !! time since the epoch [time]
     integer(int64), intent(inout) :: iterations    !! number of iterations left
     type(event_t), intent(out) :: event            !! the last event; not executed if it is later than the time limit
     type(event_log_t), intent(inout), optional :: log
@@ -233,7 +233,8 @@ contains
     if (self%is_part) counts = self%histories%counts(sim%tag, i, code)
     if (code > 0) then
       if (sim%disk(code)%collision_counter == sim%tag(i)%partner_counter) then
-        ! Equal clocks are rare. They occur if the disks are still in contact, or if both have collided at exactly this time.
+        ! Equal clocks are rare. Two disks have equal clocks if they are still in contact, or if both have collided at exactly this
+        ! time.
         if (self%general .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0) then
           call collide(sim, i, code, t, counts, log)
         else
@@ -307,7 +308,8 @@ contains
     call self%queue%schedule(sim%disk, sim%tag, i)
   end subroutine predict
 
-  !> Predicts the events of all disks, and not only of the disks involved in an event. This is the simplest algorithm of textbooks.
+  !> Predicts the events of all disks, and not only of the disks involved in an event. The prediction of all disks after each event
+  !> is the simplest algorithm in textbooks.
   subroutine predict_all(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

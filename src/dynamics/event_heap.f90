@@ -1,6 +1,6 @@
-!> A priority queue of events: a min-heap in an array, with four children per node. It contains at most one event per disk, which
-!> can be found by the index of the disk. Simultaneous events have a fixed order that depends neither on which disk stores the event
-!> nor on the order of insertion.
+!> A priority queue of events: a min-heap in an array, with four children per node. The queue contains at most one event per disk,
+!> and this event can be found by the index of the disk. Simultaneous events have a fixed order that depends neither on which disk
+!> stores the event nor on the order of insertion.
 module event_heap
   use kinds, only: int32
   use disks, only: tag_t

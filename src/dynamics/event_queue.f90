@@ -59,7 +59,7 @@ contains
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
     type(tag_t), intent(inout) :: tag(:)
-    real(real64), intent(in) :: now                !! since the epoch [time]
+    real(real64), intent(in) :: now                !! time since the epoch [time]
     logical, intent(in) :: windowed                !! .false.: all events are entered into the heap
     integer(int32) :: i
 
@@ -316,8 +316,8 @@ contains
     if (self%calendar%span_begins(self%window)) call self%open_next_span(disk, tag)
   end subroutine open_next_window
 
-  !> Empties a bucket into a sorted list. Only events before the next window are valid. Their number is small. The position of each
-  !> event is therefore found by counting the later events, without branches that depend on times.
+  !> Empties a bucket into a sorted list. Only events before the next window are valid. Because the number of these events is small,
+  !> the position of each event is found by counting the later events, without branches that depend on times.
   pure subroutine take_bucket(bucket, disk, tag, per_time, next_window, list, n)
     type(bucket_t), intent(inout) :: bucket
     type(disk_t), intent(in) :: disk(*)

@@ -11,7 +11,7 @@ module evolution
 
   !> Limits of the dynamics, which stops when the first of them is reached. The default values are never reached.
   type :: limits_t
-    real(real64) :: time = never  !! since the start of the run; when passed to an evolution, since the epoch [time]
+    real(real64) :: time = never  !! limit of time, since the start of the run; since the epoch in calls of evolutions [time]
     integer(int64) :: collisions = huge(0_int64)
     integer(int64) :: events = huge(0_int64)
     real(real64) :: dissipated = huge(0.0_real64)        !! dissipated energy [energy]
@@ -72,8 +72,8 @@ contains
   end function reached
 
   !> Whether a limit on a quantity that any collision may change is reached. Such a quantity must never decrease. A parallel run
-  !> detects only at the end of a time window that the limit was exceeded. It then repeats the window to find the collision at which
-  !> the limit was reached.
+  !> detects only at the end of a time window that the limit was exceeded. The parallel run then repeats the window to find the
+  !> collision at which the limit was reached.
   pure function outgrown(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally
@@ -102,8 +102,8 @@ contains
   !> The first time, not before `time`, at which a change to all disks can occur between two steps of the dynamics.
   pure function pause_at(self, time) result(t)
     class(evolution_t), intent(in) :: self
-    real(real64), intent(in) :: time              !! since the start of the run
-    real(real64) :: t                             !! since the start of the run
+    real(real64), intent(in) :: time              !! time since the start of the run
+    real(real64) :: t                             !! time since the start of the run
 
     t = time
   end function pause_at

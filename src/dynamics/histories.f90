@@ -85,7 +85,7 @@ contains
     self%history_of(i) = self%n_histories
   end subroutine add_history
 
-  !> Deletes the history of disk i, if it exists. The last history is moved to the free index.
+  !> Deletes the history of disk i, if it exists. The last history in the array takes the index of the deleted history.
   subroutine drop_history(self, i)
     class(histories_t), intent(inout) :: self
     integer(int32), intent(in) :: i

@@ -1,4 +1,4 @@
-!> The velocity changes of a kick. Their random numbers are functions of the seed, the disk and the number of the kick
+!> The velocity changes of a kick. The random numbers of a kick are functions of the seed, the disk and the number of the kick
 !> alone, so that they depend neither on the order of the disks nor on the history of the run.
 module kicks
   use kinds, only: int32, pi, real64

@@ -84,8 +84,8 @@ contains
     if (.not. yes .and. self%limits%at_rest) yes = stands_still(sim) .and. is_at_rest(sim)
   end function is_met
 
-  !> Whether all disks are at rest and the input contains the rule that ends the run in this case. This test is for simulations
-  !> without gravity: disks at rest then have no events, and the test at the end of an epoch is never made.
+  !> Whether all disks are at rest and the input contains the rule that ends the run in this case. The test is needed in simulations
+  !> without gravity, in which disks at rest have no events, so that the test at the end of an epoch is never made.
   pure function rests(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

@@ -63,8 +63,8 @@ contains
   !> The time at which the step that contains a given time ends.
   pure function pause_at(self, time) result(t)
     class(time_stepped_t), intent(in) :: self
-    real(real64), intent(in) :: time               !! since the start of the run
-    real(real64) :: t                              !! since the start of the run
+    real(real64), intent(in) :: time               !! time since the start of the run
+    real(real64) :: t                              !! time since the start of the run
 
     t = time
     if (time > largest_exact*self%dt) return
@@ -81,7 +81,8 @@ contains
     self%idle = .false.
   end subroutine renew
 
-  !> Executes steps. The k-th step ends at the time k*dt. This does not depend on the times at which earlier calls returned.
+  !> Executes steps. The k-th step ends at the time k*dt. The end of a step does not depend on the times at which earlier calls
+  !> returned.
   subroutine advance(self, sim, limits, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -109,7 +110,7 @@ contains
     end do
   end subroutine advance
 
-  !> The largest integer k with k*dt <= now. This number depends on the state alone.
+  !> Number of steps before the present time: the largest integer k with k*dt <= now. The result depends on the state alone.
   pure function steps_taken(now, dt) result(k)
     real(real64), intent(in) :: now, dt             !! [time]
     integer(int64) :: k
@@ -205,8 +206,8 @@ contains
       end do
     end subroutine meet_sides
 
-    !> Reflects disk i, which is beyond a side or an obstacle, if it moves further outwards. Its position is not changed, so that
-    !> its potential energy is conserved.
+    !> Reflects disk i, which is beyond a side or an obstacle, if it moves further outwards. The position of the disk is not
+    !> changed, so that its potential energy is conserved.
     subroutine meet_wall(i, code)
       integer(int32), intent(in) :: i, code
       real(real64) :: normal(2)
@@ -267,9 +268,9 @@ contains
     inside = iand(merge(1, 0, x >= low), merge(1, 0, x <= high))
   end function between
 
-  !> A warning about the length of the step; empty if the length is suitable. The fastest disk may fall through the whole box; its
-  !> speed is then estimated as v0 + sqrt(2 g L). A disk that dissipates energy in every step of a lasting contact sinks by up to g
-  !> dt**2/2 per step under gravity; the TC model prevents this.
+  !> A warning about the length of the step; empty if the length is suitable. For the estimate of the largest speed under gravity,
+  !> v0 + sqrt(2 g L), the fastest disk is assumed to fall through the whole box of length L. A disk that dissipates energy in every
+  !> step of a lasting contact sinks by up to g dt**2/2 per step under gravity; the TC model prevents this.
   pure function warning(self, sim) result(text)
     class(time_stepped_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

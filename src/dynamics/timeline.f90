@@ -107,8 +107,9 @@ contains
     end subroutine end_epoch
   end subroutine advance_once
 
-  !> Number of iterations that take about `pause_interval`. The number grows only if all iterations were used. Otherwise it would
-  !> grow without limit in a run with many samples, and signals would not be checked for hours after the last sample.
+  !> Number of iterations that take about `pause_interval`. The number grows only if all iterations were used. If the number grew in
+  !> all other cases as well, it would become arbitrarily large in a run with many samples, and signals would not be checked for
+  !> hours after the last sample.
   pure function adapted_iterations(iterations, elapsed, cut_short) result(n)
     integer(int64), intent(in) :: iterations
     real(real64), intent(in) :: elapsed               !! wall-clock time of the iterations that were used [s]
@@ -124,7 +125,7 @@ contains
   pure function next_kick(evolution, sim) result(t)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
-    real(real64) :: t                              !! since the start of the run; `never` without kicks
+    real(real64) :: t                              !! time since the start of the run; `never` without kicks
 
     t = evolution%pause_at(sim%drive%time_of(sim%kicks + 1))
   end function next_kick

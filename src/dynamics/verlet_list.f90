@@ -20,8 +20,8 @@ module verlet_list
   real(real64), parameter :: least_skin = 0.2_real64       !! smallest skin [mean diameter]
   real(real64), parameter :: cells_per_disk = 4.0_real64   !! largest number of bins per disk
 
-  !> Pairs that may touch: first those with obstacles, in the order of obstacles and then of disks; then pairs of disks, in the
-  !> order of i and then of the partner.
+  !> Pairs that may touch. Pairs with obstacles come first, in the order of obstacles and then of disks. Pairs of disks follow, in
+  !> the order of i and then of the partner.
   type :: verlet_list_t
     integer(int32) :: n = 0
     integer(int32), allocatable :: i(:)        !! (at least n) index of the first disk of the pair
@@ -164,8 +164,8 @@ contains
 
   contains
 
-    !> The periodic image of a point that lies inside the box. It is computed with reals, because a disk may have moved by more
-    !> periods than an integer can represent.
+    !> The periodic image of a point that lies inside the box. The image is computed with real numbers, because a disk may have
+    !> moved by more periods than an integer can represent.
     pure function in_box(point) result(image)
       real(real64), intent(in) :: point(2)
       real(real64) :: image(2)

@@ -124,9 +124,10 @@ contains
   end subroutine start_library
 
   !> Sets the properties of a file. The file locks of HDF5 are disabled: they would prevent other programs from reading the file,
-  !> and the lock of a reader could stop a run. The storage of a dataset is allocated when the dataset is created. It is not filled
-  !> with a value and has no time stamps, so that equal runs write equal bytes. Small datasets do not share a block of storage. HDF5
-  !> would release such a block in two steps, and between these steps the header of the file would contain a wrong length.
+  !> and the lock of a reader could stop a run. The storage of a dataset is allocated when the dataset is created. A dataset is not
+  !> filled with a value and has no time stamps, so that equal runs write equal bytes. Small datasets do not share a block of
+  !> storage. HDF5 would release such a block in two steps, and between these steps the header of the file would contain a wrong
+  !> length.
   subroutine prepare(self, access, status)
     class(hdf5_handle_t), intent(inout) :: self
     integer(hid_t), intent(out) :: access         !! HDF5 properties for access to the file
@@ -164,7 +165,7 @@ contains
     call h5pclose_f(access, closed)
   end subroutine create
 
-  !> Opens a file for reading, or for writing as well.
+  !> Opens a file for reading, or for reading and writing.
   subroutine open_file(self, path, writable)
     class(hdf5_handle_t), intent(out) :: self
     character(len=*), intent(in) :: path

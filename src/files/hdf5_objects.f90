@@ -20,8 +20,8 @@ module hdf5_objects
 
   integer, parameter :: scalar(0) = [integer ::]  !! extents of a single value
 
-  ! Limits on the texts in a file. No output of this program exceeds these limits. They are needed because the sizes in a damaged
-  ! file may be wrong.
+  ! Limits on the texts in a file. No output of this program exceeds these limits. The limits are needed because the sizes in a
+  ! damaged file may be wrong.
   integer(int64), parameter :: most_texts = 10000
   integer(size_t), parameter :: longest_text = 67108864      !! [bytes]
 
@@ -353,8 +353,8 @@ contains
     call self%fetch_values(name, n, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
   end subroutine fetch_longs
 
-  !> Reads a dataset or an attribute of n values. `values` does not change if the dataset or attribute has another number of values
-  !> or another type, or cannot be read.
+  !> Reads a dataset or an attribute of n values. If the dataset or attribute cannot be read, or if the number or the type of its
+  !> values differs from that of `values`, `values` is not changed.
   subroutine fetch_values(self, name, n, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name

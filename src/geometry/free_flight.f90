@@ -37,8 +37,8 @@ contains
     then = v + g*s
   end function flight_velocity
 
-  !> Time until a line at `distance` ahead is crossed in the forward direction; `never` if it is not crossed.
-  !> Each branch uses the form of the root of the quadratic that is free of cancellation.
+  !> Time until a point crosses a line in the forward direction; `never` if the point does not cross the line. Each branch uses the
+  !> form of the root of the quadratic that is free of cancellation.
   pure function time_to_line(distance, speed, acceleration) result(s)
     real(real64), intent(in) :: distance      !! distance to the line along its normal; negative if the line is behind [length]
     real(real64), intent(in) :: speed         !! along the normal [length/time]
@@ -145,10 +145,10 @@ contains
     end function is_positive
   end function misses_circle
 
-  !> The same as `time_to_circle`, for a disk on a parabolic path. F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic. It is
-  !> monotonic between the roots of F', which in turn are bracketed by the roots of the quadratic F''. Each root is therefore found
-  !> by bisection in an interval that contains exactly one root, and the first contact cannot be missed. F itself is evaluated from
-  !> the actual position, so that the squared radius of a small circle is not lost in rounding.
+  !> Like `time_to_circle`, for a disk on a parabolic path. F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic. F is monotonic
+  !> between the roots of F', which in turn are bracketed by the roots of the quadratic F''. Each root is therefore found by
+  !> bisection in an interval that contains exactly one root, and the first contact cannot be missed. F itself is evaluated from the
+  !> actual position, so that the squared radius of a small circle is not lost in rounding.
   pure function time_to_circle_falling(d, v, g, rho, inside) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside

@@ -38,7 +38,8 @@ module images
 contains
 
   !> The images of a box, for clocks relative to `epoch`. The image above the box is displaced by velocity*t at the time t of the
-  !> run. The displacement is reduced modulo the period without rounding error, so that late times are as precise as early ones.
+  !> run. The displacement is reduced modulo the period without rounding error, so that the precision does not decrease at late
+  !> times.
   pure function moving_images(period, velocity, epoch) result(images)
     real(real64), intent(in) :: period(2)       !! [length]
     real(real64), intent(in) :: velocity        !! [length/time]
@@ -90,7 +91,7 @@ contains
   pure function around(self, k, now) result(number)
     class(images_t), intent(in) :: self
     integer, intent(in) :: k                    !! number of the image, which starts at 1
-    real(real64), intent(in), optional :: now   !! since the epoch; needed in a sheared box [time]
+    real(real64), intent(in), optional :: now   !! time since the epoch; needed in a sheared box [time]
     real(real64) :: number(2)
     integer :: reach(2)
 
@@ -106,7 +107,7 @@ contains
   pure function displacement(self, rows, now)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: rows
-    real(real64), intent(in) :: now             !! since the epoch [time]
+    real(real64), intent(in) :: now             !! time since the epoch [time]
     real(real64) :: displacement                !! [length]
 
     displacement = rows*(self%offset + self%velocity*now)
@@ -130,7 +131,7 @@ contains
   pure function nearest_image(self, dx, now) result(number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: dx(2)           !! [length]
-    real(real64), intent(in), optional :: now   !! since the epoch; needed in a sheared box [time]
+    real(real64), intent(in), optional :: now   !! time since the epoch; needed in a sheared box [time]
     real(real64) :: number(2)
 
     number = 0

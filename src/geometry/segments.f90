@@ -1,8 +1,9 @@
 !> Straight walls between two points, impenetrable from both sides. Disks also collide with the ends of a wall.
 !>
-!> A disk touches the wall when its centre reaches the stadium around it: two straight sides at the distance of the radius, and two
-!> half circles around the ends. The stadium is convex. The centre of a disk can therefore reach a straight side only from outside.
-!> If rounding causes a contact with a straight side to be missed, the disk touches a half circle at the same time.
+!> A disk touches a wall when its centre reaches the stadium around the wall. The stadium consists of two straight sides, whose
+!> distance from the wall is the radius of the disk, and two half circles around the ends. The stadium is convex. The centre of a
+!> disk can therefore reach a straight side only from outside. If rounding causes a contact with a straight side to be missed, the
+!> disk touches a half circle at the same time.
 module segments
   use free_flight, only: flight, time_to_circle, time_to_line
   use images, only: images_t

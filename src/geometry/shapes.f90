@@ -116,8 +116,8 @@ contains
     end do
   end function from_nearest
 
-  !> Tangential unit vector at the point where the outline has the given normal. Its direction is counter-clockwise around the
-  !> middle.
+  !> Tangential unit vector at the point where the outline has the given normal. The vector points counter-clockwise around the
+  !> middle of the obstacle.
   pure function direction(self, normal) result(along)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: normal(2)       !! unit vector from the outline to a disk

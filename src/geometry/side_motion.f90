@@ -96,7 +96,7 @@ contains
   end function highest_speed
 
   !> Local time of the motion at the time epoch + t of the run: the time since the start of the period, of the motion at constant
-  !> velocity, or of the free flight of a piston. The remainders are exact, so that late times are as precise as early ones.
+  !> velocity, or of the free flight of a piston. The remainders are exact, so that the precision does not decrease at late times.
   elemental function local_time(self, epoch, t, state) result(tau)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! [time]

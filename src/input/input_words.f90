@@ -137,8 +137,8 @@ contains
       end if
     end subroutine store_token
 
-    !> Checks a text. It must be in quotes (except in overrides), and it must not be too long. If the variable has choices, the text
-    !> must be one of them.
+    !> Checks a text. The text must be in quotes (except in overrides), and it must not be too long. If the variable has choices,
+    !> the text must be one of them.
     subroutine check_text(word, quoted)
       character(len=*), intent(in) :: word
       logical, intent(in) :: quoted

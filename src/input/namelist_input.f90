@@ -21,7 +21,7 @@ contains
   subroutine read_groups(text, overrides, groups, problems, complete)
     character(len=*), intent(in) :: text
     type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
-    type(group_t), allocatable, intent(out) :: groups(:)  !! in the order of the table; groups of the same name are adjacent
+    type(group_t), allocatable, intent(out) :: groups(:)  !! groups in the order of the table; groups of the same name are adjacent
     type(problem_list_t), intent(out) :: problems
     logical, intent(out) :: complete                                !! .false. if parts of the text were skipped
     type(value_t) :: defaults(size(table))
@@ -363,7 +363,8 @@ contains
       end associate
     end subroutine take_assignment
 
-    !> Reports an unknown variable. Its name may be misspelt, an earlier name, or the name of a variable in another group.
+    !> Reports an unknown variable. The name of the variable may be misspelt, an earlier name, or the name of a variable in another
+    !> group.
     subroutine report_unknown(group, name, line)
       character(len=*), intent(in) :: group, name
       integer, intent(in) :: line

@@ -57,7 +57,7 @@ module settings
     character(len=:), allocatable :: placement        !! 'random', 'grid', 'lattice', 'dense', 'explicit', 'file', 'grown'
     integer :: grid(2)                                !! numbers of columns and rows; 0, 0 if they are not given
     character(len=:), allocatable :: file             !! for placement 'file' or 'grown': text file, or HDF5 file of a run
-    logical :: scale_positions = .false.              !! positions are scaled from the box of that run to the box of this run
+    logical :: scale_positions = .false.              !! positions from the output of another run are scaled to the box of this run
     type(disks_in_file_t) :: in_file
     real(real64), allocatable :: position(:, :)       !! (2,count) given positions for 'explicit' [length]; otherwise shape (2,0)
     character(len=:), allocatable :: velocities       !! 'rest', 'equal_speed', 'uniform', 'maxwell', 'explicit', 'file'

@@ -17,7 +17,7 @@ module variable_help
 
 contains
 
-  !> The reference input file, which contains every variable with its default. It is a valid input.
+  !> The reference input file, which contains every variable with its default. The reference file is a valid input.
   pure function defaults_text() result(text)
     character(len=:), allocatable :: text
     integer :: g, k
@@ -292,8 +292,8 @@ contains
   end function row_text
 
   !> The groups of an input in the order of the file, each with its given variables. `from` and `to` are the positions of the first
-  !> and last byte of the group in the file. They start at 0 and apply to the text without byte order mark and with line feeds as
-  !> line ends. They are null if the group is not in the file.
+  !> and last byte of the group in the file. These positions start at 0 and apply to the text without byte order mark and with line
+  !> feeds as line ends. The positions are null if the group is not in the file.
   pure function groups_text(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text

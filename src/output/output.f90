@@ -369,8 +369,8 @@ contains
     call self%file%report(error)
   end subroutine save
 
-  !> Completes the output of a finished run: checks the file and renames it to its final name. If this fails, the run can be resumed
-  !> just before its end from the checkpoint in the file.
+  !> Completes the output of a finished run: checks the file and renames it to its final name. If the completion fails, the run can
+  !> be resumed just before its end from the checkpoint in the file.
   subroutine finish(self, sim, cost, note, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -155,8 +155,8 @@ contains
     if (name == "") name = "unknown"
   end function author
 
-  !> Whether the results of a run are independent of a variable. This holds for `run.threads`, which is therefore not stored
-  !> among the parameters.
+  !> Whether the results of a run are independent of a variable. The only such variable is `run.threads`, which is therefore not
+  !> stored among the parameters.
   pure function changes_nothing(variable) result(yes)
     character(len=*), intent(in) :: variable      !! name of the variable, which may be followed by its value
     logical :: yes
@@ -291,7 +291,7 @@ contains
     real(real64), intent(in) :: wall_seconds          !! wall time of the whole run, summed over its parts [s]
     !> in the last part of the run: collisions per processor time [1/s], and number of events executed by the serial engine.
     real(real64), intent(in) :: rate(2)
-    character(len=*), intent(in) :: note              !! reason of the end, if no stop rule was met
+    character(len=*), intent(in) :: note              !! reason why the run ended, if no stop rule was met
     character(len=longest_note) :: padded
 
     padded = note

@@ -66,7 +66,7 @@ contains
 
     too_far = .false.
     do i = 1, merge(sim%n_disks(), 0, any(sim%box%periodic))
-      ! One period less than the limit, because a frame may add one.
+      ! The number of periods must be smaller than the limit, because a frame may add one period.
       too_far = too_far .or. any(abs(sim%extra(i)%image) >= largest_exact)
     end do
     if (sim%tally%events > int(largest_exact, int64) .or. too_far) &

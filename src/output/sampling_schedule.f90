@@ -121,9 +121,9 @@ contains
     limits%sampled = max(limits%sampled, self%last_time)
   end subroutine tighten
 
-  !> The first time at which a sample is due that is not before `time` and later than `past`: a multiple of the interval, a
-  !> logarithmic step, or a given time. Multiples are computed as products, because sums would accumulate rounding errors. If
-  !> several such times differ only by rounding errors, a single sample is due at the last of these times.
+  !> The time of the first sample that is due at or after `time` and after `past`. A sample is due at each multiple of the interval,
+  !> at each logarithmic sampling time, and at each given time. Multiples are computed as products, because sums would accumulate
+  !> rounding errors. If several such times differ only by rounding errors, a single sample is due at the last of these times.
   pure function next_time(self, time, past) result(next)
     class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: time, past        !! [time]
@@ -199,8 +199,9 @@ contains
     next = whole_collisions(multiple*every)
   end function next_number
 
-  !> Number of samples of a run, if it is known in advance, otherwise 0. The number is known if there is at most one interval, and
-  !> if the only stop rule limits the same quantity as the interval, or the time if times are given.
+  !> Number of samples of a run, if it is known in advance, otherwise 0. The number is known under two conditions: there is at most
+  !> one interval, and the only stop rule limits the quantity in which the interval is measured (the time, if sampling times are
+  !> given).
   elemental function planned(self, limits) result(n)
     class(schedule_t), intent(in) :: self
     type(limits_t), intent(in) :: limits          !! of the run

@@ -1,6 +1,7 @@
 !> The exchange between domains. After each time window a domain compares its copies of disks with the original disks, which other
 !> domains own. If no disk of the domain can have touched a copy whose history (record of its motion in the window) was wrong, the
-!> copies are corrected. Otherwise the window is invalid. docs/theory.md states this criterion and proves that it is sufficient.
+!> copies are corrected. If a disk can have touched such a copy, the window is invalid. docs/theory.md states this criterion and
+!> proves that it is sufficient.
 module domain_borders
   use kinds, only: int16, int32, int64
   use domains, only: correction_t, domain_t, forever, list_copies, slot_of_copy
@@ -66,8 +67,8 @@ contains
     end associate
   contains
 
-    !> Whether a disk of the neighbour was inside the patch during the window, in any periodic image. `met` is .true. if the disk
-    !> could have touched a disk that this domain owns.
+    !> Whether a disk of the neighbour was inside the patch during the window, in any periodic image. `met` becomes .true. if the
+    !> disk of the neighbour could have touched a disk that this domain owns.
     function came_near(history, met) result(near)
       type(history_t), intent(in) :: history
       logical, intent(out) :: met

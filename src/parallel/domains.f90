@@ -1,8 +1,8 @@
-!> One domain of a simulation that is divided among threads. A domain owns the disks in a rectangle of cells. It also contains
-!> copies of the disks in the halo of cells around this rectangle; the rectangle and the halo form the patch of the domain. Each
-!> domain has its own event-driven engine. Disks that would enter the patch during a time window are missing in the domain. Errors
-!> in the motion of copies therefore spread inwards from the edge of the patch during the window, until `domain_borders` corrects
-!> the copies.
+!> One domain of a simulation that is divided among threads. A domain owns the disks in a rectangle of cells. The domain also
+!> contains copies of the disks in the halo, the cells around this rectangle. The rectangle and the halo form the patch of the
+!> domain. Each domain has its own event-driven engine. Disks that would enter the patch during a time window are missing in the
+!> domain. Errors in the motion of copies therefore spread inwards from the edge of the patch during the window, until
+!> `domain_borders` corrects the copies.
 module domains
   use kinds, only: int32, int64, real64
   use cell_faces, only: patch_t
@@ -226,7 +226,7 @@ contains
   !> Time of the next event in the domain.
   function next_time(self) result(t)
     type(domain_t), intent(inout) :: self
-    real(real64) :: t                              !! since the epoch [time]
+    real(real64) :: t                              !! time since the epoch [time]
     integer(int32) :: i
 
     call self%engine%queue%first(self%sim%disk, self%sim%tag, i)

@@ -23,8 +23,8 @@ module parallel_events
   !> applies while domains are in use, and the second number applies before domains are started.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
   ! Shortest and longest periods of the serial engine [events per disk]:
-  integer(int64), parameter :: brief(2) = 5                         !! used in a situation that domains cannot handle
-  integer(int64), parameter :: after_failures(2) = [5, 5*2**20]     !! while windows are invalid
+  integer(int64), parameter :: brief(2) = 5                         !! after a situation in which domains cannot be used
+  integer(int64), parameter :: after_failures(2) = [5, 5*2**20]     !! after invalid windows
   integer(int64), parameter :: while_busy(2) = [50, 1600]           !! while the cores are busy with other programs
 
   !> The engine that has predicted the events.
@@ -86,8 +86,8 @@ contains
     end if
   end subroutine renew
 
-  !> Largest number of domains for which the cost of the copies is justified. It is also the largest number of threads that can be
-  !> used.
+  !> Largest number of domains for which the cost of the copies is justified. The result is also the largest number of threads that
+  !> can be used.
   pure function most_domains(self, n_disks, periodic) result(n)
     class(parallel_events_t), intent(in) :: self
     integer(int32), intent(in) :: n_disks

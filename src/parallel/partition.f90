@@ -208,9 +208,9 @@ contains
       call choose_target()
     end subroutine begin_window
 
-    !> Chooses the time up to which all domains advance next. This is the end of the window, unless a count would exceed its limit
-    !> in the window. In that case the domains first advance through most of the remaining events, and finally one event at a time.
-    !> The number of iterations of each engine is bounded, even if the estimated event rate is wrong.
+    !> Chooses the time up to which all domains advance next. This time is the end of the window, unless a count would exceed its
+    !> limit in the window. In that case the domains first advance through most of the remaining events, and finally one event at a
+    !> time. The number of iterations of each engine is bounded, even if the estimated event rate is wrong.
     subroutine choose_target()
       real(real64) :: expected, sure, next
       integer(int32) :: k
@@ -259,7 +259,7 @@ contains
   subroutine write_back_all(self, sim, now)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: now                !! since the epoch [time]
+    real(real64), intent(in) :: now                !! time since the epoch [time]
     integer(int32) :: k
     logical :: shared
 

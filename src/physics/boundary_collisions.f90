@@ -49,7 +49,7 @@ contains
         sim%disk(i)%v = sim%disk(i)%v + normal_velocity
         if (law%restitution < 1 .and. .not. elastic) call end_bouncing(sim%disk(i)%v, v, normal_velocity, normal)
       end if
-      ! This does not apply to time-stepped dynamics.
+      ! Time-stepped dynamics does not need this separation.
       if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call separate_from_surface(sim, i, code, normal)
       if (law%tangential%is_rough()) call apply_tangential_impulse_at_wall(sim, i, law%tangential, normal, u, v)
     end if
@@ -81,7 +81,7 @@ contains
     real(real64), intent(in) :: normal(2)        !! unit vector inwards
     real(real64), intent(in) :: before(2)        !! velocity of the disk before the collision [length/time]
     real(real64), intent(inout) :: u(2)          !! velocity of the surface [length/time]
-    real(real64), intent(in) :: t                !! since the epoch [time]
+    real(real64), intent(in) :: t                !! time since the epoch [time]
     real(real64) :: mass, v, given
     integer :: axis
 

@@ -1,5 +1,5 @@
 !> The container: four sides, which are walls or periodic along each axis, fixed obstacles, and gravity. Contact times are pure
-!> functions of the state of a disk. They are relative to the epoch, like the clock of the disk.
+!> functions of the state of a disk. The contact times are relative to the epoch, like the clock of the disk.
 module box_geometry
   use collisions, only: wall_law_t
   use disks, only: disk_t
@@ -81,7 +81,7 @@ contains
     end do
   end function new_box
 
-  !> Adds groups of obstacles. Their shapes are set later.
+  !> Adds groups of obstacles. The caller sets the shapes of the obstacles later.
   subroutine add_obstacles(self, name, n)
     class(box_t), intent(inout) :: self
     character(len=*), intent(in) :: name(:)     !! name of each group
@@ -269,7 +269,7 @@ contains
   pure function side_position(self, k, t) result(x)
     class(box_t), intent(in) :: self
     integer, intent(in) :: k
-    real(real64), intent(in) :: t               !! since the epoch [time]
+    real(real64), intent(in) :: t               !! time since the epoch [time]
     real(real64) :: x                           !! [length]
 
     associate (motion => self%surface(k)%motion, state => self%side(k))
@@ -281,7 +281,7 @@ contains
   pure function side_velocity(self, k, t) result(v)
     class(box_t), intent(in) :: self
     integer, intent(in) :: k
-    real(real64), intent(in) :: t               !! since the epoch [time]
+    real(real64), intent(in) :: t               !! time since the epoch [time]
     real(real64) :: v                           !! [length/time]
 
     associate (motion => self%surface(k)%motion, state => self%side(k))
@@ -396,7 +396,7 @@ contains
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
     real(real64), intent(in) :: normal(2)       !! unit vector from the surface to a disk
-    real(real64), intent(in) :: t               !! since the epoch [time]
+    real(real64), intent(in) :: t               !! time since the epoch [time]
     real(real64) :: u(2)                        !! [length/time]
 
     u = 0
@@ -423,7 +423,8 @@ contains
     end if
   end function wall_normal
 
-  !> Accessible area: the area of the box, or of the smallest obstacle that encloses disks, minus the areas of the other obstacles.
+  !> Accessible area: the area of the box (or the area inside the smallest obstacle that encloses disks, if this area is smaller),
+  !> minus the areas of all other obstacles.
   pure function free_area(box) result(area)
     type(box_t), intent(in) :: box
     real(real64) :: area                        !! [length**2]

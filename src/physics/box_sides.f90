@@ -1,5 +1,5 @@
 !> The sides of the box: their positions, and the times at which disks reach them. These times are pure functions of the state of a
-!> disk. They are relative to the epoch, like the clock of the disk.
+!> disk. The times are relative to the epoch, like the clock of the disk.
 module box_sides
   use box_geometry, only: box_t
   use disks, only: disk_t
@@ -19,7 +19,7 @@ contains
   !> Positions of the sides at a given time.
   pure subroutine bounds(box, t, lower, upper)
     type(box_t), intent(in) :: box
-    real(real64), intent(in) :: t               !! since the epoch [time]
+    real(real64), intent(in) :: t               !! time since the epoch [time]
     real(real64), intent(out) :: lower(2), upper(2)     !! positions of left and bottom, of right and top sides [length]
     real(real64) :: inwards(n_sides)
     integer :: k
@@ -97,7 +97,7 @@ contains
   pure subroutine separate_from_sides(box, disk, now)
     type(box_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk
-    real(real64), intent(in) :: now             !! since the epoch [time]
+    real(real64), intent(in) :: now             !! time since the epoch [time]
     real(real64) :: step
     integer(int32) :: side
 

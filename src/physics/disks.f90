@@ -20,7 +20,7 @@ module disks
     ! changes of x and v in this epoch; it serves to recognise stale events.
     integer(int32) :: collision_counter = 0
     integer(int32) :: partner = 0               !! index of a disk (> 0), or another code of `partners`
-    real(real64) :: event_time = 0.0_real64     !! since the epoch [time]
+    real(real64) :: event_time = 0.0_real64     !! time since the epoch [time]
   end type disk_t
 
   type :: tag_t

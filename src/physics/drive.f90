@@ -56,11 +56,11 @@ contains
     yes = self%is_on() .and. self%species == 0 .and. .not. (self%kind == andersen .and. self%fraction < 1)
   end function acts_on_all
 
-  !> Time of kick k. It is computed as a product, because a sum would accumulate rounding errors.
+  !> Time of kick k. The time is computed as a product, because a sum would accumulate rounding errors.
   pure function time_of(self, k) result(t)
     class(drive_t), intent(in) :: self
     integer(int64), intent(in) :: k
-    real(real64) :: t                                !! since the start of the run [time]
+    real(real64) :: t                                !! time since the start of the run [time]
 
     t = never
     if (self%is_on()) t = k*self%interval

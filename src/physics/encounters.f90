@@ -17,10 +17,11 @@ module encounters
   private
   public :: collide, collide_pair, encounter_text, is_periodic_side, pass_side
 
-  !> Limits for the detection of an inelastic collapse. The first is the number of simultaneous collisions of a pair up to which a
-  !> series is not considered a collapse. The second is the approach velocity below which further collisions only result from
-  !> rounding errors, relative to the velocities and to the loss per collision. The third is an absolute approach velocity, for
-  !> systems in which walls slow all disks down; it is far below all velocities that an input may contain [length/time].
+  !> Limits for the detection of an inelastic collapse. The first limit is the number of simultaneous collisions of a pair up to
+  !> which a series is not considered a collapse. The second limit is the approach velocity, relative to the velocities and to the
+  !> loss per collision, below which further collisions only result from rounding errors. The third limit is an absolute approach
+  !> velocity, for systems in which walls slow all disks down; it is far below all velocities that an input may contain
+  !> [length/time].
   integer(int32), parameter :: most_visible = most_repeats - 3
   real(real64), parameter :: rounded = 1.0e-12_real64, slowest = 1.0e-120_real64
 
@@ -29,8 +30,8 @@ module encounters
 
 contains
 
-  !> Executes the collision of disk i at the time t with the partner `code`: another disk, a side or an obstacle. This is the
-  !> general version, which handles rotation, friction, velocity-dependent restitution, the virial tensor and the event log;
+  !> Executes the collision of disk i at the time t with the partner `code`: another disk, a side or an obstacle. This procedure is
+  !> the general version, which handles rotation, friction, velocity-dependent restitution, the virial tensor and the event log;
   !> `collide_pair` is the fast version. The log entry does not depend on which of the two disks predicted the event. Two disks that
   !> are still in contact are skipped.
   subroutine collide(sim, i, code, t, counts, log)

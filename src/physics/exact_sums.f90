@@ -1,4 +1,4 @@
-!> Sums that are bit-identical for any order of their terms. They are stored as fixed-point numbers.
+!> Sums that are bit-identical for any order of their terms. The sums are stored as fixed-point numbers.
 module exact_sums
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use kinds, only: int64, int128, real64
@@ -14,8 +14,9 @@ module exact_sums
   !> Limit of the two integers of a sum; beyond this limit the sum is NaN.
   integer(int128), parameter :: most = 2_int128**digits_of_most
 
-  !> A fixed-point sum. A term may exceed the bound that was passed to `choose_unit`; its addition then takes slightly longer. 2**35
-  !> terms of any size below 2**90 units cannot overflow; multiples of 2**90 units in larger terms are counted separately.
+  !> A fixed-point sum. A term may exceed the bound that was passed to `choose_unit`; the addition of this term then takes slightly
+  !> longer. A sum of 2**35 terms below 2**90 units cannot overflow. Multiples of 2**90 units in larger terms are counted
+  !> separately.
   type :: exact_sum_t
     integer(int128) :: units = 0
     integer(int128) :: rare = 0                          !! multiples of 2**90 units

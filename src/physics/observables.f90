@@ -45,7 +45,7 @@ contains
   pure function observed(sim) result(list)
     type(simulation_t), intent(in) :: sim
     type(observable_list_t) :: list
-    real(real64) :: sums(lost, 0:size(sim%species))   ! sums for each species; those with index 0 are for all disks
+    real(real64) :: sums(lost, 0:size(sim%species))   ! sums for each species, and with index 0 for all disks
     character(len=:), allocatable :: path
     real(real64) :: flux_integral(5)                          ! time integrals of the fluxes [energy time], [energy length]
     real(real64) :: at(2, 2)                          ! positions of the lower and upper sides [length]
@@ -103,8 +103,8 @@ contains
     now = total(sim, sums(:, 0))
   end function total_energy
 
-  !> Adds averages per disk over the disks of a species. The temperature is kT in two dimensions. It is computed from the kinetic
-  !> energy relative to the mean velocity and, in a sheared box, relative to the velocity profile.
+  !> Adds averages per disk over the disks of a species. The temperature is kT in two dimensions. The temperature is computed from
+  !> the kinetic energy relative to the mean velocity and, in a sheared box, relative to the velocity profile.
   pure subroutine add_means(list, group, sums, rotation)
     type(observable_list_t), intent(inout) :: list
     character(len=*), intent(in) :: group         !! name of the species

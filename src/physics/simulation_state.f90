@@ -221,7 +221,7 @@ contains
     images = self%box%images(self%box%epoch)
   end function images_now
 
-  !> Position of disk i at the present time. Its stored state is not changed.
+  !> Position of disk i at the present time. The stored state of the disk is not changed.
   pure function position(self, i) result(x)
     class(simulation_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -293,7 +293,7 @@ contains
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: before(2)         !! velocity before the change [length/time]
-    real(real64), intent(in) :: t                 !! since the epoch [time]
+    real(real64), intent(in) :: t                 !! time since the epoch [time]
 
     if (.not. self%features%helfand) return
     associate (mass => self%mass_of(i), sums => self%tally%sum(flux_changes:flux_changes + 4))
@@ -368,8 +368,8 @@ contains
   end function mean_square_speed
 
   !> Chooses the units of the sums from the most common terms: the terms of disks with the mean square speed, or the terms that
-  !> walls and kicks usually produce. If masses differ widely, terms of the lightest disks are still summed with 40 binary digits,
-  !> and rare terms of the heaviest disks exceed the bound of `exact_sum_t`, which then takes slightly longer.
+  !> walls and kicks usually produce. If masses differ widely, terms of the lightest disks are still summed with 40 binary digits.
+  !> Terms of the heaviest disks may exceed the bound of `exact_sum_t`; the addition of such rare terms takes slightly longer.
   pure subroutine choose_units(self)
     class(simulation_t), intent(inout) :: self
     real(real64) :: mass(size(self%disk)), kicked(size(self%species))    ! [mass, (length/time)**2]

@@ -211,14 +211,14 @@ contains
     n = first + iand(first, merge(0, 1, self%slot(2) == i - 1))
   end function slots_before
 
-  !> Lists the disks in the slots of cell c and its eight neighbours, except disk i, which is in cell c. Whole cells are copied, so
-  !> that no branch depends on the numbers of disks. If disk i is in the linked list of a crowded cell and not in a slot, the head
-  !> of that list is omitted instead.
+  !> Lists the disks in the slots of cell c and its eight neighbours, except disk i, which is in cell c. All slots of a cell are
+  !> copied, whether they are occupied or not, so that no branch depends on the numbers of disks. If disk i is in the linked list of
+  !> a crowded cell and not in a slot, the head of that list is omitted instead.
   subroutine gather(cell, c, stride, i, list, n)
     type(cell_t), intent(in) :: cell(0:*)
     integer(int32), intent(in) :: c, stride, i
     integer(int32), intent(out) :: list(list_capacity)
-    integer(int32), intent(out) :: n               !! number of disks listed
+    integer(int32), intent(out) :: n               !! number of disks in `list`
     integer(int64) :: below, here, above, m, own   ! 64 bits, as an address, so that no conversion is needed
 
     here = c

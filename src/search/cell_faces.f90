@@ -17,9 +17,9 @@ module cell_faces
   private
   public :: all_cells, cell_faces_t, line_t, patch_t
 
-  !> A patch: the rectangular block of cells that a grid contains. It usually consists of all cells into which the box is divided.
-  !> In a parallel run the patch of a domain is a part of these cells, which may extend across a periodic side. Outer faces of a
-  !> patch that are not sides of the box are open: a disk that crosses an open face leaves the grid.
+  !> A patch: the rectangular block of cells that a grid contains. A patch usually consists of all cells into which the box is
+  !> divided. In a parallel run the patch of a domain is a part of these cells, which may extend across a periodic side. Outer faces
+  !> of a patch that are not sides of the box are open: a disk that crosses an open face leaves the grid.
   type :: patch_t
     integer(int32) :: whole(2) = 0                 !! numbers of columns and rows in the box
     integer(int32) :: first(2) = 1                 !! first column and row of the patch; less than 1 beyond a periodic side
@@ -156,7 +156,7 @@ contains
     yes = any(cell == self%last .or. cell == self%next)
   end function at_seam
 
-  !> The column or row that is `ahead` steps from a given one, and the number of periods between the two.
+  !> The column or row that is `ahead` steps from a given column or row, and the number of periods between the two.
   pure subroutine step(self, axis, cell, ahead, there, periods)
     class(patch_t), intent(in) :: self
     integer, intent(in) :: axis
@@ -247,8 +247,9 @@ contains
     end subroutine find_struck
   end subroutine set
 
-  !> Finds the columns and rows in which a piston may touch disks before it has moved by the width of a cell. If a piston is beyond
-  !> all cells, it can touch the disks in the outermost cells, because these disks may be beyond the cells as well.
+  !> Finds the columns and rows in which a piston may touch disks before it has moved by the width of a cell. The outermost cells
+  !> also contain the disks that are beyond all cells. A piston beyond all cells can therefore touch the disks in the outermost
+  !> cells.
   pure subroutine find_strips(self, box, small, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box

@@ -1,5 +1,5 @@
-!> Cell search (linked-cell method). The box is divided into cells at least one diameter wide. Before a disk leaves its cell, which
-!> is an event, it can only touch disks in its own cell and the eight cells around it. Wide cells overlap (see `cell_faces`).
+!> Cell search (linked-cell method). The box is divided into cells at least one diameter wide. A disk can only touch disks in its
+!> cell and the eight neighbouring cells until it leaves its cell, which is an event. Wide cells overlap (see `cell_faces`).
 module cell_grid
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t, next_obstacle
@@ -201,7 +201,7 @@ contains
     call self%lists%enter(i, self%cells, self%patch, sim%tag(i)%cell)
   end subroutine list
 
-  !> Marks a cell if disks there may touch obstacles, big disks or periodic images, or if big disks are assigned to it.
+  !> Marks a cell if disks in the cell may touch obstacles, big disks or periodic images, or if the cell contains big disks.
   subroutine mark(self, cell)
     class(cell_grid_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -213,7 +213,7 @@ contains
     call self%cells%mark(self%cells%number(cell), special)
   end subroutine mark
 
-  !> Updates the listed position of a big disk, and the marks of the cells that the disk leaves and reaches.
+  !> Updates the reference position of a big disk, and the marks of the cells that the disk leaves and reaches.
   subroutine follow_big(self, sim, number)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -229,7 +229,7 @@ contains
     end do
   end subroutine follow_big
 
-  !> Executes a crossing of disk i: changes its cell, neighbour list or listed position, and predicts its next event.
+  !> Executes a crossing of disk i: changes its cell, neighbour list or reference position, and predicts its next event.
   subroutine cross(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -243,7 +243,7 @@ contains
     call self%predict(sim, i)
   end subroutine cross
 
-  !> Updates the listed position of a big disk, or renews the neighbour list of a small disk.
+  !> Updates the reference position of a big disk, or renews the neighbour list of a small disk.
   subroutine cross_with_care(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -308,7 +308,7 @@ contains
     call put(self, tag, i, cell)
   end subroutine move
 
-  !> Predicts the earliest event of disk i: with a side, a cell face, an obstacle, or a disk in the nine cells around disk i.
+  !> Predicts the earliest event of disk i with a side, a cell face, an obstacle, or a disk in the nine cells around disk i.
   subroutine predict(self, sim, i)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -374,7 +374,7 @@ contains
     end subroutine predict_collided
   end subroutine predict_both_with_care
 
-  !> Whether a small disk has a complete list that includes no disks across a periodic side.
+  !> Whether a small disk has a complete neighbour list without disks across a periodic side.
   pure function is_plainly_listed(self, cell, i) result(yes)
     class(cell_grid_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -524,8 +524,8 @@ contains
     sim%tag(i)%partner_counter = sim%disk(max(near%partner, 1))%collision_counter
   contains
 
-    !> Finds the earliest event of a big disk: with a side, an obstacle, another big disk, or a small disk in the cells along its
-    !> boundary, or the time when the disk leaves the margin around its listed position.
+    !> Finds the earliest event of a big disk: a collision with a side, an obstacle, another big disk or a small disk in the cells
+    !> along its boundary, or its departure from the margin around its reference position.
     subroutine find_event_of_big()
       real(real64) :: t_margin
       integer(int32) :: number, image
@@ -573,7 +573,7 @@ contains
     end associate
   end subroutine find_event_of_small
 
-  !> Finds contacts of a small disk with the disks in its own cell and the eight cells around its own.
+  !> Finds contacts of a small disk with the disks in its cell and in the eight cells around this cell.
   subroutine scan_cells_around(self, sim, known, near)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

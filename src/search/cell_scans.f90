@@ -103,7 +103,7 @@ contains
     call test_disks()
   contains
 
-    !> Tests the big disks that have been listed, which are in one periodic image of the box.
+    !> Tests the big disks in the list of candidates. All of them are in the same periodic image of the box.
     subroutine test_disks()
       if (all(last == 0)) then
         call test_list(sim, known, near)
@@ -195,8 +195,8 @@ contains
     end do
   end subroutine scan_rim
 
-  !> Adds further candidates to those from `gather`: the disks in the linked lists of crowded cells, among the cell of a disk and
-  !> its eight neighbours.
+  !> Adds further candidates to the candidates from `gather`: the disks in the linked lists of crowded cells. The cells are the cell
+  !> of a disk and the eight cells around it.
   subroutine add_chains_around(cells, sim, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim

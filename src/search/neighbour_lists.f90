@@ -1,10 +1,10 @@
 !> Neighbour lists: for each disk the disks that it can touch while both stay in their neighbourhoods.
 !>
-!> A neighbourhood is a square around the position at which the disk was listed, clipped at the faces of its cell and at the sides
-!> of the box. Two disks are in each other's lists if they can touch somewhere in their neighbourhoods. An event occurs when a disk
-!> leaves its neighbourhood: the nine cells around the disk are then searched, and the disk receives a new neighbourhood and a new
-!> list. A prediction therefore tests only a few neighbours, however many disks the cells contain (Donev, Torquato and Stillinger,
-!> J. Comput. Phys. 202, 737 (2005)).
+!> A neighbourhood is a square around the position at which the disk received its list, clipped at the faces of its cell and at the
+!> sides of the box. Two disks are in each other's lists if they can touch somewhere in their neighbourhoods. An event occurs when a
+!> disk leaves its neighbourhood: the nine cells around the disk are then searched, and the disk receives a new neighbourhood and a
+!> new list. A prediction therefore tests only a few neighbours, however many disks the cells contain (Donev, Torquato and
+!> Stillinger, J. Comput. Phys. 202, 737 (2005)).
 !>
 !> Neighbour lists serve only to save time. If a list has no space for a further neighbour, it is marked as incomplete until the
 !> disk receives a new list. Until then the nine cells around the disk are searched in each prediction.
@@ -317,7 +317,7 @@ contains
     end do
   end subroutine leave
 
-  !> Removes an entry from the list of disk i. The last entry is moved to its position.
+  !> Removes an entry from the list of disk i. The last entry of the list is moved to the position of the removed entry.
   pure subroutine remove(self, i, place)
     type(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i, place

@@ -17,7 +17,7 @@ module neighbour_search
 
   !> A predicted event.
   type :: event_t
-    real(real64) :: time = 0.0_real64         !! since the epoch [time]
+    real(real64) :: time = 0.0_real64         !! time since the epoch [time]
     integer(int32) :: disk = 0                !! disk that stores the event
     integer(int32) :: partner = 0             !! partner in the event: a disk (> 0) or a code (<= 0)
   end type event_t

@@ -1,9 +1,9 @@
 !> Lists the objects other than small disks that reach into each cell: obstacles, and a few big disks among many small disks.
 !>
 !> The width of the cells is chosen for the small disks. A big disk is listed in each cell from which a small disk could touch it.
-!> The list is valid while the big disk stays within a margin around its listed position, which is its position at the time when the
-!> list was made. The search for a small disk therefore finds big disks in the list of its own cell, and the search for a big disk
-!> tests the cells along its boundary. The cost for a disk depends only on the sizes of disks near it.
+!> The list is valid while the big disk stays within a margin around its reference position, the position for which the list was
+!> made. The search for a small disk therefore finds big disks in the list of its own cell, and the search for a big disk tests the
+!> cells along its boundary. The cost for a disk depends only on the sizes of disks near it.
 module reach_lists
   use kinds, only: int16, int32, real64
   use cell_faces, only: cell_faces_t, patch_t
@@ -21,7 +21,7 @@ module reach_lists
   !> A cell into which an object reaches.
   type :: place_t
     integer(int32) :: cell(2) = 0                !! column and row
-    integer(int32) :: image(2) = 0               !! displacement in periods of the object as seen from the cell
+    integer(int32) :: image(2) = 0               !! periodic image of the object that reaches into the cell, in periods
   end type place_t
 
   !> An object in the list of a cell.
@@ -33,19 +33,19 @@ module reach_lists
 
   type :: big_disk_t
     integer(int32) :: disk = 0                   !! index of the disk
-    real(real64) :: centre(2) = 0.0_real64       !! listed position [length]
+    real(real64) :: centre(2) = 0.0_real64       !! reference position [length]
     type(place_t), allocatable :: rim(:)         !! cells in which small disks may touch this disk
     integer(int32), allocatable :: obstacles(:)  !! codes of the obstacles that the disk may touch, in descending order
   end type big_disk_t
 
   type :: reach_lists_t
     type(big_disk_t), allocatable :: big(:)
-    real(real64) :: margin = 0.0_real64          !! margin around the listed positions of big disks [length]
+    real(real64) :: margin = 0.0_real64          !! margin around the reference positions of big disks [length]
     !> (columns,rows) first entry of each cell; 0 if its list is empty. Not allocated if there are neither obstacles nor big disks.
     integer(int32), allocatable :: first(:, :)
     type(entry_t), allocatable :: entry(:)
     integer(int32), private :: vacant = 0        !! head of the list of free entries
-    type(patch_t), private :: patch              !! cells for which obstacles are listed
+    type(patch_t), private :: patch              !! patch of cells for which the lists of obstacles were made
     !> Lower left and upper right corner of the rectangle of all these cells [length]
     real(real64), private :: span(2, 2) = 0.0_real64
   contains
@@ -60,7 +60,7 @@ module reach_lists
 
 contains
 
-  !> The radius that determines the width of the cells: the largest radius, unless a few disks are much bigger than the others.
+  !> The radius that determines the width of the cells: the largest radius, unless a few disks are much bigger than all other disks.
   pure function largest_small_radius(disk) result(radius)
     type(disk_t), intent(in) :: disk(:)
     real(real64) :: radius, next
@@ -75,7 +75,7 @@ contains
     end do
   end function largest_small_radius
 
-  !> Whether the obstacles are already listed for these cells.
+  !> Whether the lists of obstacles have already been made for these cells.
   pure function serves(self, patch, faces) result(yes)
     class(reach_lists_t), intent(in) :: self
     type(patch_t), intent(in) :: patch
@@ -176,7 +176,7 @@ contains
     end do
   end function number_of
 
-  !> Lists the k-th big disk at its present position.
+  !> Makes the present position of the k-th big disk its reference position, and renews its entries in the lists.
   subroutine follow(self, sim, k, patch, faces)
     class(reach_lists_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

@@ -42,7 +42,8 @@ contains
     real(real64), intent(in) :: full(:)                 !! (n) radii to be reached, in the order of species [length]
     type(random_stream_t), intent(inout) :: stream
     class(status_line_t), intent(inout) :: line         !! status line that shows the progress
-    !> (2,n) positions in the order of species; in: initial positions, or shape (2,0) for random ones; out: final positions [length]
+    !> (2,n) positions in the order of species; in: initial positions, or shape (2,0) for random initial positions; out: final
+    !> positions [length]
     real(real64), allocatable, intent(inout) :: x(:, :)
     type(error_t), allocatable, intent(out) :: error
     type(simulation_t) :: sim                           ! elastic disks

@@ -154,7 +154,7 @@ contains
   end function are_listed
 
   !> The packing fraction that would result if all disks had the radius that determines the width of the cells. This radius is the
-  !> largest one, except that a few big disks may be excluded.
+  !> largest radius, except that a few big disks may be excluded.
   pure function crowding(settings) result(fraction)
     type(settings_t), intent(in) :: settings
     real(real64) :: fraction, radius

@@ -211,7 +211,7 @@ contains
     end associate
   end subroutine search_layer
 
-  !> The same for the disks in one cell.
+  !> Like `search_layer`, for the disks in one cell.
   pure function blocker_in(packing, head, p, half, radius) result(blocker)
     type(packing_t), intent(in) :: packing
     integer(int32), intent(in) :: head

@@ -264,8 +264,8 @@ contains
     end subroutine place_densely
   end subroutine place_disks
 
-  !> Represents the region, without the parts that displaced sides cover, as a box. The placed disks that reach into this box become
-  !> obstacles in it, including their periodic images.
+  !> Represents the region, without the parts that displaced sides cover, as a box. Placed disks (and periodic images of disks) that
+  !> reach into this box become obstacles in this box.
   function growth_box(packing, region) result(box)
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: region(4)

@@ -1,5 +1,5 @@
-!> Reads disks from a text file with one line `x y` or `x y vx vy` per disk. Other columns are possible if the first line holds
-!> the names of the columns, in lower or upper case. Empty lines, and text from a # to the end of its line, are ignored.
+!> Reads disks from a text file with one line `x y` or `x y vx vy` per disk. A file may have other columns if its first line
+!> contains the names of the columns, in lower or upper case. Empty lines, and text from a # to the end of its line, are ignored.
 module position_file
   use kinds, only: int64, real64
   use errors, only: exit_files, exit_usage, fail

@@ -1,5 +1,5 @@
-!> Initial velocities of the disks, by the rules of their species. Each species has its own random streams, so that changes to
-!> one species do not affect the random numbers of others.
+!> Initial velocities of the disks, by the rules of their species. Each species has its own random streams, so that changes to one
+!> species do not affect the random numbers of other species.
 module starting_velocities
   use kinds, only: int32, real64
   use disks, only: disks_before
@@ -60,8 +60,8 @@ contains
     end subroutine find_disks
 
     !> Draws the velocities of one species. If the total momentum has to be zero, velocities of equal speed are drawn in opposite
-    !> pairs (and one triple at 120 degrees if the number is odd), so that the speeds remain equal. For the other rules
-    !> `remove_drift` shifts the velocities.
+    !> pairs (and one triple at 120 degrees if the number is odd), so that the speeds remain equal. For velocities by other rules,
+    !> `remove_drift` sets the total momentum to zero.
     subroutine draw_velocities()
       associate (species => settings%species(s), disk => sim%disk)
         select case (species%velocities)

@@ -9,9 +9,9 @@ module variable_rows
   real(real64), parameter, public :: smallest = 1.0e-100_real64    !! smallest magnitude of an input value other than 0
   real(real64), parameter, public :: largest = 1.0e100_real64      !! largest magnitude; products of larger values could overflow
 
-  !> When the value of a variable may differ from its value at the start of a run: never; on `--resume`, if the variable has no
-  !> effect on the trajectory; or in a running simulation, if the variable affects the motion of the disks but not their number,
-  !> properties or initial state.
+  !> When the value of a variable may differ from its value at the start of a run: never, on `--resume`, or in a running simulation.
+  !> Variables without effect on the trajectory may change on `--resume`. Variables that affect the motion of the disks, but not
+  !> their number, properties or initial state, may change in a running simulation.
   character(len=9), parameter, public :: never = "never", on_resume = "on resume", in_motion = "running"
 
   type, public :: range_t

@@ -80,8 +80,8 @@ contains
     end do
   end function full_names
 
-  !> Whether two variables of a group must not be given together. This also holds for two variables that determine the times of the
-  !> same samples.
+  !> Whether two variables of a group must not be given together. Two variables that determine the times of the same samples also
+  !> exclude each other.
   pure function excludes(one, other) result(yes)
     integer, intent(in) :: one, other        !! rows
     logical :: yes
