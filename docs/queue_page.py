@@ -80,7 +80,7 @@ def table(now: float, queue: list[Expected]) -> str:
 
 
 def draw(axes: plt.Axes, now: float, queue: list[Expected]) -> None:
-    """Draw disks with velocities, the next event as a line, and the positions then as outlines."""
+    """Draw disks with velocities, the next event as a line, and its positions as outlines."""
     first, disks = queue[0], {event.disk: event for event in queue}
     axes.add_patch(Rectangle((0, 0), BOX, BOX, fill=False, clip_on=False, **WALL))
     for line in axes.axvline, axes.axhline:

@@ -67,7 +67,7 @@ def main() -> int:
 
 
 def line(verdict) -> str:
-    """A verdict for the terminal."""
+    """Return a verdict as a line for the terminal."""
     mark = "pass" if verdict.passed else "FAIL"
     measured = report.measured(verdict.measured, verdict.error)
     values = f"{report.number(verdict.reference, 8):>14} {measured:>22}"

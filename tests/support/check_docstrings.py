@@ -41,13 +41,13 @@ IGNORED = {
 #: Classes whose public methods and properties are checked as well.
 CLASSES = ("Run", "Simulation")
 METHODS = (FunctionType, classmethod, staticmethod)
-#: A named tuple needs no example: functions return it.
+#: Named tuples, which need no example because functions return them.
 OF_CLASSES = {"EX01", "PR01", "PR02"}
 
 
 def problems() -> list[str]:
     """Return all problems as `module.name: CODE text`."""
-    from numpydoc.validate import validate  # the tests take the list of modules without it
+    from numpydoc.validate import validate  # not installed in all tests
 
     found = []
     for module in ("ricochet", *(f"ricochet.{name}" for name in MODULES)):
@@ -62,7 +62,7 @@ def problems() -> list[str]:
 
 
 def of_methods(name: str) -> list[str]:
-    """The problems of the methods and properties of a class of the package."""
+    """Return the problems of the methods and properties of a class of the package."""
     from numpydoc.validate import validate
 
     found = []

@@ -1,11 +1,12 @@
-"""Checks the sources against rules of the design that no other tool knows. One line per problem.
+"""Check the sources against rules of the design that no other tool checks.
 
     python tests/support/check_style.py [FOLDER]
 
-Arrows between folders (the pictures in src/README.md and post/ricochet/README.md), lengths of
-files, procedures and argument lists, comments before procedures, privacy, names, no preprocessor;
-help texts, first words of sentences and a few denied words; and no path of somebody's machine in
-any file of the project.
+The script prints one line per problem.  It checks the dependences between folders (arrows in the
+pictures of src/README.md and post/ricochet/README.md), the lengths of files, procedures and
+argument lists, comments before procedures, privacy, names, the absence of preprocessor directives,
+help texts, first words of sentences, a few denied words, and the absence of paths of single
+machines.
 """
 
 import ast
@@ -32,15 +33,17 @@ TYPES = "type|class|real|integer|logical|character|procedure"
 DECLARATION = re.compile(rf"(?:use|import|implicit)\b|(?:{TYPES})\b.*::")
 EMPTY_WORDS = re.compile(r"(?:get|set(?!_in_)|do|handle)_|(?:\w+_)?(?:manager|utils?)(?:_|$)")
 MACHINE_PATH = re.compile(r"""(?:^|[\s"'=(:])/(?:home|root|Users|work|tmp|mnt|scratch)/\w""")
-# The help of a variable names the quantity first: a capital noun, no preposition, pronoun or verb.
+# The help of a variable begins with the quantity: a capitalised noun, not a preposition, pronoun or
+# verb.
 HELP = re.compile(r'variable_t\("(\w*)", "(\w+)", "\w+", \d+, "\w+", "[^"]*",[ &\n]*"(\w*)')
 NO_NOUN = {"Of", "In", "On", "At", "By", "With", "For", "From", "To", "How", "Whether", "When"}
 NO_NOUN |= {"What", "That", "Those", "Where", "Which", "Use", "Set", "Give", "The", "It", "This"}
-# A sentence that begins so has a clause or a pronoun for its subject: readers look for the noun.
+# The subject of a sentence with one of these first words is a clause or a pronoun, not a noun.
 NO_SUBJECT = re.compile(
     r"(?:^|[.!?] +)((?:What|Whom)\b(?![^.]*\?)|That which\b|(?:That|Those) (?:of|that|in)\b)"
 )
-# Each of these occurred several times where readers stopped, and no right sentence needs it.
+# Each of these expressions occurred in several sentences that readers misunderstood, and no correct
+# sentence requires them.
 DENIED = {
     r"by turns": "alternately, or interleaved",
     r"\bof late[,.;]": "recently",
@@ -66,12 +69,12 @@ class Problem(NamedTuple):
 
 
 def code_of(line: str) -> str:
-    """A line in lower case without texts and comment."""
+    """Return a line in lower case without strings and comment."""
     return re.sub(r"'[^']*'|\"[^\"]*\"", "''", line).split("!")[0].lower()
 
 
 def arrows_of(page: str) -> dict[str, set[str]]:
-    """The folders that each folder may use, from the lines `one --> other & another`."""
+    """Return the folders that each folder may use, from lines such as `one --> other & another`."""
     arrows: dict[str, set[str]] = {}
     for start, ends in ARROWS.findall(page):
         arrows.setdefault(start, set()).update(re.findall(r"\w+", ends))
@@ -81,7 +84,7 @@ def arrows_of(page: str) -> dict[str, set[str]]:
 def arrow_problems(
     path: Path, lines: list[str], homes: dict[str, str], arrows: dict[str, set[str]]
 ) -> Iterator[Problem]:
-    """Problems of `use` statements: without `only`, or without an arrow in the picture."""
+    """Return the `use` statements without `only`, or without an arrow in the picture."""
     own = path.parent.name
     for number, line in enumerate(lines, start=1):
         use = USE.match(line)
@@ -96,7 +99,7 @@ def arrow_problems(
 
 
 def import_problems(root: Path, package: Path) -> Iterator[Problem]:
-    """Imports between the folders of a Python package that have no arrow in its picture.
+    """Return the imports between folders of a Python package without an arrow in its picture.
 
     A module at the top of the package counts as a folder; `__init__.py` may use all folders.
     """
@@ -117,7 +120,7 @@ def import_problems(root: Path, package: Path) -> Iterator[Problem]:
 
 
 def imports_of(path: Path, package: Path) -> Iterator[tuple[int, str]]:
-    """Line, and first name below the package, of each import anywhere in the file."""
+    """Return line and first name below the package of each import in a file."""
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ImportFrom) and node.level > 0:
             start = path.parents[node.level - 1].relative_to(package).parts
@@ -133,7 +136,7 @@ def imports_of(path: Path, package: Path) -> Iterator[tuple[int, str]]:
 
 
 def unit_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
-    """A file is one module or submodule of its own name, not too long; a module is private."""
+    """Return the files that are too long, or not one private module with the name of the file."""
     if len(lines) > MOST_LINES_OF_FILE:
         yield Problem(path, len(lines), f"more than {MOST_LINES_OF_FILE} lines")
     units = [unit for line in lines if (unit := UNIT.match(line))]
@@ -149,7 +152,7 @@ def unit_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
 
 
 def procedure_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
-    """Procedures that are too long or have empty words for a name."""
+    """Return the procedures that are too long, or whose name contains a meaningless word."""
     start = name = None
     for number, line in enumerate(lines, start=1):
         if END.match(line):
@@ -163,7 +166,7 @@ def procedure_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
 
 
 def statements_of(text: str) -> list[tuple[int, str]]:
-    """Each statement as one line, with the number of its first; comments and blanks as well."""
+    """Return each statement, comment or empty line, joined to one line, with its line number."""
     statements: list[tuple[int, str]] = []
     continued = False
     for number, line in enumerate(text.splitlines(), start=1):
@@ -177,7 +180,7 @@ def statements_of(text: str) -> list[tuple[int, str]]:
 
 
 def heading_problems(path: Path, text: str) -> Iterator[Problem]:
-    """Procedures without `!>`, with long argument lists, or whose body follows without a gap.
+    """Return the procedures without `!>`, with long argument lists, or without an empty line.
 
     Interfaces of C functions need no comment, because they have manual pages.
     """
@@ -205,7 +208,7 @@ def heading_problems(path: Path, text: str) -> Iterator[Problem]:
 
 
 def name_problems(root: Path, paths: list[Path]) -> Iterator[Problem]:
-    """Names that a module imports and does not use, or offers and nobody uses, types aside."""
+    """Return unused imported names, and unused public names except those of types."""
     tests = [*(root / "tests").rglob("*.pf"), *(root / "tests").rglob("*.f90")]
     uses = re.compile(r"use(?:, *intrinsic *::)? *(\w+) *, *only *: *(.*)")
     wanted = set()
@@ -228,7 +231,7 @@ def name_problems(root: Path, paths: list[Path]) -> Iterator[Problem]:
 
 
 def path_problems(root: Path) -> Iterator[Problem]:
-    """Paths that exist on one machine only, in any file that is or could be committed."""
+    """Return the paths of a single machine in files that are or could be committed."""
     command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
     for name in subprocess.check_output(command, cwd=root, text=True).splitlines():
         try:
@@ -241,7 +244,7 @@ def path_problems(root: Path) -> Iterator[Problem]:
 
 
 def comments_of(path: Path) -> Iterator[tuple[int, str]]:
-    """Line and text of each comment and docstring; comment lines that follow each other are one."""
+    """Return line and text of each docstring and of each block of comment lines."""
     text = path.read_text()
     if path.suffix == ".py":
         for node in ast.walk(ast.parse(text)):
@@ -275,7 +278,7 @@ def comments_of(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def language_problems(root: Path) -> Iterator[Problem]:
-    """Helps that begin with no noun, sentences that begin with `What`, and denied words."""
+    """Return help texts that begin with no noun, sentences that begin badly, and denied words."""
     for path in sorted((root / "src" / "variables").glob("*.f90")):
         text = path.read_text()
         for row in HELP.finditer(text):
@@ -301,14 +304,14 @@ def language_problems(root: Path) -> Iterator[Problem]:
 
 
 def denied_words(path: Path, line: int, words: str) -> Iterator[Problem]:
-    """The denied words in a text."""
+    """Return the denied words in a text."""
     for pattern, better in DENIED.items():
         if found := re.search(pattern, words):
             yield Problem(path, line, f"{found[0]!r}: write {better}")
 
 
 def problems_of(root: Path) -> Iterator[Problem]:
-    """All problems of the project in `root`."""
+    """Return all problems of the project in `root`."""
     arrows = arrows_of((root / "src" / "README.md").read_text())
     paths = sorted((root / "src").rglob("*.f90"))
     homes = {path.stem: path.parent.name for path in paths}
@@ -337,7 +340,7 @@ def problems_of(root: Path) -> Iterator[Problem]:
 
 
 def main() -> int:
-    """Prints the problems; 1 if there are any."""
+    """Print the problems; return 1 if there are any, otherwise 0."""
     problems = list(problems_of(Path(sys.argv[1] if len(sys.argv) > 1 else ".")))
     print(*problems, sep="\n", end="\n" if problems else "")
     return 1 if problems else 0

@@ -1,14 +1,14 @@
-"""Runs two builds of the program on every input, and compares all that they write, bit for bit.
+"""Run two builds of the program with every input, and compare their output bit for bit.
 
     python tests/support/compare_bits.py OLD NEW [MORE.nml...]
 
-OLD and NEW are programs, say of two commits. Random systems are tried as well. Provenance is left
-out; the paths of a layout that changed on purpose are named with --except. With --sums 1e-13 sums
-over collisions may differ by that share of their largest value or of the energy. With --old-names
-OLD is a program from before the renaming of the public names (tables OLD_WORDS and OLD_PATHS): it
-gets its inputs with its own names, and its datasets are compared under the present ones. One line
-for each run; an input that OLD refuses because it does not know a variable is "unknown to OLD".
-Exit status 1 if any differ.
+OLD and NEW are programs, for example of two commits.  Random systems are compared as well.
+Provenance is left out.  The option --except names the paths of datasets whose layout changed on
+purpose.  With --sums 1e-13 sums over collisions may differ by this fraction of their largest value
+or of the energy.  With --old-names OLD is a program from before the renaming of the public names
+(tables OLD_WORDS and OLD_PATHS): its inputs contain the old names, and its datasets are compared
+under the present names.  The script prints one line for each run; an input that OLD refuses because
+of an unknown variable is "unknown to OLD".  The exit status is 1 if any runs differ.
 """
 
 import argparse
@@ -29,7 +29,7 @@ from whole_runs import contents, ran, unlike, write_input  # noqa: E402
 
 SYSTEMS = 60
 
-# Input for a program with the old names: by group, a pattern and its word.
+# Input for a program with the old names: for each group, patterns and the old words.
 OLD_WORDS = {
     "side": {
         r"\bstart_time(?= *=)": "begin",
@@ -50,7 +50,7 @@ OLD_WORDS = {
     "contact": {r"\breference_speed(?= *=)": "restitution_speed"},
     "output": {r"\bdecades_from(?= *=)": "frames_from", "'event_count'": "'collisions'"},
 }
-# The present names of what it writes: a pattern and its replacement.
+# Names of its datasets: patterns of old names, and the present names.
 OLD_PATHS = {
     r"(/parameters/(?:side/\w+@|obstacle/|wall/))speed$": r"\1surface_velocity",
     r"(/parameters/drive@)speed$": r"\1self_propulsion_speed",
@@ -76,7 +76,7 @@ OLD_VALUES = {
 
 
 def for_old(text: str) -> str:
-    """The input with the names of the old program."""
+    """Return the input with the names of the old program."""
 
     def group(match: re.Match) -> str:
         text = match[0]
@@ -88,7 +88,7 @@ def for_old(text: str) -> str:
 
 
 def of_old(found: dict) -> dict:
-    """The output of an earlier program under the present names."""
+    """Return the output of an earlier program under the present names."""
     renamed = dict(found)
     for pattern, words in OLD_VALUES.items():
         for path in filter(re.compile(pattern).fullmatch, found):
@@ -99,7 +99,7 @@ def of_old(found: dict) -> dict:
 
 
 def random_inputs(folder: Path) -> list[Path]:
-    """Random inputs, each in a folder of its own, with its starting file."""
+    """Return random inputs, each in its own folder together with its starting file."""
     inputs = []
     for k in range(SYSTEMS):
         system, place = random_system(random.Random(k)), folder / f"random_{k}"
@@ -109,7 +109,7 @@ def random_inputs(folder: Path) -> list[Path]:
     return inputs
 
 
-#: Sums over collisions, which another choice of their units may round otherwise.
+#: Sums over collisions, whose rounding errors depend on their units.
 SUMS = re.compile(
     "/observables/(virial(_tensor|_pressure)?|side_impulse|dissipated_energy|heat|work|drive_energy"
     r"|heat_virial|helfand_\w+|(sides|obstacles)/\w+/\w+)/value"
@@ -117,7 +117,7 @@ SUMS = re.compile(
 
 
 def is_near(name: str, old: dict, new: dict, share: float) -> bool:
-    """Whether two sums agree up to a fraction of their largest value, or of the energy."""
+    """Return whether two sums agree up to a fraction of their largest value or of the energy."""
     if not (SUMS.fullmatch(name) and name in old and name in new):
         return False
     a, b = old[name], new[name]
@@ -128,9 +128,9 @@ def is_near(name: str, old: dict, new: dict, share: float) -> bool:
 def compare(
     programs: tuple[str, str], path: Path, work: Path, share: float, old_names: bool
 ) -> list[str] | None:
-    """Differences between the two programs: their ends, or names in their files.
+    """Return the differences between two programs: exit codes, or names of datasets.
 
-    None if the old program does not know a variable of the input.
+    The result is None if the input contains a variable that the old program does not have.
     """
     ends, files, text = [], [], path.read_text()
     text_of_old = for_old(text) if old_names else text

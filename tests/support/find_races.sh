@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Searches races between threads under the thread sanitizer: the unit tests of domains, and all kinds of whole runs.
+# Searches for races between threads with the thread sanitizer, in the unit tests of domains and in whole runs of all kinds.
 # usage: find_races.sh BUILD     (a folder with `ricochet` and `unit_tests`, built with -fsanitize=thread)
 #
-# The sanitizer cannot see how GNU's OpenMP library lets threads wait for each other. LLVM's has the same entries, and
-# its tool Archer tells the sanitizer; so it takes the place of GNU's here. First it has to prove that it sees a race in
-# a program that has one, and none where threads do wait.
+# The sanitizer does not detect how GNU's OpenMP library synchronises threads. LLVM's OpenMP library has the same functions, and its
+# tool Archer reports the synchronisation to the sanitizer; this script therefore replaces GNU's library by LLVM's. The script first
+# tests that the sanitizer detects the race in a program with a race, and reports none in a program with synchronised threads.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 build=$(realpath "$1")
@@ -18,10 +18,10 @@ trap 'rm -rf "$work"' EXIT
 ln -s "${archer%/*}/libomp.so" "$work/libgomp.so.1"
 export TSAN_OPTIONS=halt_on_error=1:exitcode=66:ignore_noninstrumented_modules=1
 
-# A command under the sanitizer.
+# Runs a command with the libraries of the sanitizer.
 watched() { LD_LIBRARY_PATH=$work OMP_TOOL_LIBRARIES=$archer "$@"; }
 
-# Arguments: a status, and which element of n a turn of the loop adds to.
+# Arguments: the expected exit status, and the index of the element of n that an iteration of the loop changes.
 expect() {
   local status=0
   # shellcheck disable=SC2016

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-MOST_EVENTS, MOST_OF_FEW = 40_000, 12_000  #: of many disks these are an epoch or two
+MOST_EVENTS, MOST_OF_FEW = 40_000, 12_000  #: one or two epochs for many disks
 SIDES = ("left", "right", "bottom", "top")
 CADENCES = ("time", "collisions", "events", "collisions_per_disk")
-#: Variables that hold a word which is a feature of its own.
+#: Variables whose value is a word that counts as a feature.
 KINDS = r"(dynamics|motion|rule|law|placement|velocities|kind|side|precision) = '(\w+)'"
 
 
@@ -31,7 +31,7 @@ class System(NamedTuple):
     draw: "Draw"  #: draws more that fits, for changes
 
     def features(self) -> set[str]:
-        """Random choices: variables, kinds, and how the box is closed."""
+        """Return the random choices: variables, kinds, and boundary conditions."""
         found = {"many disks"} if self.disks > 2500 else set()
         for group, words in re.findall(r"^&(\w+)(.*)/$", self.text, re.MULTILINE):
             found |= {f"{group}.{name}" for name in re.findall(r"(\w+) =", words)}
@@ -43,12 +43,12 @@ class System(NamedTuple):
 
 
 def starting_file(columns: list[str], table: np.ndarray) -> str:
-    """The text of a table of disks."""
+    """Return a table of disks as the text of a starting file."""
     return "\n".join([" ".join(columns), *(numbers(*row) for row in table.tolist())]) + "\n"
 
 
 def numbers(*values: float) -> str:
-    """Values in namelist format, with all digits."""
+    """Return values in namelist format with all digits."""
     return ", ".join(repr(float(value)) for value in values)
 
 
@@ -75,15 +75,15 @@ class Draw:
         self.driven = self.chance(0.3)
         self.falls = self.chance(0.3) and not all(self.periodic)
         self.sheared = all(self.periodic) and not self.steps and self.chance(0.5)
-        self.loses = False  # energy in each collision
-        self.bouncing = False  # for ever, by a contact time
-        self.worked = False  # by walls: the energy that is left says nothing
-        self.drifts = all(self.periodic)  # all disks together, for ever, if none moves at random
+        self.loses = False  # energy is lost in each collision
+        self.bouncing = False  # the run may be endless because of the contact time
+        self.worked = False  # energy changes at walls: no stop rule on it
+        self.drifts = all(self.periodic)  # the centre of mass moves for ever if nothing is random
         self.columns: list[str] = []
         self.table = np.empty((0, 8))
         self.kinds = 1
         if self.disks < 3 and (self.driven or all(self.periodic)):
-            self.disks = 3  # one might meet nothing for ever
+            self.disks = 3  # fewer disks might never collide
 
     def chance(self, share: float) -> bool:
         return self.rng.random() < share
@@ -92,7 +92,7 @@ class Draw:
         return f" {words}" if self.chance(share) else ""
 
     def place(self, x: float, y: float) -> list[float]:
-        """A point of the box by its fractions of the edges."""
+        """Return the point of the box at these fractions of the edges."""
         return [
             low + part * edge
             for low, part, edge in zip(self.lower, (x, y), self.edges, strict=True)
@@ -124,7 +124,7 @@ class Draw:
     # --- walls ---
 
     def law(self) -> str:
-        """Contact law of one side, wall or obstacle; often the default law."""
+        """Draw the contact law of one side, wall or obstacle, which is often the default law."""
         rng = self.rng
         if self.chance(0.5):
             return ""
@@ -140,7 +140,7 @@ class Draw:
         return f"{words} rule = 'normal'{self.grip(least=-0.9)}{sliding}"
 
     def grip(self, wall: str = "", least: float = -1) -> str:
-        """Tangential restitution and friction, of disks or of walls."""
+        """Draw tangential restitution and friction of disks or of walls."""
         beta = self.rng.choice([least, 0, 1, self.rng.uniform(least, 1)])
         words = f" {wall}tangential_restitution = {beta}"
         if beta > -1:
@@ -148,7 +148,7 @@ class Draw:
         return words
 
     def sides(self) -> list[str]:
-        """Laws and motions of the sides of the box."""
+        """Draw the contact laws and motions of the sides of the box."""
         groups = []
         for k, name in enumerate(SIDES):
             if self.periodic[k // 2] or self.chance(0.65):
@@ -165,7 +165,7 @@ class Draw:
         return groups
 
     def side_motion(self) -> str:
-        """How a side moves."""
+        """Draw the motion of a side."""
         rng = self.rng
         self.worked = True
         kinds = ["constant_velocity", "parabolic", "sawtooth", "sine"]
@@ -189,7 +189,7 @@ class Draw:
         return words + self.maybe(0.7, f"phase = {rng.choice([0, 0.5, rng.random()])}")
 
     def obstacles(self) -> list[str]:
-        """Circles and straight walls, with space between them for randomly placed disks."""
+        """Draw circles and straight walls, with space between them for randomly placed disks."""
         rng, groups, small = self.rng, [], min(self.edges)
         if self.sheared:
             return groups
@@ -222,7 +222,7 @@ class Draw:
     # --- disks ---
 
     def region(self) -> tuple[float, float]:
-        """Widths of a part of the box, and its line in `self.where`."""
+        """Draw a part of the box; return its widths, and store its variables as `self.where`."""
         self.where = ""
         if self.chance(0.9 if self.blocked else 0.7):
             return tuple(self.edges)
@@ -235,7 +235,7 @@ class Draw:
         return high[0] - low[0], high[1] - low[1]
 
     def motion(self, count: int) -> str:
-        """Initial velocities of a species."""
+        """Draw the initial velocities of a species."""
         v, rng = self.speed, self.rng
         words = rng.choice(
             [
@@ -260,7 +260,7 @@ class Draw:
         return words
 
     def species(self, blocked: bool) -> list[str]:
-        """One to three kinds of disks, or one in a file; placed at random among obstacles."""
+        """Draw up to three species, placed at random among obstacles, or one in a starting file."""
         rng, groups, self.blocked = self.rng, [], blocked
         if not blocked and self.chance(0.2):
             return [rng.choice([self.from_file, self.from_file, self.by_position])()]
@@ -284,7 +284,7 @@ class Draw:
                 law, most = rng.choice([("uniform", 0.47), ("gaussian", 0.27), ("lognormal", 0.39)])
                 spread = f" polydispersity = {most * rng.random()!r} radius_distribution = '{law}'"
                 spread += self.maybe(0.5, "mass_scaling = 'area'")
-                radius /= 2  # the largest may be thrice as large
+                radius /= 2  # the largest radius may be three times as large
             size = f"radius = {radius!r} mass = {mass!r}"
             if k == 0 and "grid" not in placement and self.chance(0.2):
                 share = count * math.pi * radius**2 / (wide * high)
@@ -299,7 +299,7 @@ class Draw:
         return groups
 
     def of_many_sizes(self) -> list[str]:
-        """Species from large to small, each with about the same area, with ratios up to 1 : 100."""
+        """Draw species of about equal total area, in descending order of radius."""
         kinds, ratio = self.rng.randint(3, 6), 10.0 ** self.rng.uniform(0.3, 2)
         wide, high = self.region()
         radii = [ratio ** (-k / (kinds - 1)) for k in range(kinds)]
@@ -322,7 +322,7 @@ class Draw:
         return self.rng.choice(["random", "random", "lattice", "grid", *few])
 
     def by_position(self) -> str:
-        """A few disks one by one in a row, up to close to contact."""
+        """Draw a few disks in a row, some of them close to contact."""
         self.disks = count = self.rng.randint(3, 8)
         x = [self.place((k + 0.5) / count, self.rng.choice([0.5, 0.52])) for k in range(count)]
         radius = 0.5 * min(self.edges[0] / count, 0.9 * self.edges[1])
@@ -332,7 +332,7 @@ class Draw:
         return f"&species name = 's0' {words} /"
 
     def from_file(self) -> str:
-        """A species in a file: a square lattice, each disk with its own size and velocity."""
+        """Draw a starting file: a square lattice of disks with different sizes and velocities."""
         rng = self.rng
         columns = max(round(math.sqrt(self.disks * self.edges[0] / self.edges[1])), 1)
         rows = max(self.disks // columns, 1)
@@ -356,7 +356,7 @@ class Draw:
         self.columns += ["omega", "angle"] if self.turns else []
         return "&species name = 's0' file = 'start.txt' /"
 
-    # --- what they do ---
+    # --- dynamics, stop rules and output ---
 
     def contact(self) -> str:
         rng = self.rng
@@ -373,7 +373,7 @@ class Draw:
         if min(restitution, on_walls) < 1 and (any(self.periodic) or on_walls == 0):
             self.drifts = True  # or comes to rest: without a time the run ends at some sample
         if self.least or self.chance(0.2):
-            self.drifts = True  # slower and slower: the last of the events may be a long time away
+            self.drifts = True  # events become rarer, so that the last one may require a long time
             words += f" restitution_law = '{'viscoelastic' if self.least else 'power'}'"
             words += f" reference_speed = {self.speed * 10.0 ** rng.uniform(-2, 1)!r}"
         if self.turns or self.chance(0.5):
@@ -388,14 +388,14 @@ class Draw:
         return words + " /"
 
     def drive(self) -> str:
-        """Driving, from many kicks in a free flight to one in many flights."""
+        """Draw the driving, from many kicks per free flight to one kick per many free flights."""
         if not self.driven:
             return ""
         rng = self.rng
         flight = math.sqrt(math.prod(self.edges) / self.disks) / self.speed
         interval = flight * 10.0 ** rng.uniform(-1, 2)
         if self.steps and self.chance(0.5):
-            interval = self.step * rng.randint(1, 5)  # each at the end of a step
+            interval = self.step * rng.randint(1, 5)  # events occur at the ends of steps
         energy = self.speed**2 * 10.0 ** rng.uniform(-2, 1)
         turn = self.maybe(0.7, f"rotational_diffusion = {rng.choice([0.1, 10]) / flight!r}")
         words = rng.choice(
@@ -446,7 +446,7 @@ class Draw:
         return words + " /"
 
     def cadence(self, kind: str) -> float:
-        """Sampling interval of a track."""
+        """Draw the sampling interval of frames or observables."""
         every = max(self.events // self.rng.randint(2, 5 if self.disks > 1000 else 40), 1)
         if kind == "time":
             return self.rng.uniform(0.02, 0.3) * min(self.edges) / self.speed
@@ -456,7 +456,7 @@ class Draw:
 
 
 def random_system(rng: random.Random, most: int = 10**6) -> System:
-    """A system of at most about `most` disks, which may be refused, break off, or run."""
+    """Return a system of at most about `most` disks; the program may refuse or abort it."""
     draw = Draw(rng, most)
     walls = draw.sides()
     obstacles = draw.obstacles()

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Runs the unit tests and believes them only with exit status 0, the OK line, and as many tests as
-# the .pf files mark with @test: a `stop` in tested code, say, would end the run early with status 0.
-# They get LIMIT seconds of processor time, so that a busy machine stops nothing, and two hours by the clock. Threads
-# that wait leave their cores to the others: some tests have more threads than there are cores.
+# Runs the unit tests. They pass only if the exit status is 0, the OK line is printed, and the number of tests is that of the @test
+# marks in the .pf files: a `stop` in tested code, for example, would end the run early with status 0. The limits are LIMIT seconds of
+# processor time, which do not depend on the load of the machine, and two hours of wall time. Waiting threads release their cores,
+# because some tests have more threads than there are cores.
 # usage: [LIMIT=SECONDS] run_unit_tests.sh RUNNER PROGRAM FILE.pf...
 set -euo pipefail
 runner=$1 program=$2 limit=${LIMIT:-300} hours=2

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs the program under valgrind on one small run of each kind: no error, nothing lost.
+# Performs one small run of each kind under valgrind, and checks that there are no errors and no memory leaks.
 # usage: run_valgrind.sh PROGRAM     (built for a processor that valgrind knows, as ARCH=x86-64-v3)
 set -euo pipefail
 program=$(realpath "$1")
@@ -9,7 +9,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
 
-# Arguments: the exit status that is right, then those of the program.
+# Arguments: the expected exit status, then the arguments of the program.
 watched() {
   local right=$1 status=0
   shift

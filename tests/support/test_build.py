@@ -1,4 +1,4 @@
-"""The Makefile: folders, runners of unit tests, two at once, a linker that is not GNU's."""
+"""Tests of the Makefile: folders, parallel unit tests, linkers other than GNU's, installation."""
 
 import json
 import os
@@ -17,7 +17,7 @@ import pytest
 from whole_runs import environment, executable, ran
 
 ROOT = Path(__file__).resolve().parents[2]
-#: Files to which pages lead and that are not installed: they are in a clone.
+#: Files that pages mention and that exist in a clone only, because they are not installed.
 SOURCES = {"src", "post", "runs", "tests", "CONTRIBUTING.md"}
 PFUNIT_DIR = os.environ.get("PFUNIT_DIR", "")
 SUITE = """module test_it
@@ -37,7 +37,7 @@ def make(*arguments, **more) -> subprocess.CompletedProcess:
 
 @pytest.fixture
 def small(tmp_path) -> list[str]:
-    """Arguments of `make unit-tests` for a program with one test and no module of the project."""
+    """Return arguments of `make unit-tests` for one test that uses no module of the project."""
     suites = tmp_path / "suites"
     suites.mkdir()
     (suites / "test_it.pf").write_text(SUITE.format(1))
@@ -53,7 +53,7 @@ def test_two_at_once_in_one_folder_both_succeed(small):
 
 
 def test_a_build_that_is_killed_while_it_links_is_finished_by_the_next(small, tmp_path):
-    """An empty program, newer than its objects, must not pass for a finished one."""
+    """An empty program that is newer than its objects must be linked again."""
     script = """case "$*" in
 *" -o "*/unit_tests*)
   printf '' > "$(echo "$*" | sed 's/.* -o \\([^ ]*\\) .*/\\1/')"
@@ -76,7 +76,7 @@ esac"""
 
 @pytest.mark.skipif(not PFUNIT_DIR, reason="PFUNIT_DIR names no pFUnit")
 def test_runners_take_turns_in_one_folder(small, tmp_path):
-    """Each runs its own program, not the one that the other has left."""
+    """Each runner must run its own program, and not that of the other runner."""
     real = [*[word for word in small if not word.startswith(("shared", "PFUNIT"))]]
     real += ["shared=", f"PFUNIT_DIR={PFUNIT_DIR}"]
     for value, status in ((1, 0), (2, 2), (1, 0)):
@@ -87,7 +87,7 @@ def test_runners_take_turns_in_one_folder(small, tmp_path):
 
 
 def test_a_linker_that_cannot_redirect_gets_no_hints(small, tmp_path):
-    """A stand-in for such a linker refuses the option as others do."""
+    """A script in place of the linker refuses the option as such linkers do."""
     refusal = 'case "$*" in *--wrap*) echo unknown option: --wrap >&2; exit 1;; esac'
     compiler = executable(tmp_path / "gfortran", f'{refusal}\nexec gfortran "$@"')
     run = make(*small, f"FC={compiler}")
@@ -130,7 +130,7 @@ def test_a_film_takes_one_command(program, tmp_path):
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
-    """A folder with all installed files, which an uninstall removes again."""
+    """Yield a folder with all installed files; uninstall them afterwards."""
     root = tmp_path_factory.mktemp("root")
     place = [f"DESTDIR={root}", "PREFIX=/usr"]
     assert make("install", *place).returncode == 0
@@ -154,7 +154,7 @@ def test_an_installed_program_and_its_scripts_run_from_anywhere(installed, tmp_p
 
 
 def test_an_installed_engine_is_found_by_its_module(installed, tmp_path):
-    """By what the modulefile sets: a program in C, and the package."""
+    """The settings of the modulefile are sufficient for a program in C and for the package."""
     (module,) = (installed / "share/modulefiles/ricochet").iterdir()
     told = dict(re.findall(r"^prepend-path (\w+) {(.+)}$", module.read_text(), re.MULTILINE))
     assert module.read_text().startswith("#%Module") and told["PATH"] == "/usr/bin"
@@ -211,7 +211,7 @@ def test_only_what_was_installed_goes(tmp_path):
     assert make("install", place).returncode == 0
     assert installed < set(files_in(prefix)) and mine_are_there()
     assert not old.parent.exists()
-    (shared / "installed").unlink()  # as the first versions left none
+    (shared / "installed").unlink()  # the first versions left no such file
     (shared / "input/gas.nml").write_text("of an earlier version")
     done = make("uninstall", place)
     assert done.returncode == 2 and str(shared / "installed") in done.stderr.splitlines()[0]
@@ -224,7 +224,7 @@ def test_only_what_was_installed_goes(tmp_path):
 
 
 def test_a_program_that_is_older_than_its_source_is_not_installed(program, tmp_path):
-    """Nor is another one built, perhaps with other options, in a folder of somebody else."""
+    """It must not be built either, because the folder may belong to another user."""
     build, prefix = tmp_path / "build", tmp_path / "usr"
     build.mkdir()
     copy = shutil.copy(program, build)
@@ -240,7 +240,7 @@ def test_a_program_that_is_older_than_its_source_is_not_installed(program, tmp_p
 
 
 def test_what_the_manual_pages_speak_of_is_installed(installed):
-    """All places in them are absolute, and every command says that it is the one it is called."""
+    """All paths in the pages are absolute, and each page has the name of its command."""
     pages = sorted(path.name for path in (installed / "share/man/man1").iterdir())
     assert pages == ["ricochet-ensemble.1", "ricochet.1"]
     version = ran(installed / "bin/ricochet", "--version").stdout.split()[1]
@@ -277,7 +277,7 @@ def test_what_the_manual_pages_speak_of_is_installed(installed):
 
 
 def test_pip_brings_program_library_package_commands_and_inputs(tmp_path):
-    """Into an environment that sees the packages of this one, without a network."""
+    """The environment uses the packages of this one, so that no network is required."""
     own = tmp_path / "venv"
     venv.create(own, symlinks=True)
     python = own / "bin/python"
@@ -301,7 +301,7 @@ def test_pip_brings_program_library_package_commands_and_inputs(tmp_path):
 
 @pytest.mark.parametrize("script", [".ci/set-up", "src/install.sh", "runs/ensemble.sh"])
 def test_scripts_that_need_a_later_bash_say_so(tmp_path, script):
-    """With a pretended old bash version they stop before they do anything."""
+    """With the version number of an old bash they stop before any other action."""
     text = (ROOT / script).read_text()
     limit = re.search(r"BASH_VERSINFO.*>= (404)\b", text).span(1)
     copy = tmp_path / "script"

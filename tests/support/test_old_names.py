@@ -1,4 +1,4 @@
-"""No old public name is left in the tree, except in the table of old names."""
+"""Test that no old public name occurs outside the table of old names."""
 
 import re
 import subprocess
@@ -34,7 +34,7 @@ OLD = [
 
 @pytest.mark.parametrize("pattern", OLD)
 def test_no_old_name_is_left(pattern):
-    """Searched in all text files of the project as whole words."""
+    """Old names are searched as whole words in all text files of the project."""
     files = subprocess.run(
         ["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True
     ).stdout.split("\0")

@@ -184,7 +184,7 @@ def test_translation_keeps_line_numbers_and_texts_with_commas_or_at_signs(tmp_pa
 
 
 def judged(tmp_path: Path, script: str, suite: str, **variables):
-    """The verdict on a stand-in for the program with the unit tests."""
+    """Return the verdict on a script that replaces the program with the unit tests."""
     program, path = executable(tmp_path / "unit_tests", script), tmp_path / "test_it.pf"
     path.write_text(suite)
     judge = SUPPORT / "run_unit_tests.sh"
@@ -330,7 +330,7 @@ def test_folders_and_what_they_use_are_those_of_the_picture(tmp_path):
     ],
 )
 def test_imports_of_the_package_are_those_of_its_picture(tmp_path, line, used):
-    """Absolute or relative, at the top or in a function; those from the same folder are allowed."""
+    """Imports may be absolute or relative, and inside functions; the same folder is allowed."""
     package = tmp_path / "post" / "ricochet"
     ran("git", "init", "-q", tmp_path, check=True)
     for name in ("__init__", "commands", "reading/reader", "pages/live", "pages/lab"):

@@ -1,8 +1,9 @@
-"""Translates a pFUnit test file (.pf) into Fortran for the module `funit` beside this script.
+"""Translate a pFUnit test file (.pf) into Fortran for the module `funit` beside this script.
 
-It accepts the part of pFUnit's language that the tests need and refuses everything else, also what
-pFUnit itself would accept or silently ignore: a file that runs here runs under pFUnit with the same
-result. Each line stays one line, so that messages refer to lines of the .pf file.
+The script accepts the part of pFUnit's language that the tests need.  It refuses everything else,
+including text that pFUnit itself would accept or silently ignore, so that a file that runs here
+runs under pFUnit with the same result.  Each line is translated into one line, so that messages
+refer to lines of the .pf file.
 
     python translate_pf.py tests/unit/test_errors.pf build/tests/test_errors.F90
 """
@@ -14,7 +15,7 @@ from typing import NamedTuple
 
 
 class Refused(Exception):
-    """A line outside of the supported part of the language."""
+    """Error for a line outside the supported part of the language."""
 
 
 class Suite(NamedTuple):
@@ -39,13 +40,13 @@ SUBROUTINE = re.compile(r"\s*subroutine\s+(\w+)\s*(?:\(\s*\))?\s*(?:!.*)?$", re.
 
 
 def without_strings(line: str) -> str:
-    """The code of a line: no comment, and texts replaced by blanks of the same length."""
+    """Return the code of a line without comment, with strings replaced by blanks."""
     blanked = re.sub(r"'[^']*'|\"[^\"]*\"", lambda text: " " * len(text[0]), line)
     return blanked.split("!")[0]
 
 
 def split_arguments(text: str) -> list[str]:
-    """The arguments of a call, cut at the commas outside brackets and texts."""
+    """Return the arguments of a call, separated at commas outside brackets and strings."""
     code = re.sub(r"'[^']*'|\"[^\"]*\"", lambda quoted: " " * len(quoted[0]), text)
     cuts, depth = [-1], 0
     for place, letter in enumerate(code):
@@ -61,7 +62,7 @@ def split_arguments(text: str) -> list[str]:
 
 
 def sort_arguments(text: str) -> tuple[list[str], dict[str, str]]:
-    """Positional arguments, and the keywords `message` and `tolerance`."""
+    """Return the positional arguments, and the keywords `message` and `tolerance`."""
     positional: list[str] = []
     keywords: dict[str, str] = {}
     for argument in split_arguments(text):
@@ -80,13 +81,13 @@ def sort_arguments(text: str) -> tuple[list[str], dict[str, str]]:
 
 
 def assertion(name: str, arguments: str, place: str) -> str:
-    """The Fortran of one `@assert`; `place` is the file and line for the report."""
+    """Return the Fortran code of one `@assert`; `place` is the file and line for the report."""
     values, keywords = sort_arguments(arguments)
     message = f", message={keywords['message']}" if "message" in keywords else ""
     kind = name.lower() + (" within" if "tolerance" in keywords else "")
     if kind in COMPARISON:
         expect_count(values, 2)
-        # Double brackets: of a text in single ones gfortran 14 says that its size is too large.
+        # Double brackets, because gfortran 14 reports a wrong size for a string in single brackets.
         check = (
             f"associate (e_ => (({values[0]})), a_ => (({values[1]}))); "
             "if (.not. pf_conform(shape(e_), shape(a_))) then; "
@@ -104,13 +105,13 @@ def assertion(name: str, arguments: str, place: str) -> str:
 
 
 def expect_count(values: list[str], count: int) -> None:
-    """Refuses more or fewer positional arguments: tolerance and message are always keywords."""
+    """Refuse a wrong number of positional arguments; tolerance and message must be keywords."""
     if len(values) != count:
         raise Refused(f"{len(values)} positional arguments instead of {count}")
 
 
 def translate_line(line: str, place: str) -> str:
-    """One line of Fortran for one line of a .pf file."""
+    """Return one line of Fortran for one line of a .pf file."""
     found = re.match(r"\s*@assert(\w+)\s*\((.*)\)\s*$", line, re.IGNORECASE)
     if found:
         return assertion(found[1], found[2], place)
@@ -122,7 +123,7 @@ def translate_line(line: str, place: str) -> str:
 
 
 def find_suite(lines: list[str], stem: str) -> Suite:
-    """The tests and fixtures of a file, and the check that its module has the file's name."""
+    """Return the tests and fixtures of a file; its module must have the name of the file."""
     modules = [found[1] for line in lines if (found := re.match(r"\s*module\s+(\w+)\s*$", line))]
     if modules != [stem]:
         raise Refused(f"the file must hold one module, named {stem}")
@@ -148,7 +149,7 @@ def find_suite(lines: list[str], stem: str) -> Suite:
 
 
 def translate(source: Path) -> str:
-    """The Fortran text of a whole file: its module, then the subroutine that runs its tests."""
+    """Return the Fortran text of a file: its module, and the subroutine that runs its tests."""
     lines = source.read_text().splitlines()
     suite = find_suite(lines, source.stem)
     fortran = [f'# 1 "{source}"']
@@ -170,7 +171,7 @@ def translate(source: Path) -> str:
 
 
 def main() -> int:
-    """Translates one file into another; 1 if it is refused."""
+    """Translate a file into another one; return 1 if the file is refused."""
     source, target = map(Path, sys.argv[1:])
     try:
         target.write_text(translate(source))

@@ -1,8 +1,8 @@
 """The physics validation behind `make check`: tables of cases with published or exact references.
 
-A case is a line: the inputs it runs, how it is measured (a pure function of the runs), the
-reference, the tolerance, the source.  `python tests/validate.py` runs them; docs/validation.md is
-its report.
+A case consists of the inputs of its runs, a pure function that measures a value from the runs, the
+reference value, the tolerance, and the source of the reference.  `python tests/validate.py` runs
+all cases and writes the report docs/validation.md.
 """
 
 from importlib import import_module

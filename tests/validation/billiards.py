@@ -1,4 +1,4 @@
-"""Section 12: billiards."""
+"""Section 12 of the report: billiards."""
 
 import atexit
 from functools import cache, partial
@@ -28,7 +28,7 @@ ROUND = Member(
 
 
 def angles(run: Run) -> np.ndarray:
-    """Polar angles of the hits, without jumps."""
+    """Return the polar angles of the collisions, continuous across 2 pi."""
     x = run.position[1 : len(run.event_log().time) + 1][:, 0]
     return np.unwrap(np.arctan2(x[:, 1], x[:, 0]))
 
@@ -68,10 +68,10 @@ STEPS = Member(
 
 
 def miss(run: Run) -> float:
-    """Largest distance from the exact path in a right-angled wedge under gravity.
+    """Return the largest deviation from the exact path in a right-angled wedge under gravity.
 
-    The heights over the two walls are two balls that bounce on floors of their own, with the
-    accelerations g/sqrt 2, and do not know of each other.
+    The distances of the disk from the two walls are independent of each other.  Each is the height
+    of a ball that bounces on a floor with the acceleration g / sqrt(2).
     """
     t, x = run.time, run.position[:][:, 0]
     normals = np.array(((-1, 1), (1, 1))) / np.sqrt(2)
@@ -86,29 +86,33 @@ def miss(run: Run) -> float:
 
 
 def last(run: Run, name: str) -> float:
-    """Sum of an observable at the end."""
+    """Return the last value of an observable, summed over its components."""
     return float(np.sum(run.observable(name).value[-1]))
 
 
 def free_path(run: Run) -> float:
-    """Length of the path over the number of hits, speed 1."""
+    """Return the mean free path: the length of the path, at speed 1, per collision."""
     return run.time[-1] / (last(run, "side_collisions") + last(run, "obstacle_collisions"))
 
 
 def mean_path(radius: float, hole: float) -> float:
-    """Pi Q / p, by area and perimeter open to the centre in the unit box with one scatterer."""
+    """Return the exact mean free path pi Q / p in the unit box with one scatterer.
+
+    Q and p are the area and the perimeter of the region that the centre of the disk can reach.
+    """
     a, reach = 1 - 2 * radius, hole + radius
     return pi * (a**2 - pi * reach**2) / (4 * a + 2 * pi * reach)
 
 
-#: A random Lorentz gas: scatterers that may overlap per R^2, R = 1 the sum of the radii; speed 1.
+#: A random Lorentz gas: number of scatterers, which may overlap, per area R^2, where R = 1 is the
+#: sum of the radii; number of scatterers; radius of the tracer, whose speed is 1.
 DENSITY, SCATTERERS, TRACER = 0.01, 100_000, 0.1
-FREE_TIME = 1 / (2 * DENSITY)  # exact: overlaps hide the same share of the rims and of the area
+FREE_TIME = 1 / (2 * DENSITY)  # exact, because overlaps hide the same fraction of rims and area
 
 
 @cache
 def scatterers() -> str:
-    """The path of a file of random circles, which ends with this process."""
+    """Return the path of a file of random circles, which is removed when this process ends."""
     folder = TemporaryDirectory()
     atexit.register(folder.cleanup)
     path = Path(folder.name) / "scatterers.txt"
@@ -120,7 +124,7 @@ def scatterers() -> str:
 
 
 def among_scatterers(seed: int) -> str:
-    """One tracer, with a frame every ten mean free times."""
+    """Return a run of one tracer with a frame every ten mean free times."""
     side = float(np.sqrt(SCATTERERS / DENSITY))
     return namelist(
         run={"seed": seed}, box={"upper": (side, side), **PERIODIC},
@@ -134,19 +138,19 @@ LORENTZ = tuple(Member(partial(among_scatterers, seed)) for seed in range(1, 5))
 
 
 def free_time(run: Run) -> float:
-    """Mean time between the hits of a tracer."""
+    """Return the mean time between the collisions of a tracer."""
     return run.time[-1] / last(run, "obstacle_collisions")
 
 
 def over_boltzmann(run: Run) -> float:
-    """D, from the slope of <dx^2> between 10 and 30 mean free times, over 3/(16 n)."""
+    """Return D / D_0 from the slope of <dx^2> between 10 and 30 mean free times."""
     x = run.position[:][:-1, 0] + run.image[:][:-1, 0] * run.edges  # the last frame is at the end
     near, far = (np.mean(np.sum((x[lag:] - x[:-lag]) ** 2, axis=1)) for lag in (1, 3))
     return float((far - near) / (4 * 20 * FREE_TIME) / (3 / (16 * DENSITY)))
 
 
 def boltzmann_over(n: float) -> float:
-    """D_0 / D of scatterers that may overlap, by the expansion in their density.
+    """Return D_0 / D for scatterers that may overlap, from the expansion in their density.
 
     The coefficients are quoted from memory.
     """

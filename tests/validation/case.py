@@ -1,4 +1,4 @@
-"""A case of the validation, and the verdict on it."""
+"""A case of the validation, and its verdict: whether the measured values are acceptable."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Tolerance(NamedTuple):
 
 @dataclass(frozen=True)
 class Case:
-    """One line of the tables."""
+    """A case: one line of the tables of the report."""
 
     id: str
     what: str
@@ -41,7 +41,7 @@ class Case:
 
 
 class Verdict(NamedTuple):
-    """The value (of several, the one nearest to its tolerance), and whether all values pass."""
+    """The value of a case that is closest to its tolerance, and whether all values pass."""
 
     case: Case
     values: int
@@ -103,7 +103,7 @@ def judge(case: Case, runs: list) -> Verdict:
 def shares(
     tolerance: Tolerance, measured: np.ndarray, reference: np.ndarray, error: np.ndarray
 ) -> np.ndarray:
-    """Return deviations over allowed ones; infinite if none is allowed, NaN (failed) for NaN."""
+    """Return deviations over allowed deviations; inf if none is allowed, NaN for a value NaN."""
     same = measured == reference  # infinite values too
     with np.errstate(invalid="ignore", divide="ignore"):
         deviation = np.where(same, 0.0, measured - reference)

@@ -1,4 +1,4 @@
-"""Section 10: a projectile hits a bed; random sequential insertion."""
+"""Section 10 of the report: craters of projectiles, and random sequential insertion."""
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -12,7 +12,7 @@ from .inputs import PERIODIC, ensemble, namelist
 
 
 def crater(count: int, seed: int = 1, mass: float = 25, exit_codes=(0,), **more) -> Member:
-    """A bed in the lower half at packing 1/2, a projectile five times as wide as its disks."""
+    """Return runs of a bed at a packing fraction of 1/2 and a projectile of five radii."""
     groups = {
         "contact": {"restitution": 0.5, "contact_time": 2.0**-17},
         "stop": {"energy_fraction": 0.1},
@@ -37,7 +37,7 @@ def crater(count: int, seed: int = 1, mass: float = 25, exit_codes=(0,), **more)
 
 
 def hit(run: Run) -> int:
-    """Bed disks that had a collision with a disk."""
+    """Return the number of bed disks that collided with another disk."""
     log = run.event_log()
     pairs = log.j > 0
     return len(np.union1d(log.i[pairs], log.j[pairs])) - 1
@@ -48,35 +48,36 @@ SCAN = tuple(crater(2000, seed, mass) for mass in MASSES for seed in range(1, 13
 
 
 def rises(*runs: Run) -> np.ndarray:
-    """Growth of the mean number of disks hit from one mass to the next, in its errors."""
+    """Return the increases of the mean number of disks hit between masses, over their errors."""
     means, errors = hits_of_masses(*runs)
     return np.diff(means) / np.hypot(errors[1:], errors[:-1])
 
 
 def straightness(*runs: Run) -> float:
-    """Correlation of the mean number of disks hit with the mass."""
+    """Return the correlation coefficient of the mean number of disks hit and the mass."""
     return float(np.corrcoef(MASSES, hits_of_masses(*runs).mean)[0, 1])
 
 
 def hits_of_masses(*runs: Run) -> Estimate:
-    """Mean number of disks hit by each of `MASSES`."""
+    """Return the mean number of disks hit for each of `MASSES`."""
     return estimate(np.reshape([hit(run) for run in runs], (len(MASSES), -1)), axis=1)
 
 
 def hit_less_bound(run: Run) -> float:
-    """Disks hit less M (1/f - 1), if the sides played no part."""
+    """Return the disks hit minus the bound M (1/f - 1), if no disk reached the sides."""
     if np.sum(run.observable("side_collisions").value[-1]) > 0:
         raise ValueError("a disk has hit a side")
     return hit(run) - 25 * (1 / 0.1 - 1)
 
 
 def fraction_left(run: Run) -> np.ndarray:
-    """Energy over the first, event by event."""
+    """Return the energy after each event, divided by the initial energy."""
     lost = run.observable("dissipated_energy").value
     return 1 - lost / run.observable("total_energy").value[0]
 
 
-# Without the TC model about four beds of five collapse before a tenth of the energy is left.
+# Without the TC model an inelastic collapse occurs in about four of five beds before the energy
+# has decreased to a tenth.
 NO_TC = tuple(
     crater(2000, seed, exit_codes=(0, 4), contact={"contact_time": 0}, output={"event_log": False})
     for seed in range(1, 13)
@@ -113,7 +114,7 @@ BED = 10000
 
 
 def inserted(packing: float) -> tuple[Member, ...]:
-    """Periodic boxes filled at random, as they start."""
+    """Return the initial states of periodic boxes that are filled at random."""
     return ensemble(
         8,
         box=PERIODIC,
@@ -122,7 +123,7 @@ def inserted(packing: float) -> tuple[Member, ...]:
 
 
 def free_part(*runs: Run, probes: int = 200_000) -> float:
-    """Fraction of the area where one more disk fits, mean over runs."""
+    """Return the mean fraction of the area in which a further disk can be inserted."""
     parts = []
     for run in runs:
         tree = cKDTree(run.position[0], boxsize=run.edges)
@@ -137,7 +138,10 @@ FILLED = tuple(member for packing in GRID for member in inserted(packing))
 
 
 def attempts(*runs: Run) -> list[float]:
-    """Attempts x disk area to reach .1, .2, .3, .4, .5: the integral of 1 / free part."""
+    """Return attempts times disk area up to the packing fractions 0.1, 0.2, ..., 0.5.
+
+    The result is the integral of 1 / `free_part` over the packing fraction.
+    """
     free = [1.0, *(free_part(*runs[k : k + 8]) for k in range(0, len(runs), 8))]
     inverse = PchipInterpolator([0, *GRID], -np.log(free))
     fine = np.linspace(0, 0.5, 5001)

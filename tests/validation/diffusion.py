@@ -1,6 +1,6 @@
-"""Section 14: velocity autocorrelation and diffusion.
+"""Section 14 of the report: velocity autocorrelation and diffusion.
 
-Frames in single precision: seven digits of a velocity are more than enough here.
+Frames are written in single precision, because seven digits of a velocity are sufficient here.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ PACKINGS = (0.05, 0.2, 0.4)
 
 
 def rate(eta: float) -> float:
-    """W at kT = 1."""
+    """Return the collision rate w at kT = 1."""
     diameter = 2 * np.sqrt(eta / (np.pi * N))
     return hd.collision_rate(float(hd.simulated_finite(eta, N)), diameter, N - 1)
 
@@ -34,7 +34,7 @@ def watched(seeds: int, eta: float, step: float, frames: int) -> tuple[Member, .
 
 
 def mean_free_time(run: Run) -> float:
-    """Return 1 / w of a run at its energy."""
+    """Return the mean free time 1 / w at the energy of a run."""
     return run.n_disks * run.time[-1] / (2 * run.observable("collisions").value[-1])
 
 

@@ -1,4 +1,4 @@
-"""Section 9: gases that lose energy, the TC model, collapse."""
+"""Section 9 of the report: cooling gases, the TC model, inelastic collapse."""
 
 from itertools import pairwise
 from math import log, sqrt
@@ -13,13 +13,13 @@ from .estimators import at_collisions, each, over
 from .inputs import PERIODIC, disk, gases, light_and_heavy, namelist
 from .laws import cooling_ratio
 
-# --- one kind of disk ---
+# --- gases of one species ---
 
 ETA = 0.02
 
 
 def cooling(xi: float, tau: float) -> tuple[Member, ...]:
-    """Thirty gases that start in equilibrium."""
+    """Return thirty cooling gases that start in equilibrium."""
     return gases(
         30, 1000, packing_fraction=ETA, periodic=True, temperature=1.0,
         contact={"restitution": xi}, stop={"collisions_per_disk": tau},
@@ -31,13 +31,13 @@ COOLING = {0.9: cooling(0.9, 20.2), 0.8: cooling(0.8, 10.2)}
 
 
 def left(run: Run, tau: float) -> float:
-    """K over K at the start."""
+    """Return K / K0 after `tau` collisions per disk."""
     energy = at_collisions(run, "all/kinetic_energy", tau)
     return float(energy / run.observable("all/kinetic_energy").value[0])
 
 
 def left_at_time(run: Run, w0_t: float) -> float:
-    """The same after a time in units of the first mean free time."""
+    """Return K / K0 after a time in units of the initial mean free time."""
     time, energy = run.observable("all/kinetic_energy")
     kt = energy[0] * run.n_disks / (run.n_disks - 1)
     z = hd.simulated_finite(ETA, run.n_disks)
@@ -67,19 +67,19 @@ SOFT = {
 
 
 def late_exponent(run: Run) -> float:
-    """The p of K ~ t^-p where t is thousands of the first mean free times."""
+    """Return p of K ~ t^-p at times of thousands of initial mean free times."""
     time, energy = run.observable("all/kinetic_energy")
     return exponent(time, energy)
 
 
 def over_the_law(run: Run) -> float:
-    """K over the law of soft disks, at the end."""
+    """Return the final K over its prediction for velocity-dependent restitution."""
     law, (w0_t, _, left) = soft_law([run]), energy_left(run)
     return float(left[-1] / np.exp(np.interp(w0_t[-1], law[0], np.log(law[2]))))
 
 
 def fall(run: Run) -> float:
-    """Decades that the temperature has fallen."""
+    """Return the decrease of the temperature in powers of ten."""
     kt = run.observable("all/temperature").value
     return float(np.log10(kt[0] / kt[-1]))
 
@@ -88,7 +88,7 @@ SLOW = 0.99999
 
 
 def slow_loss(rule: str) -> tuple[Member, ...]:
-    """Walls that take so little that the gas stays in equilibrium."""
+    """Return gases that lose energy to the walls so slowly that they stay in equilibrium."""
     return gases(
         30, 1000, radius=0.001, temperature=1.0,
         contact={"restitution": 1, "wall_restitution": SLOW, "wall_rule": rule},
@@ -97,7 +97,7 @@ def slow_loss(rule: str) -> tuple[Member, ...]:
 
 
 def loss_per_hit(run: Run) -> float:
-    """Mean energy lost per hit on a side, over (1 - xi^2) kT."""
+    """Return the mean energy lost per collision with a side, divided by (1 - xi^2) kT."""
     energy = run.observable("total_energy").value
     hits = run.observable("side_collisions").value.sum(axis=1)
     return -log(energy[-1] / energy[0]) * run.n_disks / hits[-1] / (1 - SLOW**2)
@@ -153,7 +153,7 @@ def mixtures(xi: float, seeds: int, radius: float, **box) -> tuple[Member, ...]:
 
 
 def temperature_ratio(run: Run) -> float:
-    """K_heavy / K_light from 10 to 20 collisions per disk."""
+    """Return K_heavy / K_light, averaged from 10 to 20 collisions per disk."""
     heavy, light = (
         at_collisions(run, f"{name}/kinetic_energy", np.linspace(10, 20, 21))
         for name in ("heavy", "light")
@@ -162,7 +162,7 @@ def temperature_ratio(run: Run) -> float:
 
 
 def steps(*runs: Run) -> float:
-    """Smallest rise of the ratio from one of three groups of runs to the next, in its errors."""
+    """Return the smallest increase of the ratio between successive groups, over its error."""
     ratio, third = over(temperature_ratio), len(runs) // 3
     groups = [ratio(*runs[k : k + third]) for k in range(0, len(runs), third)]
     return min((b.mean - a.mean) / np.hypot(a.error, b.error) for a, b in pairwise(groups))
@@ -192,7 +192,7 @@ MIXTURE = [
 
 
 def since_last(run: Run) -> np.ndarray:
-    """Time since the last event of either partner, for each event."""
+    """Return, for each event, the time since the last event of either partner."""
     log = run.event_log()
     last = [-np.inf] * (run.n_disks + 1)
     since = np.empty(len(log.time))
@@ -205,7 +205,7 @@ def since_last(run: Run) -> np.ndarray:
 
 
 def flagged(run: Run) -> np.ndarray:
-    """Which events find a partner that had its last less than the contact time ago."""
+    """Return for which events a partner had an event within the last contact time."""
     return since_last(run) < run.parameter("contact", "contact_time")
 
 
@@ -221,7 +221,7 @@ ELASTIC = tuple(
 
 
 def flag_fractions(run: Run) -> np.ndarray:
-    """Fractions of collisions that would be elastic, at w t_c of `FLAG_TIMES`."""
+    """Return the fractions of collisions that are elastic in the TC model, at `FLAG_TIMES`."""
     rate = 2 * len(run.event_log().time) / run.n_disks / run.time[-1]
     since = since_last(run)[run.event_log().time > 10 / rate] * rate
     return np.mean(since[:, None] < FLAG_TIMES, axis=0)
@@ -238,7 +238,7 @@ FLAGGED = tuple(
 
 
 def wrong_flags(run: Run) -> int:
-    """Events whose loss contradicts the rule of the TC model."""
+    """Return the number of events whose energy loss contradicts the TC model."""
     lost = np.diff(run.observable("dissipated_energy").value) > 0
     return int(np.sum(lost == flagged(run)))
 
@@ -259,7 +259,7 @@ TC = [
 
 
 def line_of_three(xi: float, places: tuple, velocities: tuple, time: float) -> Member:
-    """Three disks on a line, with much room on both sides."""
+    """Return a run of three disks on a line, far from the sides."""
     return Member(
         namelist(
             box={"lower": (-1000, 0), "upper": (1001, 1)},
@@ -273,7 +273,10 @@ def line_of_three(xi: float, places: tuple, velocities: tuple, time: float) -> M
 
 
 def symmetric(*factors: float) -> tuple[Member, ...]:
-    """Outer disks that come in with equal speeds, one a little later; xi over the critical one."""
+    """Return runs in which the outer of three disks approach at equal speeds, one slightly later.
+
+    The restitution is a factor times the critical restitution of collapse.
+    """
     return tuple(
         line_of_three(factor * CRITICAL, (0.3, 0.5, 0.7001), (1, 0, -1), 100.0)
         for factor in factors
@@ -281,7 +284,7 @@ def symmetric(*factors: float) -> tuple[Member, ...]:
 
 
 def spread(run: Run) -> float:
-    """Largest difference of the velocities at the end."""
+    """Return the largest difference between the final velocities."""
     return float(np.ptp(run.velocity[-1][:, 0]))
 
 

@@ -1,4 +1,4 @@
-"""Section 15: thermal walls, rough disks, transport coefficients."""
+"""Section 15 of the report: thermal walls, rough disks, transport coefficients."""
 
 from math import pi, sqrt
 
@@ -14,14 +14,14 @@ from .case import AT_LEAST, Case, Member, sigmas, within
 from .estimators import over
 from .inputs import PERIODIC, ensemble
 
-# --- one disk between a hot and a cold wall, which its centre finds 1 apart ---
+# --- one disk between a hot and a cold wall; the distance open to its centre is 1 ---
 
 HOT, COLD = 4.0, 1.0
 FLUX = sqrt(2 / pi) * sqrt(HOT * COLD) * (sqrt(HOT) - sqrt(COLD))
 
 
 def between_walls(turning: bool) -> tuple[Member, ...]:
-    """A disk, smooth or with a spin, in a box that is periodic along the walls."""
+    """Return a run of one disk, smooth or rough, in a box that is periodic along the walls."""
     spin = {"angular_velocity": 1.0} if turning else {}
     return ensemble(
         10,
@@ -34,13 +34,13 @@ def between_walls(turning: bool) -> tuple[Member, ...]:
 
 
 def rate(run: Run, name: str) -> float:
-    """A sum at its end over the time."""
+    """Return the final value of a cumulative observable, divided by the time."""
     time, value = run.observable(name)
     return float(value[-1] / time[-1])
 
 
 def flux(run: Run) -> float:
-    """Heat per time from left to right."""
+    """Return the heat that flows from left to right per time."""
     return (rate(run, "sides/left/energy_to_disks") - rate(run, "sides/right/energy_to_disks")) / 2
 
 
@@ -58,24 +58,24 @@ HEATED = ensemble(
 
 
 def energies(run: Run) -> np.ndarray:
-    """Total energies after the start."""
+    """Return the total energies after the equilibration."""
     time, energy = run.observable("total_energy")
     return energy[time >= 100]
 
 
 def maxwell_p(*runs: Run) -> float:
-    """Probability of the distance of all speeds from Maxwell's law at T."""
+    """Return the p-value of a test of all speeds against Maxwell's distribution at T."""
     speeds = [run.speed(slice(1, None)).ravel() * np.sqrt(1 / (2 * KT)) for run in runs]
     return goodness_of_fit(np.concatenate(speeds), maxwell_cdf).ks_p
 
 
 # --- rough disks that cool ---
 
-ETA, ROUGH_COUNT = 0.0025, 20000  # the references are those of the dilute limit
+ETA, ROUGH_COUNT = 0.0025, 20000  # dilute, because the references apply to the dilute limit
 
 
 def cooling(xi: float, beta: float) -> tuple[Member, ...]:
-    """Dilute gases that start with the proportion of temperatures that they are to keep."""
+    """Return dilute cooling gases that start with the steady ratio of temperatures."""
     edge = sqrt(ROUGH_COUNT * pi / 4 / ETA)
     return ensemble(
         6,
@@ -91,7 +91,7 @@ def cooling(xi: float, beta: float) -> tuple[Member, ...]:
 
 
 def ratio(run: Run) -> float:
-    """T_rot / T from 4 to 10 collisions per disk."""
+    """Return T_rot / T, averaged from 4 to 10 collisions per disk."""
     tau = run.collisions_per_disk.value
     turning, moving = (
         run.observable(f"all/{name}").value for name in ("rotational_temperature", "temperature")
@@ -105,7 +105,7 @@ FLOWING = 200
 
 
 def flowing(eta: float, size: float, mass: float) -> tuple[Member, ...]:
-    """Two species, as many of each; the first has the diameter 1 and the mass 1."""
+    """Return gases of two equally numerous species; the first has the diameter and mass 1."""
     edge = sqrt(FLOWING * pi / 8 * (1 + size**2) / eta)
     own = np.full(2, FLOWING / 2 / edge**2), np.array([1, size]), np.array([1, mass])
     memory = hd.enskog_mixture(hd.henderson(eta), *own)["memory"]
@@ -123,7 +123,7 @@ def flowing(eta: float, size: float, mass: float) -> tuple[Member, ...]:
 
 
 def enskog_ratios(*runs: Run) -> Estimate:
-    """Shear and bulk viscosity, and conductivity of equal disks, over those of Enskog's theory."""
+    """Return the viscosities and, for equal disks, the conductivity over Enskog's values."""
     found = of_moments(list(runs), [start_of_equilibrium(run) for run in runs])
     means = [combine_runs(found[name].members) for name in MOMENTS if name in found]
     return Estimate(*(np.array([getattr(one, k) for one in means]) for k in ("mean", "error")))

@@ -1,4 +1,4 @@
-"""Sections 7 and 8: collision rates, pressure, equation of state."""
+"""Sections 7 and 8 of the report: collision rates, pressure, equation of state."""
 
 from math import gamma, pi, sqrt
 
@@ -17,7 +17,7 @@ N = 1000
 
 
 def long_gases(seeds: int, count: int, tau: float, **more) -> tuple[Member, ...]:
-    """Gases observed 2000 times in `tau` collisions per disk."""
+    """Return gases with 2000 samples of the observables in `tau` collisions per disk."""
     output = {"observables_every_collisions": max(1, int(tau * count / 4000))}
     return gases(seeds, count, stop={"collisions_per_disk": tau}, output=output, **more)
 
@@ -28,19 +28,19 @@ PACKINGS = tuple(round(0.05 * k, 2) for k in range(1, 11))
 
 
 def bulk(eta: float) -> tuple[Member, ...]:
-    """Longer where the pressure is tested, too."""
+    """Return periodic gases; runs in which the pressure is also tested are longer."""
     seeds = 4 if eta in (0.1, 0.3, 0.5) else 1
     return long_gases(seeds, N, 4000, packing_fraction=eta, periodic=True)
 
 
 def reduced_rate(run: Run) -> SeriesMean:
-    """The w at kT = m = 1."""
-    scale = sqrt(run.n_disks / (run.n_disks - 1))  # speeds sqrt 2, at rest as a whole
+    """Return the collision rate w at kT = m = 1."""
+    scale = sqrt(run.n_disks / (run.n_disks - 1))  # speeds are sqrt(2), total momentum 0
     return collision_rate(run).scaled(1 / scale)
 
 
 def pair_rate(run: Run) -> SeriesMean:
-    """Pair collisions per time."""
+    """Return the number of pair collisions per time."""
     return collision_rate(run).scaled(run.n_disks / 2)
 
 
@@ -82,7 +82,7 @@ BULK = [
 
 # --- walls ---
 
-WALLED = {  # radius: w, hits of all sides, force on one side, collisions per disk to run
+WALLED = {  # radius: w, collision rate of all sides, force on a side, length in collisions per disk
     0.001: (7.118, 1608.5, 1008.33, 4000),
     0.004: (30.93, 1784, 1118.4, 20000),
     0.007: (65.30, 2279, 1424.6, 25000),
@@ -105,7 +105,7 @@ WALLS = [
 
 
 def two_exact(s: float) -> list[float]:
-    """Pair rate, hits of all sides, force on one, in the unit box with E = 2."""
+    """Return pair collision rate, side collision rate and force on a side for E = 2."""
     a, n, energy = 1 - s, 2, 2.0
     q = a**4 - pi * s**2 * a**2 + 8 / 3 * s**3 * a - s**4 / 2
     dq_ds = -(2 * pi * s * a**2 - 8 * s**2 * a + 2 * s**3)
@@ -127,7 +127,7 @@ TWO = [
     for radius, tolerance in ((0.1, 0.005), (0.15, 0.003))
 ]  # fmt: skip
 
-# --- dilute, and the virial identity ---
+# --- dilute gases, and the virial theorem ---
 
 DILUTE = long_gases(2, 100, 40000, radius=0.01)
 
@@ -143,7 +143,7 @@ IDENTITIES = tuple(
 
 
 def identity_terms(run: Run) -> tuple[float, float, float]:
-    """Wall pressure, virial pressure, and the boundary term d(sum m x v) / (2 K t); whole run."""
+    """Return wall pressure, virial pressure and the term d(sum m x v) / (2 K t) of a whole run."""
     work = 2 * np.sum(run.kinetic_energy(0)) * run.time[-1]
     impulse, a = run.observable("side_impulse").value[-1], run.edges - 2 * run.radius[0]
     wall = (impulse[:2].mean() * a[0] + impulse[2:].mean() * a[1]) / work
@@ -178,7 +178,7 @@ DILUTE_CASES = [
 
 
 def mixtures(seeds: int, radii: tuple, masses: tuple, **output) -> tuple[Member, ...]:
-    """Half of each, periodic, kT = 1."""
+    """Return periodic mixtures of two equally numerous species at kT = 1."""
     species = [
         {"name": name, "count": N // 2, "radius": r, "mass": m, "temperature": 1.0}
         for name, r, m in zip(("first", "second"), radii, masses, strict=True)
@@ -193,7 +193,7 @@ def radii_for(eta: float, factor: float) -> tuple[float, float]:
 
 
 def species_rates(run: Run) -> np.ndarray:
-    """w_11, w_12, w_21, w_22 at kT = 1."""
+    """Return the collision rates w_11, w_12, w_21, w_22 at kT = 1."""
     log = run.event_log()
     pairs = log.j > 0
     kinds = run.species[np.stack([log.i[pairs], log.j[pairs]]) - 1] - 1
@@ -206,13 +206,13 @@ def species_rates(run: Run) -> np.ndarray:
 
 
 def over_equation_of_state(run: Run) -> SeriesMean:
-    """Z by the virial over that of a fluid of the radii of the run."""
+    """Return Z from the virial, divided by its prediction for the radii of the run."""
     eta, alike = packing(run), np.mean(run.radius) ** 2 / np.mean(run.radius**2)
     return z_virial(run).scaled(1 / float(hd.of_sizes(hd.simulated_finite(eta, N), eta, alike)))
 
 
 def polydisperse(eta: float, law: str, spread: float) -> tuple[Member, ...]:
-    """Periodic, masses as areas."""
+    """Return periodic gases of polydisperse disks whose masses are proportional to their areas."""
     size = {"polydispersity": spread, "radius_distribution": law, "mass_scaling": "area"}
     return long_gases(2, N, 2000, packing_fraction=eta, periodic=True, **size)
 
@@ -252,7 +252,7 @@ def dense(count: int, eta: float, tau: float) -> tuple[Member, ...]:
     return long_gases(2, count, tau, **more)
 
 
-#: A triangular crystal that fits its periodic box.
+#: A triangular crystal that is commensurate with its periodic box.
 COLUMNS, ROWS = 30, 32
 CRYSTAL = long_gases(
     1, COLUMNS * ROWS, 4000, packing_fraction=0.80, placement="lattice",
@@ -260,7 +260,7 @@ CRYSTAL = long_gases(
 )  # fmt: skip
 
 
-# Packing: beta P (2 r)^2 of 870 disks in a square box.
+# Packing fraction: P d^2 / kT of 870 disks in a square box.
 NEAR_FREEZING = {0.67: 7.986779, 0.69: 8.969898}
 
 DENSE = [

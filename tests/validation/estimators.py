@@ -34,14 +34,15 @@ def pooled(measure: Callable[[Run], SeriesMean]) -> Callable[..., SeriesMean]:
 def middle(measure: Callable[[Run], ArrayLike]) -> Callable[..., np.ndarray]:
     """Return a function for the median over independent runs.
 
-    For tests that reject one right sample in a hundred: the median of three runs is rejected once
-    in some 3000; a wrong law shows in all of them.
+    The median is used for tests that reject one correct sample in a hundred.  The median of three
+    correct runs is rejected about once in 3000 cases, whereas a wrong distribution is detected in
+    every run.
     """
     return lambda *runs: np.median([measure(run) for run in runs], axis=0)
 
 
 def several(means: list[SeriesMean]) -> Estimate:
-    """Return several means as a mean with vector values."""
+    """Return several means as one mean whose value is a vector."""
     return Estimate(*np.array([(one.mean, one.error) for one in means]).T)
 
 
@@ -57,7 +58,7 @@ def at_collisions(run: Run, name: str, tau: np.ndarray) -> np.ndarray:
 
 
 def hit_rate(run: Run) -> SeriesMean:
-    """Return the rate of collisions with all sides."""
+    """Return the number of collisions with all sides per time."""
     s = steps(run)
     return correlated_mean(s.hits, s.time)
 

@@ -1,4 +1,4 @@
-"""Sections 1 to 4: one, two and ten disks, exact results."""
+"""Sections 1 to 4 of the report: exact results for one, two and ten disks."""
 
 from math import log, sqrt
 
@@ -15,13 +15,13 @@ SMALL = 0.04
 
 
 def few(*species: dict, box=None, contact=None, **stop) -> Member:
-    """Some disks with every event on record."""
+    """Return a run of a few disks with a frame and a log entry at every event."""
     groups = {"box": box or {}, "contact": contact or {}}
     return Member(namelist(species=list(species), stop=stop, output=EVERY_EVENT, **groups))
 
 
 def final(run: Run) -> np.ndarray:
-    """Velocities at the end."""
+    """Return the final velocities."""
     return run.velocity[-1].ravel()
 
 
@@ -29,39 +29,39 @@ def final(run: Run) -> np.ndarray:
 
 
 def square_path(start=(0.5, 0.25), contact=None, **stop) -> Member:
-    """A path that elastic walls close after four hits."""
+    """Return a run of a disk whose path closes after four collisions with elastic walls."""
     return few(disk(start, (1, 1), 0.1), contact=contact, **stop)
 
 
 def dropped(height: float, events: int, speed=(0, 0), contact=None) -> Member:
-    """A disk above the floor."""
+    """Return a run of a disk that falls onto the floor."""
     box = FALLING | {"upper": (40, 16)}
     return few(disk((1, height), speed, SMALL), box=box, contact=contact, events=events)
 
 
 def impacts(xi: float, count: int) -> np.ndarray:
-    """Times of the impacts after a drop from 1 above the floor."""
+    """Return the exact times of the impacts after a fall from the height 1."""
     flights = np.append(0.5, xi ** np.arange(1, count))
     return 2 * sqrt(2 / 9.81) * np.cumsum(flights)
 
 
 def until_rest(xi: float) -> int:
-    """Impacts until the next flight is shorter than 1e-12."""
+    """Return the number of impacts before the first flight that is shorter than 1e-12."""
     return int(np.ceil(log(1e-12 / (2 * sqrt(2 / 9.81))) / log(xi)))
 
 
 def dissipating(run: Run) -> int:
-    """Number of events that took energy."""
+    """Return the number of events that dissipated energy."""
     return int(np.sum(np.diff(run.observable("dissipated_energy").value) > 0))
 
 
 def last_flight(run: Run) -> float:
-    """Mean length of the flights when no more energy is lost."""
+    """Return the mean duration of the flights after the last loss of energy."""
     return float(np.diff(run.event_log().time[dissipating(run) - 1 :]).mean())
 
 
 def apexes(run: Run) -> np.ndarray:
-    """Heights of the centre that the speeds after the impacts reach."""
+    """Return the largest heights of the centre that follow from the speeds after the impacts."""
     return run.position[1:][:, 0, 1] + run.velocity[1:][:, 0, 1] ** 2 / (2 * 9.81)
 
 
@@ -73,7 +73,7 @@ REST_TIMES = [1.35457092295719, 4.06371276887158, 8.57894917872889, 17.609421998
 
 
 def bouncing(rule: str = "velocity", vx: float = 0) -> tuple[Member, ...]:
-    """Drops for the restitutions of `REST`, until they are practically at rest."""
+    """Return runs of falling disks, for the restitutions `REST`, until they are almost at rest."""
     return tuple(
         dropped(1.04, until_rest(xi), (vx, 0), {"wall_restitution": xi, "wall_rule": rule})
         for xi in REST
@@ -238,7 +238,7 @@ SLOWING = [
 
 
 def scattered(b: float) -> Member:
-    """P3: the heavy disk at y = 0, so that `b` is not rounded."""
+    """Return a run of case P3; the heavy disk is at y = 0, so that `b` is not rounded."""
     heavy, light = disk((0.5, 0), (0, 0), 0.1, 1e6), disk((0.2, b), (1, 0), 0.001)
     return few(heavy, light, box={"lower": (0, -0.5), "upper": (1, 0.5)}, collisions=1, time=0.7)
 
@@ -247,7 +247,7 @@ SCATTERED = tuple(scattered(0.101 * b) for b in B)
 
 
 def deflection(run: Run) -> float:
-    """Angle of the light disk at the end [deg]."""
+    """Return the final direction of the light disk [deg]."""
     return float(np.degrees(np.arctan2(abs(run.velocity[-1][1, 1]), run.velocity[-1][1, 0])))
 
 
@@ -287,7 +287,7 @@ ROD_COUNTS = {1: [54, 8], 10: [566, 95], 100: [5606, 959]}
 
 
 def rod_counts(run: Run, frame: int) -> list[int]:
-    """Pair and wall collisions so far."""
+    """Return the numbers of pair collisions and of wall collisions at each sample."""
     walls = run.observable("side_collisions").value[frame]
     return [run.observable("collisions").value[frame], walls.sum()]
 

@@ -1,4 +1,4 @@
-"""Section 11: two kinds of disks under gravity, event driven and by time steps."""
+"""Section 11 of the report: two species under gravity, event-driven and time-stepped."""
 
 from collections.abc import Callable, Iterable
 from math import asin, pi, sqrt
@@ -15,13 +15,13 @@ from .estimators import each, middle, over
 from .inputs import ensemble
 
 G, R, TOP, MASS = 9.81, 0.04, 16.0, {"A": 0.025, "B": 0.05}
-START = 20.0  #: when everything has come to equilibrium
+START = 20.0  #: time after which the gas is in equilibrium
 
 
 def boxes(
     seeds: int | Iterable[int], v0: float, time: float, observed: float = 1.0, run=None, **output
 ) -> tuple[Member, ...]:
-    """30 + 30 disks in the lower half: centres up to 8."""
+    """Return runs of 30 + 30 disks that start in the lower half, at heights of at most 8."""
     return ensemble(
         seeds, run=run or {}, box={"upper": (8, 16), "gravity": (0, -G)},
         species=[
@@ -35,48 +35,48 @@ def boxes(
     )  # fmt: skip
 
 
-# --- what the energy makes of the temperature ---
+# --- the temperature that follows from the energy ---
 
 
 def mean_height_energy(kt: float, mass: float) -> float:
-    """<U> of one disk between floor and ceiling."""
+    """Return the mean potential energy of one disk between floor and ceiling."""
     weight, height = mass * G / kt, TOP - 2 * R
     return mass * G * R + kt - mass * G * height / np.expm1(weight * height)
 
 
 def energy_of(kt: float) -> float:
-    """E/N of the gas; disks that exclude each other stand 1.8 % of kT higher."""
+    """Return E/N; the excluded area raises the mean potential energy by 1.8 % of kT."""
     return kt + np.mean([mean_height_energy(kt, m) for m in MASS.values()]) + 0.018 * kt
 
 
 def temperature_of(energy: float) -> float:
-    """KT that belongs to E/N."""
+    """Return kT of the gas at an energy E/N."""
     return brentq(lambda kt: energy_of(kt) - energy, 0.05, 10)
 
 
 def start_energy(run: Run) -> float:
-    """E/N."""
+    """Return the initial energy per disk, E/N."""
     return float(run.observable("total_energy").value[0]) / run.n_disks
 
 
 def settled(run: Run, name: str) -> np.ndarray:
-    """An observable after `START`."""
+    """Return the values of an observable after the time `START`."""
     time, value = run.observable(name)
     return value[time > START]
 
 
 def kinetic(run: Run) -> float:
-    """Mean of the two species' kinetic energies per disk."""
+    """Return the mean of the kinetic energies per disk of the two species."""
     return float(np.mean([settled(run, f"{name}/kinetic_energy").mean() for name in MASS]))
 
 
 def share(run: Run) -> float:
-    """<K_A> / <K_B>."""
+    """Return the ratio <K_A> / <K_B> of the kinetic energies of the species."""
     return float(settled(run, "A/kinetic_energy").mean() / settled(run, "B/kinetic_energy").mean())
 
 
 def pair_rate(run: Run) -> float:
-    """Pair collisions per disk and time after `START`."""
+    """Return the number of pair collisions per disk and time after the time `START`."""
     time, collisions = run.observable("collisions")
     first = int(np.searchsorted(time, START))
     return 2 * (collisions[-1] - collisions[first]) / run.n_disks / (time[-1] - time[first])
@@ -89,7 +89,7 @@ SCAN_KT = {0.1: 0.7302, 0.5: 0.7318, 1: 0.7366, 2: 0.7561}
 
 
 def at_energy(mean: float) -> Callable[[Run], float]:
-    """KT at the seed-averaged energy: each run is shifted there by the law of its own energy."""
+    """Return a function that measures kT of a run, corrected to the mean energy of all seeds."""
     kt = temperature_of(mean)
     return lambda run: kinetic(run) + kt - temperature_of(start_energy(run))
 
@@ -127,7 +127,7 @@ FALLING = boxes(1024, 0.5, 10.0, observed=0.05)
 
 
 def window_ratios(*runs: Run) -> list[float]:
-    """<K_B> / <K_A> in `WINDOWS`, means over seeds and time."""
+    """Return <K_B> / <K_A> in `WINDOWS`, averaged over seeds and time."""
     time = runs[0].observable("A/kinetic_energy").time
     a, b = (
         np.mean([run.observable(f"{name}/kinetic_energy").value for run in runs], axis=0)
@@ -145,12 +145,12 @@ def later(run: Run) -> slice:
 
 
 def of(run: Run, name: str, values: np.ndarray) -> np.ndarray:
-    """The columns of one species."""
+    """Return the values of the disks of one species."""
     return values[:, run.of_species(name)]
 
 
 def square_distances(run: Run) -> list[float]:
-    """KS distance times sqrt(n) of v^2 from its law, for each species."""
+    """Return the KS distance of v^2 from its predicted distribution, times sqrt(n), by species."""
     found = []
     for name in MASS:
         energy = of(run, name, run.kinetic_energy(later(run))).ravel()
@@ -160,7 +160,7 @@ def square_distances(run: Run) -> list[float]:
 
 
 def slopes(run: Run) -> list[float]:
-    """Fitted d ln p / dy of the heights over m g / kT; floor and ceiling layers left out."""
+    """Return slopes d ln p / dy over m g / kT, fitted without the layers at floor and ceiling."""
     heights, kt = run.position[later(run)][..., 1], kinetic(run)
     low, high = 1.0, 13.0
     found = []
@@ -172,7 +172,7 @@ def slopes(run: Run) -> list[float]:
 
 
 def exponent(mean: float, length: float) -> float:
-    """The k for which density exp(-k y) on 0..length has this mean."""
+    """Return k for which the density exp(-k y) on 0..length has this mean."""
     return brentq(lambda k: 1 / k - length / np.expm1(k * length) - mean, 1e-3, 10)
 
 
@@ -198,15 +198,16 @@ LAWS = [
 
 # --- time steps ---
 
-CONTACTS = {(0.025, 0.025): 0.21, (0.025, 0.05): 0.50, (0.05, 0.05): 0.29}  #: shares of the pairs
+CONTACTS = {(0.025, 0.025): 0.21, (0.025, 0.05): 0.50, (0.05, 0.05): 0.29}  #: fraction of pairs
 
 
 def too_short(q: float) -> float:
-    """Share of contacts that no step sees: a step is q contact distances long.
+    """Return the fraction of collisions that time steps miss, for steps of q contact distances.
 
-    A pair is seen if a step ends while it overlaps and still approaches, on the first half of its
-    chord: with uniform impact parameter b and phase, the mean of 1 - sqrt(1 - b^2) / q where that
-    is positive.  (Overlap alone, receding or not, would make it q / 2.)
+    A collision is detected if a step ends while the disks overlap and still approach each other, on
+    the first half of the chord.  For uniformly distributed impact parameters b and phases, the
+    result is the mean of 1 - sqrt(1 - b^2) / q where that is positive.  (If overlaps of separating
+    disks were detected as well, q / 2 would replace q.)
     """
     if q >= 1:
         return 1 - pi / (4 * q)
@@ -214,7 +215,10 @@ def too_short(q: float) -> float:
 
 
 def missed(kt: float, dt: float) -> float:
-    """The mean over pairs; in a gas they meet with speeds of density g^2 exp(-mu g^2 / 2kT)."""
+    """Return the mean of `too_short` over pairs and over relative speeds of collisions in a gas.
+
+    The density of the relative speeds g is proportional to g^2 exp(-mu g^2 / 2kT).
+    """
     total = 0.0
     for (m1, m2), part in CONTACTS.items():
         g = np.linspace(0, 12, 2001)[1:] * sqrt(kt * (1 / m1 + 1 / m2))
@@ -225,7 +229,7 @@ def missed(kt: float, dt: float) -> float:
 
 
 def rate_ratio(stepped: Run, exact: Run) -> float:
-    """Collision rates at equal seeds, so at equal energies, over what is expected."""
+    """Return the collision rate over its expected value, for runs of equal energies."""
     expected = 1 - missed(kinetic(stepped), stepped.parameter("run", "dt"))
     return pair_rate(stepped) / pair_rate(exact) / expected
 

@@ -8,7 +8,7 @@ from .case import Member
 
 EVERY_EVENT = {"frames_every_events": 1, "observables_every_events": 1, "event_log": True}
 PERIODIC = {"boundary": ("periodic", "periodic")}
-ROOT_2 = 1.4142135623730951  #: speed at which K = m, so kT = 1
+ROOT_2 = 1.4142135623730951  #: speed at which K = m, so that kT = 1 for m = 1
 
 
 def namelist(**groups: dict | list[dict]) -> str:
@@ -25,7 +25,8 @@ def ensemble(seeds: int | Iterable[int], *, run: dict = {}, **groups) -> tuple[M
 def gases(seeds: int | Iterable[int], count: int, *, periodic=False, **more) -> tuple[Member, ...]:
     """Return an input of `count` equal disks with speeds sqrt 2, so that kT = 1 between walls.
 
-    `more` goes to the group of that name, such as stop or contact, or else to the species.
+    An argument in `more` that names a group, such as stop or contact, defines that group; all other
+    arguments are variables of the species.
     """
     groups = {"box": PERIODIC if periodic else {}}
     groups |= {key: value for key, value in more.items() if isinstance(value, dict)}

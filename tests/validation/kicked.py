@@ -1,4 +1,4 @@
-"""Section 15, kicks: noise against collisions, heat baths, Brownian and active disks."""
+"""Section 15 of the report, driving: white noise, heat baths, Brownian and active disks."""
 
 from collections.abc import Callable
 from math import exp, pi, sqrt
@@ -15,7 +15,7 @@ from .inputs import PERIODIC, ensemble, gases
 from .laws import noise_kurtosis
 
 
-# --- a dilute inelastic gas that noise heats: collisions take what it gives at T = 1 ---
+# --- a dilute inelastic gas with white-noise driving, which balances dissipation at T = 1 ---
 
 HEATED_COUNT, ETA = 5000, 0.0025
 FREE_TIME = 1 / float(hd.collision_rate(hd.henderson(ETA), 1.0, HEATED_COUNT))  # at T = 1
@@ -23,7 +23,11 @@ STRENGTH = 0.002
 
 
 def heated(xi: float) -> tuple[Member, ...]:
-    """Many kicks in a free flight, samples at any moment between two, from the temperature due."""
+    """Return heated gases that start at the predicted temperature.
+
+    There are ten kicks per mean free time, and the sampling times are not multiples of their
+    interval.
+    """
     edge = sqrt(HEATED_COUNT * pi / 4 / ETA)
     kt = hd.noise_temperature(STRENGTH, xi, ETA, 1.0)
     unit = FREE_TIME / sqrt(kt)
@@ -48,21 +52,22 @@ def heated(xi: float) -> tuple[Member, ...]:
 
 
 def steady_temperature(run: Run) -> float:
-    """The mean after a fifth of the run."""
+    """Return the mean temperature after the first fifth of the run."""
     time, kt = run.observable("all/temperature")
     return float(kt[time >= time[-1] / 5].mean())
 
 
 def steady_kurtosis(run: Run) -> float:
-    """a2 of all velocities after a fifth of the run."""
+    """Return a2 of the velocities after the first fifth of the run."""
     return float(np.mean([excess_kurtosis(v) for v in run.speed(slice(run.n_frames // 5, None))]))
 
 
 def diffusion(run: Run) -> float:
-    """Slope of <dr^2> / 4 between some 6 and 18 free times over D of Enskog times 2 / (1 + xi).
+    """Return D, from the slope of <dr^2> between 6 and 18 mean free times, over its prediction.
 
-    In first approximation: of a mean velocity a collision takes (1 + xi) / 2 of what an elastic one
-    does; V. Garzo, Physica A 343, 105 (2004), for disks alike.
+    The prediction is Enskog's D times 2 / (1 + xi): to first order a collision changes a mean
+    velocity by (1 + xi) / 2 of the change in an elastic collision; V. Garzo, Physica A 343, 105
+    (2004), for equal disks.
     """
     time = run.time[run.n_frames // 5 : -1]
     lags = (time[1] - time[0]) * np.array([2, 6])
@@ -71,13 +76,13 @@ def diffusion(run: Run) -> float:
     return float((msd[1] - msd[0]) / (4 * (t[1] - t[0])) / theory * (1 + run.restitution) / 2)
 
 
-# --- disks that never meet: what each of them does is known exactly ---
+# --- disks that almost never collide, whose motion is known exactly ---
 
 FREE_COUNT, KICK = 100, 1.0
 
 
 def free(frames_every: int, kicks: int, **drive) -> tuple[Member, ...]:
-    """All but points, which hardly ever meet; `drive` as in the input."""
+    """Return a run of very small driven disks; `drive` contains the variables of the input."""
     return ensemble(
         8,
         box={"upper": (100, 100), **PERIODIC},
@@ -96,7 +101,7 @@ FRACTION = 0.3
 LAGS = (1, 2, 5)
 BATHED = free(1, 2000, kind="andersen", temperature=BATH, fraction=FRACTION)
 DIFFUSING = free(1, 2000, kind="brownian", temperature=BATH)
-SWIM, TURN = 1.5, 0.02  #: speed and diffusion of the orientation of an active disk
+SWIM, TURN = 1.5, 0.02  #: speed and rotational diffusion coefficient of an active disk
 WARMTH = 0.5
 SWIMMING = free(
     10,
@@ -109,13 +114,16 @@ SWIMMING = free(
 
 
 def memory(run: Run) -> list[float]:
-    """<v(0) v(t)> at the lags, over 2 kT / m."""
+    """Return <v(0) v(t)> at the lags, divided by 2 kT / m."""
     v = run.velocity[:]
     return [float(np.mean(v[k:] * v[: len(v) - k])) * MASS / BATH for k in (0, *LAGS)]
 
 
 def spread(lags: tuple[int, ...], law: Callable[[int], float]) -> Callable[[Run], list[float]]:
-    """<|dr|^2> at lags in frames over its law; the first flight is not yet that of a kick."""
+    """Return a function that measures <|dr|^2> over its prediction, at lags in frames.
+
+    The first frame is left out, because the first flight does not follow a kick.
+    """
 
     def measure(run: Run) -> list[float]:
         r = run.unwrapped(slice(1, None))
@@ -126,30 +134,30 @@ def spread(lags: tuple[int, ...], law: Callable[[int], float]) -> Callable[[Run]
 
 
 def headings(run: Run) -> list[float]:
-    """<cos> of the turn of the orientation at the lags, in frames."""
+    """Return the mean cosine of the change of orientation at the lags, in frames."""
     angle = run.per_disk("orientation")[:]
     return [float(np.mean(np.cos(angle[k:] - angle[:-k]))) for k in LAGS]
 
 
 def swum(kicks: int) -> float:
-    """<|dr|^2> of an active disk that has a straight flight for each kick.
+    """Return <|dr|^2> of an active disk that flies straight from kick to kick.
 
-    The n directions of the flights are u_1 ... u_n with <u_i u_j> = exp(-D_r |i - j| interval);
-    for short intervals it is 4 D t + 2 (v / D_r)^2 (D_r t - 1 + exp(-D_r t)), Howse et al., Phys.
-    Rev. Lett. 99, 048102 (2007).
+    The n directions of the flights are u_1 ... u_n with <u_i u_j> = exp(-D_r |i - j| interval); for
+    short intervals the result is 4 D t + 2 (v / D_r)^2 (D_r t - 1 + exp(-D_r t)), Howse et al.,
+    Phys. Rev. Lett. 99, 048102 (2007).
     """
     i = np.arange(kicks)
     together = np.exp(-TURN * KICK * np.abs(i[:, None] - i)).sum()
     return float(KICK**2 * (SWIM**2 * together + 2 * kicks * WARMTH / MASS))
 
 
-# --- disks of two kinds that can turn, in a heat bath: every freedom has its share ---
+# --- two species of rough disks in a heat bath: equipartition of the energy ---
 
 PAIRS = 100
 
 
 def bathed(kind: str, **drive) -> tuple[Member, ...]:
-    """A dense elastic mixture, as rough as can be, that starts at another temperature."""
+    """Return a dense mixture of perfectly rough disks that starts at another temperature."""
     edge = sqrt(PAIRS * pi * (0.5**2 + 0.8**2) / 0.3)
     return ensemble(
         8,
@@ -169,7 +177,7 @@ def bathed(kind: str, **drive) -> tuple[Member, ...]:
 
 
 def shares(run: Run) -> list[float]:
-    """<m v^2 / 2> and <I omega^2> of both species over the temperature of the bath."""
+    """Return <m v^2 / 2> and <I omega^2> of both species, over the temperature of the bath."""
     return [
         factor * float(run.observable(f"{species}/{what}").value[100:].mean()) / BATH
         for species in ("light", "heavy")
@@ -178,7 +186,7 @@ def shares(run: Run) -> list[float]:
 
 
 def heat_capacity(run: Run) -> float:
-    """Variance of the energy over T^2, per disk."""
+    """Return the variance of the energy per disk, divided by T^2."""
     return float(run.observable("total_energy").value[100:].var() / BATH**2 / (2 * PAIRS))
 
 
@@ -193,7 +201,7 @@ CROWDS = gases(
 
 
 def compressibility(run: Run) -> float:
-    """Z by the virial of the pairs."""
+    """Return Z from the virial of the pair collisions."""
     time, virial = run.observable("virial")
     return float(1 + (virial[-1] - virial[1]) / (2 * CROWD * (time[-1] - time[1])))
 

@@ -1,4 +1,4 @@
-"""Published laws that only the validation compares with; symbols as in `ricochet.hard_disks`."""
+"""Published results that only the validation uses; symbols as in `ricochet.hard_disks`."""
 
 import math
 
@@ -9,7 +9,7 @@ from ricochet import hard_disks as hd
 
 
 def mixture_rates(diameters, density, masses, kt: float = 1.0) -> np.ndarray:
-    """w_ij: collisions of a disk of species i with those of species j, per time."""
+    """Return w_ij, the collisions of a disk of species i with disks of species j per time."""
     s, n, m = (np.asarray(a, dtype=float) for a in (diameters, density, masses))
     pair = (s[:, None] + s) / 2
     reduced = 2 * math.pi * kt * (1 / m[:, None] + 1 / m)
@@ -18,10 +18,10 @@ def mixture_rates(diameters, density, masses, kt: float = 1.0) -> np.ndarray:
 
 
 def cooling_ratio(mass_ratio: float, xi: float, share: float = 0.5) -> float:
-    """T_heavy / T_light of a dilute cooling mixture of disks of equal size.
+    """Return T_heavy / T_light of a dilute cooling mixture of disks of equal size.
 
     Both species cool at the same rate; rates with Maxwellian velocities as in Garzo and Dufty,
-    Phys. Rev. E 60, 5706 (1999), here in two dimensions.  `share` = heavy disks over all.
+    Phys. Rev. E 60, 5706 (1999), here in two dimensions.  `share` is the fraction of heavy disks.
     """
     mass, part = np.array([1.0, mass_ratio]), np.array([1 - share, share])
 
@@ -37,16 +37,16 @@ def cooling_ratio(mass_ratio: float, xi: float, share: float = 0.5) -> float:
 
 
 def noise_kurtosis(xi: float) -> float:
-    """a2 of a gas that noise heats, van Noije and Ernst, Granular Matter 1, 57 (1998)."""
+    """Return a2 for white-noise driving: van Noije and Ernst, Granular Matter 1, 57 (1998)."""
     return 16 * (1 - xi) * (1 - 2 * xi**2) / (185 - 153 * xi + 30 * (1 - xi) * xi**2)
 
 
 def sheared_grains(xi: float) -> tuple[float, float, float]:
-    """Shear rate, stress -P_xy and P_yy of a dilute inelastic gas in steady uniform shear.
+    """Return shear rate, stress -P_xy and P_yy of a dilute inelastic gas in steady uniform shear.
 
-    In units of nu = 2 sqrt(pi) n sigma sqrt(T / m), the pressure and the pressure; Santos, Garzo
-    and Dufty, Phys. Rev. E 69, 061303 (2004), in two dimensions: the moments relax with beta nu,
-    and zeta nu is the rate of cooling.
+    The unit of the shear rate is nu = 2 sqrt(pi) n sigma sqrt(T / m); the unit of the stresses is
+    the pressure.  Santos, Garzo and Dufty, Phys. Rev. E 69, 061303 (2004), in two dimensions: the
+    stress relaxes at the rate beta nu, and the cooling rate is zeta nu.
     """
     beta, zeta = (1 + xi) / 2 * (1 - (1 - xi) / 4), (1 - xi**2) / 2
     rate = math.sqrt(zeta / beta) * (beta + zeta)

@@ -1,4 +1,4 @@
-"""Section 15, sides that move: one disk on a floor, a gas under a piston, Maxwell's demon."""
+"""Section 15 of the report, moving sides: bouncing disk, gas under a piston, Maxwell's demon."""
 
 from math import acos, pi, sin, sqrt
 
@@ -14,11 +14,11 @@ from .case import AT_LEAST, AT_MOST, Case, Member, Tolerance, relative, sigmas, 
 from .estimators import each, over, several
 from .inputs import ensemble, namelist
 
-# --- one disk that bounces on the floor, g = 1 ---
+# --- one disk that bounces on a moving floor, g = 1 ---
 
 
 def bouncing(height: float, **law) -> Member:
-    """A disk that starts at rest with its rim so high above the place of the floor."""
+    """Return a disk that starts at rest with its rim at a height above the mean floor."""
     return Member(
         namelist(
             box={"upper": (1, 1000), "gravity": (0, -1)},
@@ -35,14 +35,15 @@ STRUCK = tuple(bouncing(1, motion="sawtooth", velocity=V, restitution=xi) for xi
 
 
 def leaving(run: Run) -> np.ndarray:
-    """Upward velocities right after the last 40 bounces."""
+    """Return the upward velocities immediately after the last 40 bounces."""
     return run.velocity[run.n_frames - 41 : run.n_frames - 1][:, 0, 1]
 
 
 def shaken(xi: float, strength: float) -> Member:
-    """On a sine of period 1, from close to the orbit of a bounce per period.
+    """Return a run that starts close to the periodic orbit with one bounce per period.
 
-    A disk that leaves with 1/2 flies for a period; the floor then has (1 - xi) / (1 + xi) / 2.
+    The floor oscillates with the period 1.  A disk that leaves the floor at the velocity 1/2 flies
+    for one period if the velocity of the floor is then (1 - xi) / (1 + xi) / 2.
     """
     amplitude = strength / (2 * pi) ** 2
     phase = acos((1 - xi) / (1 + xi) / 2 / (2 * pi * amplitude))
@@ -54,7 +55,7 @@ def shaken(xi: float, strength: float) -> Member:
 
 
 def doubling(xi: float) -> float:
-    """Largest acceleration of the floor, over g, up to which the orbit repeats at each bounce."""
+    """Return the acceleration of the floor, over g, at which the period of the orbit doubles."""
     return float(np.hypot(pi * (1 - xi) / (1 + xi), 2 * (1 + xi**2) / (1 + xi) ** 2))
 
 
@@ -63,7 +64,7 @@ BELOW, ABOVE = (
 )
 
 
-# --- a dilute gas that a side presses together and lets expand, slowly ---
+# --- a dilute gas that a side compresses and expands slowly ---
 
 PISTON = ensemble(
     4,
@@ -77,13 +78,13 @@ PISTON = ensemble(
 
 
 def adiabats(run: Run) -> list[float]:
-    """T x area over its start when the side is farthest in, at its place, farthest out."""
+    """Return T times area over its initial value at the inner, mean and outer side position."""
     kt = run.observable("all/temperature").value
     area = np.array([2.0, 1.5, 2.0, 2.5]) - 2e-3
     return list((kt * area / (kt[0] * area[0]))[1:])
 
 
-# --- a dense gas that a side presses together, to half its width: `compression.nml`, but slowly ---
+# --- a dense gas that a side compresses slowly to half its width, as in `compression.nml` ---
 
 SLOW, PRESSED_DISKS = 0.0125, 500
 PRESSED = ensemble(
@@ -95,23 +96,23 @@ PRESSED = ensemble(
     stop={"time": 80},
     output={"observables_every_time": 20},
 )  # fmt: skip
-#: The side starts at once: sound, and the flow, have up to m u^2 / kT of the energy.
+#: The side starts abruptly: sound and flow contain a fraction of up to m u^2 / kT of the energy.
 SOUND = Tolerance("4 sigma + m u² / kT", lambda _, error: 4 * error + SLOW**2)
 
 
 def heated(run: Run) -> np.ndarray:
-    """The logarithm of T over its start at four places."""
+    """Return the logarithm of T over its initial value at four positions of the side."""
     kt = run.observable("all/temperature").value
     return np.log(kt[1:] / kt[0])
 
 
 def pressed() -> np.ndarray:
-    """Its value on the adiabat; without layers at the walls 1.413 at the end, not 1.462."""
+    """Return ln T on the adiabat; its last value is 1.462, or 1.413 without layers at the walls."""
     radius, widths = sqrt(0.4 / PRESSED_DISKS / pi), np.array([2, 1.75, 1.5, 1.25, 1])
     return np.log(adiabat(widths, 1.0, PRESSED_DISKS, radius, walled=True))[1:]
 
 
-# --- a side that disks push: constant force, constant enthalpy ---
+# --- a piston: constant force, constant enthalpy ---
 
 FORCE, PUSHING, WIDE = 130.0, 100, 1.5
 PUSHED = ensemble(
@@ -122,7 +123,7 @@ PUSHED = ensemble(
     stop={"time": 1000},
     output={"observables_every_time": 0.1},
 )  # fmt: skip
-ROD = 0.05  # radius of disks of masses 1, 2, 3 on a line
+ROD = 0.05  # radius of three disks on a line, with the masses 1, 2, 3
 RODS = Member(
     namelist(
         box={"upper": (2, 1)},
@@ -138,7 +139,7 @@ RODS = Member(
 
 
 def room(*runs: Run) -> Estimate:
-    """Mean width and its variance, when the start is over."""
+    """Return the mean width and its variance after the equilibration."""
     tracks = [run.observable("sides/right/position") for run in runs]
     widths = [np.ravel(place)[time > time[-1] / 20] for time, place in tracks]
     squares = [(x - x.mean()) ** 2 for x in widths]
@@ -148,14 +149,17 @@ def room(*runs: Run) -> Estimate:
 
 
 def room_of_gas() -> tuple[float, float]:
-    """The same by theory: its adiabat tells how many places the gas has."""
+    """Return the predicted mean and variance of the width of the gas.
+
+    The configuration integral of the gas follows from its adiabat.
+    """
     radius, widths = sqrt(0.3 * WIDE / PUSHING / pi), np.linspace(1, 2.2, 20001)
     places = -PUSHING * np.log(adiabat(widths, 1.0, PUSHING, radius, walled=True))
     return pushed_width(widths, places, 2 * PUSHING + 1, PUSHING + FORCE * (WIDE - widths))
 
 
 def room_of_rods() -> tuple[float, float]:
-    """Of rods: Q is the third power of the free length."""
+    """Return mean and variance of the width for three rods: Q is the free length cubed."""
     energy = 3 + 2.0
     widths = np.linspace(6 * ROD, energy, 200002)[1:-1]
     return pushed_width(widths, 3 * np.log(widths - 6 * ROD), 4, energy - widths)
@@ -165,11 +169,11 @@ def room_of_rods() -> tuple[float, float]:
 
 GRAINS, DIAMETER, WIDTH, HOLE, XI = 120, 0.5, 19.5, 8.0, 0.9
 LAYERS = GRAINS * DIAMETER / WIDTH
-THRESHOLD = LAYERS * (1 - XI**2) * sqrt(pi * HOLE) / 4  # of the velocity: see `demon_share`
+THRESHOLD = LAYERS * (1 - XI**2) * sqrt(pi * HOLE) / 4  # critical velocity: see `demon_share`
 
 
 def chambers(velocity: float) -> tuple[Member, ...]:
-    """The input `demon.nml` with another floor, for longer."""
+    """Return longer runs of the input `demon.nml` with another velocity of the floor."""
     return ensemble(
         8,
         box={"upper": (40, 50), "gravity": (0, -1)},
@@ -188,7 +192,7 @@ def chambers(velocity: float) -> tuple[Member, ...]:
 
 
 def fuller_share(run: Run) -> float:
-    """Mean share of the half that has more of them, in the second half of the time."""
+    """Return the mean fraction of disks in the fuller half, in the second half of the time."""
     _, left = share(run)[""]
     return float(fuller(left[run.n_frames // 2 :]).mean())
 

@@ -1,4 +1,4 @@
-"""The report of a validation, for people (Markdown) and for programs (JSON)."""
+"""The report of a validation: a page in Markdown and data in JSON."""
 
 import json
 from itertools import groupby
@@ -75,12 +75,12 @@ NOTES = """
 
 
 def number(value: float, digits: int = 9) -> str:
-    """A number for people."""
+    """Return a number as text for a reader."""
     return "-" if value is None or np.isnan(value) else f"{value:.{digits}g}"
 
 
 def measured(value: float, error: float) -> str:
-    """A measured value, with its error if it has one."""
+    """Return a measured value as text, with its error if there is one."""
     if not (value and error and np.isfinite(error)):
         return number(value)
     digits = max(2, int(np.ceil(np.log10(abs(value) / error + 1))) + 2)
@@ -88,7 +88,7 @@ def measured(value: float, error: float) -> str:
 
 
 def shown(cell: str) -> str:
-    """A cell whose signs Markdown takes for none of its own."""
+    """Return the text of a cell with the special characters of Markdown escaped."""
     return cell.replace("|", "&#124;").replace("<", "&lt;")
 
 
@@ -96,12 +96,12 @@ LIMITS = {"at most": "≤", "at least": "≥"}
 
 
 def topic_of(case: dict) -> str:
-    """The first part of the name of a case."""
+    """Return the topic of a case, which is the first part of its name."""
     return case["case"].partition("-")[0]
 
 
 def is_rounding(case: dict) -> bool:
-    """Whether the tolerance of a case is one of rounding errors."""
+    """Return whether the tolerance of a case allows for rounding errors only."""
     text = case["tolerance"].partition(" ")[0]
     if case["tolerance"] in LIMITS:
         return abs(case["reference"] or 0) <= 1e-9
@@ -109,7 +109,7 @@ def is_rounding(case: dict) -> bool:
 
 
 def rows(cases: list[dict]) -> list[str]:
-    """The lines of the table: for each topic, for each case below it, and all values that fail."""
+    """Return the lines of the table: one for each topic and for each case, and all failures."""
     lines = []
     ordered = sorted(cases, key=lambda case: [*TOPICS, topic_of(case)].index(topic_of(case)))
     for topic, under in groupby(ordered, key=topic_of):
@@ -124,7 +124,7 @@ def rows(cases: list[dict]) -> list[str]:
 
 
 def rows_of_case(values: list[dict]) -> list[str]:
-    """The lines of the cases of one number: of those that fail, or of the one nearest to it."""
+    """Return lines for the cases of one name: failed cases, or the closest to its tolerance."""
     failed = [value for value in values if value["verdict"] != "pass"]
     lines = []
     for value in failed or sorted(values, key=lambda value: -value["used"])[:1]:
@@ -136,12 +136,12 @@ def rows_of_case(values: list[dict]) -> list[str]:
 
 
 def line(*cells: str) -> str:
-    """A line of the table."""
+    """Return a line of the table."""
     return "| " + " | ".join(map(shown, cells)) + " |"
 
 
 def outcome(cases: list[dict], seconds: float) -> str:
-    """The result in one line."""
+    """Return the result of the validation in one line."""
     bad = [case["case"] for case in cases if case["verdict"] != "pass"]
     result = f"failed: {', '.join(bad)}" if bad else "all pass"
     return f"{len(cases)} cases in {seconds / 60:.1f} minutes: {result}"
@@ -170,7 +170,7 @@ p-values of `speeds.py` for valid runs. Of 100 of them 5 should be below .05 and
 
 
 def statistics_tables(base: Path) -> str:
-    """The tables of `tests/coverage_tables.py`, from coverage.json if it is beside the page."""
+    """Return the tables of `tests/coverage_tables.py` if coverage.json is beside the page."""
     path = base.parent / "coverage.json"
     if not path.exists():
         return ""
@@ -194,13 +194,13 @@ def statistics_tables(base: Path) -> str:
 
 
 def rewrite(base: Path) -> None:
-    """BASE.md anew from BASE.json and coverage.json."""
+    """Write BASE.md again from BASE.json and coverage.json."""
     data = json.loads(base.with_suffix(".json").read_text())
     base.with_suffix(".md").write_text(markdown(data, statistics_tables(base)))
 
 
 def markdown(data: dict, tables: str = "") -> str:
-    """The page of a report; `tables` follow the cases."""
+    """Return the page of a report; `tables` follow the cases."""
     cases = data["cases"]
     return (
         f"{HEAD}{outcome(cases, data['seconds'])}. Program: {data['program']}.\n\n"
@@ -211,7 +211,7 @@ def markdown(data: dict, tables: str = "") -> str:
 
 
 def as_data(verdict: Verdict) -> dict:
-    """A verdict as it stands in the JSON file."""
+    """Return a verdict in the form that the JSON file contains."""
     finite = lambda value: value if np.isfinite(value) else None  # noqa: E731
     return {
         "case": verdict.case.id,
@@ -230,7 +230,7 @@ def as_data(verdict: Verdict) -> dict:
 
 
 def write(base: Path, verdicts: list[Verdict], origin: str, seconds: float) -> None:
-    """Both reports, BASE.md and BASE.json."""
+    """Write both reports, BASE.md and BASE.json."""
     cases = [as_data(verdict) for verdict in verdicts]
     data = {"program": origin, "seconds": round(seconds, 1), "cases": cases}
     base.parent.mkdir(parents=True, exist_ok=True)

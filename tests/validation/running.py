@@ -1,4 +1,4 @@
-"""Runs the members of the cases side by side and measures each case when its members are there."""
+"""Perform the runs of the cases in parallel, and measure each case once its runs are finished."""
 
 import hashlib
 import re
@@ -15,17 +15,17 @@ MOST_SECONDS = 1200
 
 
 class Workshop:
-    """Runs each member once, several at a time, in a folder of its own."""
+    """Performs the run of each member once, several runs at a time, in one folder."""
 
     def __init__(self, program: Path, folder: Path, jobs: int, seed_shift: int = 0):
-        """`seed_shift` is added to all seeds: other runs of the same cases."""
+        """Store the settings; `seed_shift` is added to all seeds and so changes all runs."""
         self.program, self.folder, self.seed_shift = program, folder, seed_shift
         self.pool = ThreadPoolExecutor(jobs)
         self.futures: dict[Member, Future] = {}
         folder.mkdir(parents=True, exist_ok=True)
 
     def order(self, member: Member) -> Future:
-        """The future result of a member. Members that it is made from are ordered first."""
+        """Return the future result of a member; members that it depends on are run first."""
         for earlier in member.after:
             self.order(earlier)
         if member not in self.futures:
@@ -33,7 +33,7 @@ class Workshop:
         return self.futures[member]
 
     def make(self, member: Member) -> Run:
-        """Run a member. Raises RunError if it does not end as it should."""
+        """Perform the run of a member; raise RunError if its exit code is not the expected one."""
         text = member.text
         if callable(text):
             text = text(*(self.futures[earlier].result() for earlier in member.after))
@@ -58,7 +58,7 @@ class Workshop:
 def validate(
     cases: list[Case], program: Path, folder: Path, jobs: int, seed_shift: int = 0
 ) -> Iterator[Verdict]:
-    """Verdicts in the order of the cases, as soon as they are known."""
+    """Yield the verdicts in the order of the cases, as soon as they are known."""
     workshop = Workshop(program, folder, jobs, seed_shift)
     try:
         ordered = [[workshop.order(member) for member in case.members] for case in cases]

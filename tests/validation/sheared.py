@@ -1,4 +1,4 @@
-"""Section 15, flow: sheared gases, elastic and inelastic; heat and momentum from wall to wall."""
+"""Section 15 of the report, flow: sheared gases, and fluxes of heat and momentum between walls."""
 
 from collections.abc import Callable
 from math import pi, sqrt
@@ -13,13 +13,16 @@ from .estimators import over
 from .inputs import PERIODIC, ensemble
 from .laws import sheared_grains
 
-# --- an elastic gas: viscosity is how fast shear heats it ---
+# --- an elastic gas: the viscosity follows from the heating by shear ---
 
 COUNT = 500
 
 
 def heating(eta: float) -> tuple[Member, ...]:
-    """From T = 1 to about 4, at first with a shear rate of a thirtieth of the collision rate."""
+    """Return gases that shear heats from T = 1 to about 4.
+
+    The shear rate is a thirtieth of the initial collision rate.
+    """
     gamma = float(hd.collision_rate(hd.henderson(eta), 1.0, COUNT)) / 30
     doubling = 2 / (viscosity(eta) * gamma**2)
     edge = sqrt(COUNT * pi / 4 / eta)
@@ -34,14 +37,15 @@ def heating(eta: float) -> tuple[Member, ...]:
 
 
 def viscosity(eta: float) -> float:
-    """Enskog's, over the mass density, at T = 1."""
+    """Return Enskog's viscosity at T = 1, divided by the mass density."""
     return float(hd.enskog(hd.simulated(eta), eta, 1.0)["viscosity"] * pi / 4 / eta)
 
 
 def heated_by_shear(eta: float) -> Callable[[Run], float]:
-    """Growth of the root of T over that by Enskog's viscosity.
+    """Return the growth of sqrt(T), divided by the growth for Enskog's viscosity.
 
-    n dT/dt = (viscosity) gamma^2, and the viscosity is as the root of T: that grows evenly.
+    In n dT/dt = (viscosity) gamma^2 the viscosity is proportional to sqrt(T), so that sqrt(T) grows
+    linearly in time.
     """
 
     def measure(run: Run) -> float:
@@ -52,14 +56,14 @@ def heated_by_shear(eta: float) -> Callable[[Run], float]:
     return measure
 
 
-# --- a dilute inelastic gas: shear heats it as fast as collisions cool it ---
+# --- a dilute inelastic gas in which heating by shear balances dissipation ---
 
 GRAINS, ETA = 1000, 0.0025
 FREQUENCY = 2 * sqrt(pi) * 4 * ETA / pi  # the unit of rates at T = 1
 
 
 def steady(xi: float) -> tuple[Member, ...]:
-    """With the shear rate that the theory has for T = 1."""
+    """Return sheared gases at the shear rate for which theory predicts T = 1."""
     edge = sqrt(GRAINS * pi / 4 / ETA)
     gamma = sheared_grains(xi)[0] * FREQUENCY
     return ensemble(
@@ -74,9 +78,10 @@ def steady(xi: float) -> tuple[Member, ...]:
 
 
 def of_steady_shear(run: Run) -> list[float]:
-    """Shear rate, -P_xy and P_yy in the units of the theory, after 50 collisions per disk.
+    """Return shear rate, -P_xy and P_yy in units of the theory, after 50 collisions per disk.
 
-    Disks alone carry the stress: what collisions hand on is of the order of the packing.
+    Only the kinetic part of the stress is included, because the collisional part is smaller by a
+    factor of the order of the packing fraction.
     """
     late = slice(50, None)
     place, v = run.position[late], run.velocity[late]
@@ -89,13 +94,13 @@ def of_steady_shear(run: Run) -> list[float]:
     ]
 
 
-# --- a gas between two walls: heat and momentum that pass from one to the other ---
+# --- a gas between two walls: fluxes of heat and momentum ---
 
 BETWEEN, CELLS = 800, 20
 
 
 def between(eta: float, temperatures: tuple[float, float], speed: float) -> tuple[Member, ...]:
-    """Thermal walls on the left and the right; they slide in opposite directions."""
+    """Return gases between two thermal walls, which slide in opposite directions."""
     edge = sqrt(BETWEEN * pi / 4 / eta / 2)
     return ensemble(
         8,
@@ -114,7 +119,7 @@ def between(eta: float, temperatures: tuple[float, float], speed: float) -> tupl
 
 
 def drop(name: str) -> Callable[[Run], float]:
-    """How much a field changes over the middle half of the box, over what the fluxes say."""
+    """Return the change of a field over the middle half of the box, over its prediction."""
 
     def measure(run: Run) -> float:
         own, x = fields([run], None, (CELLS, 1)), places(run, (CELLS, 1))[:, 0]

@@ -1,4 +1,4 @@
-"""Sections 5 and 6: how speeds are distributed, and how a gas and a mixture come to equilibrium."""
+"""Sections 5 and 6 of the report: speed distributions, and relaxation of gases and mixtures."""
 
 from collections.abc import Callable
 from math import pi, sqrt
@@ -19,12 +19,12 @@ LEAST = 1.63  #: times 1/sqrt(n): a larger distance has a probability below 1 %
 
 
 def after(run: Run, tau: float) -> slice:
-    """Frames from so many collisions per disk on."""
+    """Return the frames after a number of collisions per disk."""
     return slice(int(np.searchsorted(run.collisions_per_disk_at(run.time), tau)), None)
 
 
 def reduced(run: Run, tau: float = 15) -> np.ndarray:
-    """Speeds in equilibrium, frame after frame, over sqrt(2 K / N)."""
+    """Return the speeds of the frames in equilibrium, divided by sqrt(2 K / N)."""
     v = run.speed(after(run, tau))
     return (v / sqrt(np.mean(v**2))).ravel()
 
@@ -36,7 +36,10 @@ def obeyed(
     sample: Callable[[Run], tuple],
     source: str = "D",
 ) -> Case:
-    """Whether what a run has many of is distributed as it should be: `sample` gives both."""
+    """Return a case that tests a sample of values from a run against a distribution function.
+
+    The function `sample` returns both for a run.
+    """
 
     def distance(run: Run) -> float:
         values, law = sample(run)
@@ -54,7 +57,7 @@ def uniform(u: np.ndarray) -> np.ndarray:
 
 
 def sampled(count: int, radius: float, interval: float, frames: int) -> tuple[Member, ...]:
-    """Frames at equal intervals of time."""
+    """Return runs with frames at equal intervals of time."""
     time = interval * frames
     output = {"frames_every_time": interval, "observables_every_time": time / 400}
     return gases(3, count, radius=radius, stop={"time": time}, output=output)
@@ -72,12 +75,12 @@ def large(run: Run) -> tuple:
 
 
 def finite(run: Run) -> tuple:
-    """N disks share a fixed energy."""
+    """Return reduced speeds and their distribution for N disks that share a fixed energy."""
     return reduced(run), finite_n_cdf(run.n_disks)
 
 
 def component(run: Run) -> tuple:
-    """The share m vx^2 / 2E has the law Beta(1/2, N - 1/2)."""
+    """Return the fractions m vx^2 / 2E and their distribution, Beta(1/2, N - 1/2)."""
     share = run.velocity[after(run, 15)][..., 0].ravel() ** 2 / (2 * run.n_disks)
     return share, stats.beta(0.5, run.n_disks - 0.5).cdf
 
@@ -95,7 +98,7 @@ LAWS = [
 
 
 def hits_on_record(periodic: bool) -> tuple[Member, ...]:
-    """Every event of gases that have been in equilibrium from the start."""
+    """Return gases that start in equilibrium, with an event log."""
     output = {"frames_every_events": 1, "event_log": True, "observables_every_time": 0.1}
     return gases(
         3, 100, periodic=periodic, radius=0.005, temperature=1.0,
@@ -104,27 +107,27 @@ def hits_on_record(periodic: bool) -> tuple[Member, ...]:
 
 
 def wall_speeds(run: Run) -> tuple:
-    """|v_n| of hits on the sides, over sqrt(2 kT / m)."""
+    """Return |v_n| / sqrt(2 kT / m) of collisions with the sides, and its distribution."""
     log = run.event_log()
     hit = log.j <= 0
     return log.impulse[hit] / (2 * sqrt(2 * kt_at_start(run))), maxwell_cdf
 
 
 def wall_energies(run: Run) -> np.ndarray:
-    """K of a disk that hits a side, over kT; exact for fixed energy."""
+    """Return K / kT of the disk in each collision with a side."""
     log = run.event_log()
     hit = np.flatnonzero(log.j <= 0)
     return run.kinetic_energy(slice(1, None))[hit, log.i[hit] - 1] / kt_at_start(run)
 
 
 def in_parts(measure, runs: tuple[Run, ...]) -> Estimate:
-    """The mean of what is measured at each hit, with the error from parts of the runs."""
+    """Return the mean of values measured at collisions, with its error from parts of the runs."""
     values = np.concatenate([measure(run) for run in runs])
     return estimate([part.mean() for part in np.array_split(values, 60)])
 
 
 def approach_speeds(run: Run) -> tuple:
-    """g_n of pair collisions over sqrt(4 kT / m)."""
+    """Return g_n / sqrt(4 kT / m) of pair collisions, and its distribution."""
     log = run.event_log()
     return log.impulse[log.j > 0] / sqrt(4 * kt_at_start(run)), maxwell_cdf
 
@@ -168,7 +171,7 @@ EQUAL_SPEEDS = gases(
 
 
 def kurtosis(*runs: Run) -> list[float]:
-    """a2 at `TAU`, over the disks of all runs."""
+    """Return a2 at the times `TAU`, from the disks of all runs."""
     return [excess_kurtosis(np.concatenate([run.speed(tau) for run in runs])) for tau in TAU]
 
 
@@ -186,19 +189,19 @@ MIXING = light_and_heavy(
 
 
 def settled(run: Run, name: str) -> np.ndarray:
-    """An observable after 20 collisions per disk."""
+    """Return the values of an observable after 20 collisions per disk."""
     series = run.observable(name)
     return series.value[run.collisions_per_disk.value > 20]
 
 
 def energies(run: Run) -> list[float]:
-    """Mean kinetic energies and speeds, light then heavy."""
+    """Return mean kinetic energies and mean speeds, of the light and then of the heavy disks."""
     names = ("light/kinetic_energy", "heavy/kinetic_energy", "light/mean_speed", "heavy/mean_speed")
     return [settled(run, name).mean() for name in names]
 
 
 def ratios(*runs: Run) -> np.ndarray:
-    """Mean K_heavy over mean K_light at `TAU`."""
+    """Return the mean K_heavy over the mean K_light at the times `TAU`."""
     heavy, light = (
         np.mean([at_collisions(r, f"{name}/kinetic_energy", TAU) for r in runs], axis=0)
         for name in ("heavy", "light")

@@ -1,4 +1,4 @@
-"""Section 13: conservation laws, symmetries, reversal; all of them for every trajectory."""
+"""Section 13 of the report: conservation laws, symmetries and time reversal of trajectories."""
 
 from collections.abc import Iterator
 from math import sqrt
@@ -29,14 +29,14 @@ ROUND = Member(
 
 
 def spin_drift(run: Run) -> float:
-    """Largest change of the angular momentum about the centre, over sum m |x| |v|."""
+    """Return the largest change of the angular momentum about the centre, over sum m |x| |v|."""
     x, v, spin = run.position[0], run.velocity[0], angular_momentum(run)
     scale = np.sum(run.mass * np.linalg.norm(x, axis=1) * np.linalg.norm(v, axis=1))
     return float(np.max(np.abs(spin - spin[0])) / scale)
 
 
 def energy_drift(run: Run) -> float:
-    """Largest relative change of the energy."""
+    """Return the largest relative change of the energy."""
     energy = run.observable("total_energy").value
     return float(np.max(np.abs(energy / energy[0] - 1)))
 
@@ -45,7 +45,7 @@ def energy_drift(run: Run) -> float:
 
 
 def start(count: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Places on a shaken square grid and velocities with kT = 1, at rest as a whole."""
+    """Return positions on a perturbed square lattice, and velocities with kT = 1 and no drift."""
     rng = np.random.default_rng(13)
     columns = int(sqrt(count))
     x, y = np.meshgrid(*2 * [(np.arange(columns) + 0.5) / columns])
@@ -69,7 +69,7 @@ def explicit(
 
 
 PLACES, VELOCITIES = start(100, 0.025)
-SHORT = 0.085  #: about 2 collisions per disk at packing 0.2
+SHORT = 0.085  #: about 2 collisions per disk at a packing fraction of 0.2
 BOOST = np.array([0.75, -0.5])
 ORDER = np.random.default_rng(5).permutation(100)
 PLAIN, BOOSTED = (
@@ -82,7 +82,7 @@ LISTED, RELABELLED = (
 
 
 def boost_error(run: Run, boosted: Run) -> float:
-    """Largest difference of places (shifted back) and collision times."""
+    """Return the largest difference of collision times and of positions after shifting back."""
     if len(run.event_log().time) < 90:
         raise ValueError("too few collisions")
     apart = boosted.unwrapped(-1) - BOOST * SHORT - run.unwrapped(-1)
@@ -91,7 +91,7 @@ def boost_error(run: Run, boosted: Run) -> float:
 
 
 def label_error(run: Run, relabelled: Run) -> float:
-    """Largest difference of places and event times."""
+    """Return the largest difference of positions and event times."""
     apart = relabelled.position[-1] - run.position[-1][ORDER]
     times = relabelled.event_log().time - run.event_log().time
     return float(max(np.max(np.abs(apart)), np.max(np.abs(times))))
@@ -108,21 +108,21 @@ SAMPLES = 30
 
 
 def onward(run: Run) -> str:
-    """The same run, but stopped between events, at nine tenths of its time."""
+    """Return the input of the same run that stops between events, at nine tenths of its time."""
     return explicit(
         run.position[0], run.velocity[0], float(run.radius[0]), 0.9 * run.time[-1], periodic=False
     )
 
 
 def backward(run: Run) -> str:
-    """The run with all velocities reversed at its end, for the same time."""
+    """Return the input of a run from the final state with reversed velocities, as long as `run`."""
     return explicit(
         run.position[-1], -run.velocity[-1], float(run.radius[0]), run.time[-1], periodic=False
     )
 
 
 def there_and_back(count: int, radius: float, tau: int) -> Iterator[Member]:
-    """Runs of about `tau` collisions per disk, each before its reversal."""
+    """Return pairs of runs: one of about `tau` collisions per disk, then its reversal."""
     longer = {"collisions": round(tau / 0.9 * count / 2)}
     for timed in gases(SAMPLES, count, radius=radius, temperature=1.0, stop=longer):
         there = Member(onward, (timed,))
@@ -130,7 +130,7 @@ def there_and_back(count: int, radius: float, tau: int) -> Iterator[Member]:
 
 
 def return_errors(*runs: Run) -> np.ndarray:
-    """Log10 of the rms distance from the start, mean over `SAMPLES` pairs of runs."""
+    """Return log10 of the rms distance from the start, averaged over `SAMPLES` pairs of runs."""
     errors = [
         np.log10(np.sqrt(np.mean(np.sum((back.position[-1] - there.position[0]) ** 2, axis=1))))
         for there, back in zip(runs[::2], runs[1::2], strict=True)

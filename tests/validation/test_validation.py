@@ -1,4 +1,4 @@
-"""The quick part of the validation with every `make test`, and that its verdicts can be trusted."""
+"""Run the quick part of the validation in `make test`, and test its verdicts."""
 
 import json
 import re
