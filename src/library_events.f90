@@ -75,8 +75,8 @@ contains
     if (n > 0) records(:, :n) = session%log%record(:, session%log%n - n + 1:session%log%n)
   end function last_events
 
-  !> See ricochet.h. The collisions are found by advancing a copy of the simulation, because a disk may collide twice, or a kick may
-  !> change its velocity before its next collision.
+  !> See ricochet.h. The collisions are found by advancing a copy of the simulation, because before the next collision of a disk its
+  !> partner may collide with other disks, or a kick may change its velocity.
   function next_events(handle, most, records) bind(C, name="ricochet_next_events") result(n)
     type(c_ptr), value :: handle
     integer(c_int), value :: most

@@ -1,5 +1,5 @@
-!> Sets up a run from an input file: reads and checks the input, creates the initial state, translates words of the input into
-!> types, and starts the threads. Only this module depends on all searches and all kinds of dynamics.
+!> Sets up a run from an input file: reads and checks the input, creates the initial state, creates the objects that the input
+!> selects, and starts the threads. Only this module depends on all searches and all kinds of dynamics.
 module run_setup
   use errors, only: error_t
   use event_driven, only: event_driven_t

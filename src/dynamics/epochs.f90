@@ -17,8 +17,8 @@ module epochs
   integer(int64), parameter :: epoch_length = 24
   !> Significant bits of the length of an epoch; with so few bits, sums of lengths are exact.
   integer, parameter :: significant_bits = 20
-  !> A collapse is reported when the number of events since the last advance of the time reaches the first number, and the number of
-  !> these events per disk reaches the second number.
+  !> Numbers of events without an advance of the time, in total and per disk, at which a collapse is reported. Both numbers must be
+  !> reached.
   integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
   real(real64), parameter :: shortest = 2.0_real64**(-20)  !! shortest epoch in units of `negligible_time`
   real(real64), parameter :: last_time = 0.5_real64*never

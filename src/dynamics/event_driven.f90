@@ -158,7 +158,7 @@ contains
         call fail(error, exit_broken, "a time became NaN: "//encounter_text(sim, event%disk, event%partner))
         return
       end if
-      self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! in a sheared box the images move without end
+      self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! in a sheared box images move forever
       if (limits%time < last_time) sim%now = max(sim%now, limits%time)
       self%arrived = .true.
       return
@@ -194,8 +194,8 @@ contains
     end subroutine read_ahead
   end subroutine advance
 
-  !> Hot path: executes one event after another until the number of events is `last_count`, a time limit is reached, or a number of
-  !> iterations is used. The caller does all work that is rarely needed.
+  !> Hot path: executes one event after another. The loop ends when the number of events reaches `last_count`, when the next event
+  !> is later than the time limit, or when all allowed iterations have been used. The caller does all work that is rarely needed.
   subroutine run_events(self, sim, t_limit, iterations, event, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -284,8 +284,8 @@ contains
     end associate
   end subroutine follow_side
 
-  !> Predicts the events of the disks in the strip (see `piston_strips`) that a piston enters, and of the disks in the strip that it
-  !> leaves.
+  !> Predicts the events of the disks in the strip that a piston leaves and of the disks in the strip that the piston enters. A
+  !> strip consists of the cells that a piston can reach soon: see `piston_strips`.
   subroutine follow_piston(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

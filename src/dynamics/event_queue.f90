@@ -33,7 +33,7 @@ module event_queue
     real(real64) :: width = never                  !! width of a window [time]
     real(real64) :: per_time = 0.0_real64          !! number of windows per time, 1/width
     real(real64) :: next_window = 1.0_real64       !! window + 1
-    integer(int64) :: n_taken = 0                  !! number of events taken from the queue since all events were last entered
+    integer(int64) :: n_taken = 0                  !! number of events removed from the queue since all events were last entered
     real(real64) :: filled_at = 0.0_real64         !! time when all events were last entered [time]
   contains
     procedure :: fill
@@ -395,8 +395,8 @@ contains
     end do
   contains
 
-    !> Whether the width of the windows has proved far too small or too large since all events were last entered, and enough windows
-    !> have passed to justify entering all events again.
+    !> Whether all events should be entered again with another width of the windows: the present width has proved far too small or
+    !> too large, and enough windows have passed since all events were last entered.
     pure function ill_fitting() result(yes)
       logical :: yes
       real(real64) :: per_window

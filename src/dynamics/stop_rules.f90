@@ -106,8 +106,8 @@ contains
       yes = relative_energy(sim) < coldest*sim%reference_energy
   end function too_cold
 
-  !> Whether a run is finished: a rule is met, rounding errors dominate, or no event will occur any more and the run has no time
-  !> limit. Failures are errors of `timeline` or of the evolution.
+  !> Whether a run is finished. A run is finished when a stop rule is met, when rounding errors dominate, or, if the run has no time
+  !> limit, when no event will occur any more. Failures are not tested here, because `timeline` and the evolution report them.
   pure function is_over(self, sim, evolution) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

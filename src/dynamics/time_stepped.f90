@@ -1,6 +1,6 @@
-!> Time-stepped dynamics: exact free flight over a fixed step; then each disk beyond a wall is reflected, and each pair of disks
-!> that overlap and approach each other collides once. A contact is detected up to one step late, and a contact that begins and ends
-!> within a step is not detected. The method serves for comparisons with event-driven dynamics.
+!> Time-stepped dynamics. In each step of fixed length all disks first move in exact free flight. Then each disk beyond a wall is
+!> reflected, and each pair of disks that overlap and approach each other collides once. A contact is detected up to one step late,
+!> and a contact that begins and ends within a step is not detected. The method serves for comparisons with event-driven dynamics.
 !>
 !> As in event-driven dynamics, the stored state of a disk changes only when this disk collides, so that rounding errors do not
 !> accumulate from step to step.

@@ -37,7 +37,7 @@ contains
     end do
   end subroutine advance
 
-  !> Advances until a limit is reached, a kick is due, or the epoch ends, and executes the kick or the change of epoch. The
+  !> Advances until a limit is reached, a kick is due, or the epoch ends. Then executes the kick or starts the next epoch. The
   !> trajectory does not depend on the times at which the procedure returns.
   subroutine advance_once(evolution, sim, limits, error, log)
     class(evolution_t), intent(inout) :: evolution

@@ -105,9 +105,9 @@ contains
   end function hdf5_version
 
   !> Initialises the HDF5 library, once per process, because each initialisation leaks memory. The library is set up to print no
-  !> errors and to install no exit handler. At the exit of the program the files have been closed, or they could not be closed
-  !> because the disk is full; in the latter case the handler would crash. External links are disabled, because they could refer to
-  !> devices or to files of other users.
+  !> errors and to install no exit handler. The exit handler is not needed, because the program closes all files before it exits. If
+  !> a file cannot be closed because the disk is full, the exit handler would crash. External links are disabled, because they could
+  !> refer to devices or to files of other users.
   subroutine start_library(status)
     integer, intent(out) :: status
     logical, save :: started = .false.

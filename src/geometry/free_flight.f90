@@ -1,5 +1,5 @@
-!> Kinematics of free flight as pure functions: the position of a disk after some time, and the time until it touches a line or a
-!> circle. Times are relative to the time of the state that is passed as argument. Contacts of two disks are predicted in
+!> Kinematics of free flight as pure functions: the position of a disk after some time, and the time until a disk touches a line or
+!> a circle. Times are relative to the time of the state that is passed as argument. Contacts of two disks are predicted in
 !> `neighbour_search`.
 module free_flight
   use kinds, only: never, real64
@@ -64,8 +64,8 @@ contains
   end function time_to_line
 
   !> Time until the centre of a disk reaches a circle of radius rho around the origin, from outside or, with `inside`, from inside.
-  !> The result is 0 if the disk is already on the circle, or beyond the circle because of rounding, and moves further in this
-  !> direction.
+  !> If the disk is already on the circle (or beyond the circle because of rounding) and moves further in this direction, the result
+  !> is 0.
   pure function time_to_circle(d, v, g, rho, inside, within) result(s)
     real(real64), intent(in) :: d(2)      !! centre of the disk relative to the centre of the circle [length]
     real(real64), intent(in) :: v(2)      !! [length/time]

@@ -2,8 +2,8 @@
 !> this module.
 !>
 !> In a sheared box (Lees and Edwards, J. Phys. C 5, 1921 (1972)) the image above the box moves along x. The position of an image
-!> depends on the time alone: it follows from its displacement at the epoch and its velocity. The separation of two disks through an
-!> image is therefore a function of their states and of the time.
+!> depends on the time alone: it follows from its displacement at the epoch and its velocity. The separation of a disk from an image
+!> of another disk is therefore a function of the states of the two disks and of the time.
 module images
   use kinds, only: never, real64
   implicit none
@@ -77,8 +77,8 @@ contains
     n = product(2*self%reach() + 1)
   end function count_around
 
-  !> Largest index of images in reach, along each axis. Two disks in the box can touch only through these images until one of
-  !> them passes a side, or until the time `valid_until`.
+  !> Largest index of images in reach, along each axis. Until the time `valid_until`, two disks in the box can touch only in these
+  !> images, unless one of the two disks passes a side before.
   pure function reach(self)
     class(images_t), intent(in) :: self
     integer :: reach(2)

@@ -16,8 +16,8 @@ module side_motion
   integer, parameter, public :: still = 1, sine = 2, parabolic = 3, sawtooth = 4, constant_velocity = 5, piston = 6
   !> Angle below which a series is used, because differences would suffer from cancellation [radian]
   real(real64), parameter :: small_angle = 0.5_real64
-  !> A time interval, as a fraction of a period. An acceleration that acts for a shorter time does not change the gap within its
-  !> precision.
+  !> A time interval, as a fraction of a period. The effect on the gap of an acceleration that acts for a shorter time is smaller
+  !> than the rounding error of the gap.
   real(real64), parameter :: negligible = 1.0e-10_real64
   !> Number of successive intervals that together exceed a period, even if some of them are negligible.
   integer, parameter :: intervals_in_reach = 6
@@ -95,8 +95,9 @@ contains
     if (self%kind == piston) speed = sqrt(2*abs(self%pull)*self%amplitude)
   end function highest_speed
 
-  !> Local time of the motion at the time epoch + t of the run: the time since the start of the period, of the motion at constant
-  !> velocity, or of the free flight of a piston. The remainders are exact, so that the precision does not decrease at late times.
+  !> Local time of the motion at the time epoch + t of the run. The local time is measured from the start of the present period or,
+  !> for other motions, from the start of the motion at constant velocity or of the present free flight of a piston. The remainders
+  !> are exact, so that the precision does not decrease at late times.
   elemental function local_time(self, epoch, t, state) result(tau)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! [time]

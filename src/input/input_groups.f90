@@ -12,8 +12,9 @@ module input_groups
   integer, parameter :: text_length = 512      !! longest text value, in bytes
   integer, parameter, public :: most_written = 100      !! largest number of values in an assignment; longer lists are truncated
 
-  !> One variable. Real numbers are stored in `reals`, all other values in `texts`: integers as digits, so that all 64 bits are
-  !> represented, and logicals as `.true.` or `.false.`. If the variable has no value, neither component is allocated.
+  !> One variable. Real numbers are stored in `reals`, and all other values in `texts`. The text of an integer consists of its
+  !> digits, so that all 64 bits are represented. The text of a logical is `.true.` or `.false.`. If the variable has no value,
+  !> neither component is allocated.
   type :: value_t
     integer :: row = 0                         !! row in the table of variables
     character(len=name_length) :: name = ""

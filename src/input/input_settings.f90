@@ -264,8 +264,8 @@ contains
 
   contains
 
-    !> Reports sampling times that are all later than the end of the run, and columns of frames that are named twice or that no disk
-    !> of this run has.
+    !> Reports sampling times that are all later than the end of the run, and columns of frames that the input names twice or that
+    !> do not exist in this run.
     subroutine check_samples()
       character(len=*), parameter :: late = "no sample would be taken until stop.time"
       integer :: g, k

@@ -44,8 +44,8 @@ module checkpoint
 
 contains
 
-  !> A text that identifies the program and the properties of a build that can affect the bits of its results: the version of
-  !> checkpoints, and compiler flags that permit inexact arithmetic.
+  !> A text that identifies the program. It contains the version of checkpoints, and the compiler flags that permit inexact
+  !> arithmetic and can therefore change the results.
   pure function program() result(text)
     character(len=:), allocatable :: text
 
@@ -81,7 +81,7 @@ contains
   end function fixed_input
 
   !> Adds the overrides of the original command line whose variables must not change on `--resume`, so that users need not repeat
-  !> them.
+  !> these overrides.
   subroutine recall_overrides(output, overrides, error)
     character(len=*), intent(in) :: output                       !! path of the output
     !> in: GROUP.VARIABLE=VALUE of the present command line; out: these and the overrides from the file.

@@ -258,8 +258,8 @@ contains
     end do
   end subroutine describe_table
 
-  !> Writes the geometry of all obstacles in the groups of one name, in the order of their codes, and the number of the group of
-  !> each. These data are needed if a group describes several obstacles by a file or a polyline.
+  !> Writes a table of all obstacles in the groups of one name, in the order of their codes. The table contains the geometry of each
+  !> obstacle and the number of its group. These data are needed if a group describes several obstacles by a file or a polyline.
   subroutine describe_rows(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)

@@ -13,8 +13,8 @@ module domain_borders
 
 contains
 
-  !> Determines whether the disks that the k-th domain owns can have touched a disk with a wrong or missing history, and lists the
-  !> corrections for the copies of this domain. The procedure reads the states of the neighbouring domains.
+  !> Determines whether a disk that the k-th domain owns can have touched a disk whose history in this domain is wrong or missing.
+  !> Also lists the corrections for the copies in this domain. The procedure reads the states of the neighbouring domains.
   subroutine compare_copies(domain, k)
     type(domain_t), intent(inout) :: domain(:)
     integer(int32), intent(in) :: k

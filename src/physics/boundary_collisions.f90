@@ -120,9 +120,10 @@ contains
     if (sim%features%rotation) sim%extra(i)%spin = sqrt(temperature/sim%inertia_of(i))*normals(2)
   end subroutine draw_thermal_velocity
 
-  !> Separates disk i from a surface on which it rests. With restitution 0 there is no normal velocity that the TC model could
-  !> conserve, and infinitely many collisions would follow at the same time. The normal velocity of the disk is therefore set such
-  !> that its next contact is 0.4 to 0.8 contact durations later.
+  !> Separates disk i from a surface on which it rests. With restitution 0 the normal velocity of the disk vanishes in the first
+  !> collision, so that the elastic collisions of the TC model would not separate the disk from the surface, and infinitely many
+  !> collisions would follow at the same time. The normal velocity of the disk is therefore set such that its next contact is 0.4 to
+  !> 0.8 contact durations later.
   pure subroutine separate_from_surface(sim, i, code, normal)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code

@@ -10,8 +10,8 @@ module collisions
   character(len=*), parameter :: wall_rules = "velocity normal"
   integer, parameter :: normal_rule = 2              !! position of the rule 'normal', which applies to smooth walls
 
-  !> Names in the input of the laws by which the restitution depends on the impact velocity, and the coefficient c of `speed_law_t`
-  !> in each law. In the series for viscoelastic spheres c is 3/5.
+  !> Names of the laws by which the restitution depends on the impact velocity, as in the input. For each law `series_terms`
+  !> contains the coefficient c of `speed_law_t`, which is 3/5 for viscoelastic spheres.
   character(len=*), parameter :: restitution_laws = "constant power viscoelastic"
   real(real64), parameter :: series_terms(3) = [0.0_real64, 0.0_real64, 0.6_real64]
 

@@ -210,8 +210,9 @@ contains
     call remove_residual_approach(sim, i, j)
   end subroutine apply_tangential_impulse
 
-  !> Change of the momentum of disk i in a collision with a surface or with disk j. If disk i is far heavier than its partner, its
-  !> velocity change is dominated by rounding, and the momentum lost by the partner is used.
+  !> Change of the momentum of disk i in a collision with a surface or with disk j. If disk i is far heavier than its partner,
+  !> rounding errors dominate the velocity change of disk i. In this case the momentum change is computed as the momentum that the
+  !> partner loses.
   pure function momentum_change(sim, i, j, v, w) result(change)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
@@ -417,7 +418,7 @@ contains
     end associate
   end subroutine pass_sheared_boundary
 
-  !> Disk i, its partner and the time, as a text for messages.
+  !> A text for messages that states disk i, its partner and the time.
   pure function encounter_text(sim, i, code) result(text)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code           !! index of the disk and code of its partner: see `partners`

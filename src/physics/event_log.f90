@@ -11,8 +11,8 @@ module event_log
     !> Largest number of entries; the dynamics returns to the caller when the log reaches it.
     integer :: most = huge(0)
     integer :: n = 0                              !! number of entries
-    !> (6, at least n) Time since the start of the run, ids i and j in the order of the input, and the momentum change of disk
-    !> i: magnitude and two components [mass length/time]. For a wall, j is the code of the surface: see `partners`.
+    !> (6, at least n) Time since the start of the run, ids i and j in the order of the input, and the magnitude and the two
+    !> components of the momentum change of disk i [mass length/time]. For a wall, j is the code of the surface: see `partners`.
     real(real64), allocatable :: record(:, :)
   contains
     procedure :: append

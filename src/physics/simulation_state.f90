@@ -14,8 +14,8 @@ module simulation_state
   private
   public :: specification_t, simulation_t, system_t
 
-  !> Factors for the bounds of sums: the largest factor by which terms usually exceed the typical terms of the heaviest disks, and
-  !> the corresponding factor for the lightest disks.
+  !> Factors for the bounds of sums. The bound of a sum is the smaller of two products: `common` times a typical term of the
+  !> heaviest disks, and `rare` times a typical term of the lightest disks.
   real(real64), parameter :: common = 2.0_real64**7, rare = 2.0_real64**22
   !> The work of walls and kicks may be far less than their parameters suggest, and it is zero before they first act. The units of
   !> sums are therefore refined by this factor, so that they also resolve the energies of the undriven disks.
@@ -49,7 +49,7 @@ module simulation_state
     ! For the detection of a collapse, an infinite series of events during which time does not advance:
     real(real64) :: negligible_time = 0.0_real64  !! time in which no disk moves noticeably; 0 if it is not known yet [time]
     real(real64) :: last_advance = 0.0_real64     !! time of the last advance by more than `negligible_time`, since the epoch [time]
-    integer(int64) :: events_then = 0             !! number of events at the time `last_advance`
+    integer(int64) :: events_then = 0             !! number of events that had been executed at the time `last_advance`
     integer(int64) :: kicks = 0                   !! number of kicks since the start of the run
     integer(int64) :: changes = 0                 !! number of changes to forces, laws or velocities since the start of the run
     type(tally_t) :: tally                        !! counters and sums since the start of the run
@@ -367,8 +367,8 @@ contains
     end do
   end function mean_square_speed
 
-  !> Chooses the units of the sums from the most common terms: the terms of disks with the mean square speed, or the terms that
-  !> walls and kicks usually produce. If masses differ widely, terms of the lightest disks are still summed with 40 binary digits.
+  !> Chooses the units of the sums according to the sizes of typical terms, which are the terms of disks with the mean square speed
+  !> or the terms from walls and kicks. If masses differ widely, terms of the lightest disks are still summed with 40 binary digits.
   !> Terms of the heaviest disks may exceed the bound of `exact_sum_t`; the addition of such rare terms takes slightly longer.
   pure subroutine choose_units(self)
     class(simulation_t), intent(inout) :: self

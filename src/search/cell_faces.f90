@@ -43,7 +43,7 @@ module cell_faces
     procedure :: equals
   end type patch_t
 
-  !> A line parallel to an axis that limits a cell: a face of a column or row of cells, or a side of the box.
+  !> A line that limits a cell and is parallel to an axis: a face of a column or row of cells, or a side of the box.
   type :: line_t
     real(real64) :: place = 0.0_real64             !! position of the face or side [length]
     !> Distance from the line at which the event of a disk occurs, in radii: 0 for a face, 1 for a side.

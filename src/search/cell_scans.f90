@@ -1,5 +1,5 @@
-!> Finds contacts that the simple scan of nine cells does not include: contacts with disks of crowded cells, with disks across a
-!> periodic side, and with single disks.
+!> Finds contacts that the simple scan of nine cells does not find: contacts with disks in the linked lists of crowded cells, with
+!> disks across a periodic side, and with given disks.
 module cell_scans
   use kinds, only: int16, int32, int64, real64
   use box_geometry, only: find_image_contact

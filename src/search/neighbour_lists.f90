@@ -436,8 +436,8 @@ contains
   end subroutine neighbour
 
   !> Prefetches the data that are needed to predict the events of some disks. The first stage prefetches the records of the disks,
-  !> the second stage their lists, and the third stage the disks in these lists. The data of their collision partners are prefetched
-  !> one stage later.
+  !> the second stage their lists, and the third stage the disks in these lists. For the collision partner of each disk the same
+  !> data are prefetched one stage later.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(neighbour_lists_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)

@@ -121,8 +121,8 @@ contains
       p = min(max(voxels%origin + (voxels%column_row(:, chosen(voxels, attempt)) + attempt%place)*voxels%side, lower), upper)
     end function place
 
-    !> Prefetches data for the next attempts: the voxel of the attempt that was drawn last, and the cells and disks around the
-    !> attempts that were drawn earlier. Prefetching saves time if the data of the disks do not fit into the cache, because
+    !> Prefetches data for the next attempts: the voxel for the attempt that was drawn last, and cells and disks near the points of
+    !> the attempts that were drawn earlier. Prefetching saves time if the data of the disks do not fit into the cache, because
     !> consecutive attempts read different parts of memory.
     subroutine load_ahead()
       associate (far => coming(modulo(attempts - 1, drawn_ahead)), near => coming(modulo(attempts + 3, drawn_ahead)), &

@@ -1,4 +1,4 @@
-!> The type of a row of the table of `variables`, ranges of numbers, and limits that users of the program need to know.
+!> Definitions for the table of `variables`: the type of its rows, and ranges and limits of numbers.
 module variable_rows
   use kinds, only: real64
   implicit none
