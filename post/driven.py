@@ -112,7 +112,7 @@ def temperature_law(run: Run) -> np.ndarray | float | None:
 
 
 def only_moving(run: Run, motion: str) -> int | None:
-    """Return the number of the moving side of a box of equal elastic disks.
+    """Return the index of the moving side of a box of equal elastic disks.
 
     The result is None unless exactly one side moves.
     """

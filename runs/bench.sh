@@ -43,10 +43,10 @@ state() {
   input "$work/$name.nml" "placement = 'file', file = '$work/$name.h5', velocities = 'file'" "$@"
 }
 
-# gas DISKS PACKING: makes the state of equal disks.
+# gas DISKS PACKING: makes a state of equal disks at this packing fraction.
 gas() { state "gas_$1_$2" "name = 'gas', count = $1, packing_fraction = $2"; }
 
-# polydisperse DISTRIBUTION DISKS PACKING: makes the state of disks whose radii differ by up to a factor of 9.9.
+# polydisperse DISTRIBUTION DISKS PACKING: makes a state of disks whose radii differ by up to a factor of 9.9.
 polydisperse() {
   local spread=0.472
   [ "$1" = lognormal ] && spread=0.398
@@ -60,7 +60,7 @@ run() {
   "${run_by[@]}" "$program" "$work/$name.nml" -o "$work/bench.h5" --force --quiet --set "stop.collisions=$collisions" "$@"
 }
 
-# rate NAME COLLISIONS [OPTION...]: prints the million collisions per second of one run.
+# rate NAME COLLISIONS [OPTION...]: prints the number of collisions per second of one run, in millions.
 rate() {
   run_by=("${one_core[@]}")
   run "$@" | awk '$1 == "collisions_per_second" { print $3/1e6 }'
@@ -70,7 +70,7 @@ median() { sort -g | awk '{ r[NR] = $1 } END { printf "%.3f", r[int((NR + 1)/2)]
 
 repeated() { local k; for ((k = 0; k < repeats; k++)); do "$@"; done; }
 
-# --- Rates by number and packing -------------------------------------------------------------------
+# --- Rates for several numbers of disks and packing fractions -------------------------------------------------------------------
 
 samples() { echo "output.observables_every_collisions=$((5 * $1))"; }      # for this number of disks
 

@@ -3,8 +3,8 @@
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 # Each parameter has ten values, with eight beds (seeds) for each value. The other three parameters have their base values: mass 25,
-# speed 5, radius 5, restitution 0.5. Without an energy scale the result cannot depend on the speed; the contact time is
-# proportional to 1/speed, so that this remains exact.
+# speed 5, radius 5, restitution 0.5. Because hard disks have no energy scale, the crater does not depend on the speed. The contact
+# time of the TC model is proportional to 1/speed, because a constant contact time would introduce such a scale.
 member() { # mass speed radius restitution seed
   local contact_time
   contact_time=$(awk -v v="$2" 'BEGIN { printf "%.17g", 5e-5 / v }')

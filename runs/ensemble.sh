@@ -317,8 +317,8 @@ tell_kill() {
   printf '%skilled by signal %d%s, %(%FT%T%z)T on %s\n' "$given_up" "$(($1 - 128))" "$how" -1 "$host"
 }
 
-# Opens a member's log with the file descriptor `lock`. The file must be ordinary, have only one name, and be the same as the opened
-# one.
+# Opens a member's log with the file descriptor `lock`. The log must be an ordinary file with a single name, and its path must still
+# refer to the opened file.
 open_log() {
   may_be_ours "$1" && { exec {lock}>>"$1"; } 2>/dev/null || return
   [[ ! -L $1 && $1 -ef /dev/fd/$lock && $(stat -L -c %h "/dev/fd/$lock") == 1 ]] && return
@@ -430,7 +430,7 @@ count_reply() {
   esac
 }
 
-# WHO HOW WHY
+# failure MEMBER HOW REASON: counts a failed member and reports the failure.
 failure() {
   failed=$((failed + 1))
   failures+=("$1$2: ${3:-no message in its log}")

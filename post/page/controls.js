@@ -147,7 +147,7 @@ function fromAddress() {
 // ---------- mouse and fingers on the stage ----------
 
 const pointers = new Map();  // fingers or mouse buttons that are down
-let moved = 0;               // how far they have moved [pixels]
+let moved = 0;               // distance that they have moved [pixels]
 
 const onStage = ({ clientX, clientY }) => {
   const box = $('stage').getBoundingClientRect();

@@ -6,7 +6,7 @@ const $ = id => document.getElementById(id);
 let film, disks, kinds;         // the facts of the film; the number of disks; the species
 let speciesOf, sizeOf, masses;  // of each disk: number of its species, number of its size, mass
 let X, Y, VX, VY;               // positions and velocities at the present moment; positions are wrapped into a periodic box
-let UX, UY, HITS;               // positions that are continuous since the frame before; events since that frame
+let UX, UY, HITS;               // positions that are continuous since the previous frame; events since that frame
 let angles;                     // orientations at the present moment, if the disks have any
 let source;                     // where frames and events come from: a file or a worker
 let past = [];                  // the frames: time, position and velocity (x1 y1 x2 y2 ...), angle, periods crossed since the first frame, ...

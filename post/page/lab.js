@@ -7,7 +7,7 @@ const lab = JSON.parse($('data').textContent);  // the table of variables by gro
 const state = {
   input: null, groups: [],   // the input (name, title, sliders, ...); the groups of its file with kind, address and values
   settings: {}, added: [],   // variables that the form changes, with their texts; groups that are not in the file: [kind, name]
-  has: {},                   // the settings that the run has taken over
+  has: {},                   // the settings of the present run
   waiting: {},               // variables with a text that was refused: the text and the message
   runs: 0,                   // number of runs so far
   boxes: [],                 // kept runs { figure, frame, letter, words, run, shown }, and the present one at the end

@@ -3,7 +3,7 @@
 const layers = ['ground', 'disks', 'marks'].map($);
 const [ground, disksBrush, marks] = layers.map((layer, k) => layer.getContext('2d', { willReadFrequently: k === 1 }));
 let ink;                       // the colours of the theme
-let picture, pixels, palette, paper;  // image of the disks; its pixels as integers; colours of disks and of the ground as such integers
+let picture, pixels, palette, paper;  // image of the disks; its pixels as integers; colours of disks and of the ground in the same format
 let radii;                     // of each size [pixels]
 let groundShown, marked;       // the view for which the ground was drawn; whether the layer of marks contains marks
 

@@ -28,7 +28,7 @@ class System(NamedTuple):
     table: np.ndarray
     disks: int
     events: int
-    draw: "Draw"  #: draws more that fits, for changes
+    draw: "Draw"  #: used to draw changes that are valid for the system
 
     def features(self) -> set[str]:
         """Return the random choices: variables, kinds, and boundary conditions."""
@@ -371,7 +371,7 @@ class Draw:
         on_walls = max(self.least, rng.choice([0, 1, 0.9, rng.random()]))
         words += self.maybe(0.5, f"wall_restitution = {on_walls}")
         if min(restitution, on_walls) < 1 and (any(self.periodic) or on_walls == 0):
-            self.drifts = True  # or comes to rest: without a time the run ends at some sample
+            self.drifts = True  # or all disks come to rest
         if self.least or self.chance(0.2):
             self.drifts = True  # events become rarer, so that the last one may require a long time
             words += f" restitution_law = '{'viscoelastic' if self.least else 'power'}'"

@@ -15,7 +15,7 @@ from .case import AT_MOST, Case, Member, relative, sigmas, within
 from .estimators import at_collisions, middle, over
 from .inputs import PERIODIC, gases, light_and_heavy
 
-LEAST = 1.63  #: times 1/sqrt(n): a larger distance has a probability below 1 %
+LEAST = 1.63  #: KS distance times sqrt(n); larger values have a probability below 1 %
 
 
 def after(run: Run, tau: float) -> slice:

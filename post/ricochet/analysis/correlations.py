@@ -246,7 +246,7 @@ class Correlator:
 
 
 def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield the positions (continuous in time) and velocities at these times as far as possible."""
+    """Yield positions, continuous in time, and velocities at the times that the run contains."""
     if isinstance(source, Simulation):
         box = source.parameters["box"]
         edges = np.subtract(box["upper"], box["lower"])

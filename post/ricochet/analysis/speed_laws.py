@@ -27,8 +27,9 @@ BINS = 30  # of equal probability
 DRAWN = 4000  # drawn samples
 MOST = 1000  # speeds of a drawn sample; more have the same distribution of the scaled statistics
 MANY = 2000  # number of disks above which the motion of the centre of mass is negligible
-#: Excess of an inefficiency times the root of the frames: one standard deviation of the noise of
-#: cumulative counts, of which two are independent, and two of the counts in all bins.
+#: Thresholds for the excess of a statistical inefficiency over 1, times the square root of the
+#: number of frames: one standard deviation of its noise for cumulative counts, of which two are
+#: independent, and two standard deviations for the counts in all bins.
 LEAST_DISTANCE, LEAST_CHI2 = 1.4, 4 / np.sqrt(BINS - 1)
 TAIL = 0.05  # fraction of the samples that an exponential tail replaces
 

@@ -1,7 +1,7 @@
 """Means with errors, fits, and goodness-of-fit tests.
 
-There are two kinds of error: `estimate` is for independent values, such as runs that differ by
-their seed; `correlated_mean` is for one series in time, whose samples are correlated.
+Errors are computed in two ways: by `estimate` for independent values, such as runs that differ by
+their seed, and by `correlated_mean` for a single series in time, whose samples are correlated.
 """
 
 from collections.abc import Callable, Sequence

@@ -184,7 +184,7 @@ class Live:
 
 
 def abandoned(lock: Path) -> bool:
-    """Return whether a lock file exists that no process holds, because the program was killed.
+    """Return whether the program was killed: a lock file exists, but no process holds the lock.
 
     A free lock is acquired for a moment only.  If the file system has no locks, the result is
     False.

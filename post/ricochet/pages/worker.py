@@ -514,8 +514,8 @@ def scan(request: dict) -> None:
 def measure(text: str, lines: list[str], name: str) -> tuple[float, float | None]:
     """Measure the time average of an observable, or the rate of one of `COUNTED`, with its error.
 
-    The second half of `SCAN_SAMPLES` samples is used, which are half a collision per disk apart.
-    An error is returned only if the run relaxes to equilibrium.
+    The samples are half a collision per disk apart, and the second half of `SCAN_SAMPLES` samples
+    is used. An error is returned only if the run relaxes to equilibrium.
     """
     samples, began = [], time.perf_counter()
     with Simulation._of(text, lines) as simulation:
