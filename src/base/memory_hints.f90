@@ -1,5 +1,5 @@
 !> Hints about memory that Fortran cannot express. Hints affect only the speed of a run, never its results. The C file with the same
-!> name contains the parts that depend on the compiler and the system. Without this file a prefetch has no effect.
+!> name contains the parts that depend on the compiler and the system. Without the C file a prefetch has no effect.
 module memory_hints
   use, intrinsic :: iso_c_binding, only: c_double, c_int32_t
   implicit none

@@ -30,8 +30,8 @@ module random_stream
 
 contains
 
-  !> Starts the stream of a seed and a key. Streams with different keys are independent, so that drawing
-  !> more numbers for one purpose never changes the numbers for another.
+  !> Starts the random stream that belongs to a seed and a key. Streams with different keys are independent, so that drawing more
+  !> numbers for one purpose never changes the numbers for another.
   pure subroutine seed(self, number, key)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(in) :: number        !! seed from the input; any value is allowed

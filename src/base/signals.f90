@@ -43,7 +43,8 @@ module signals
 contains
 
   !> From this call on, a stop signal ends the program immediately, with the given message and exit status. A signal that was
-  !> recorded before has the same effect. This mode is used while no data can be lost.
+  !> recorded before this call also ends the program. This mode is used in parts of the program in which a sudden end cannot lose
+  !> data.
   subroutine end_at_signals(message, code)
     character(len=*), intent(in) :: message
     integer, intent(in) :: code                        !! exit status

@@ -17,7 +17,7 @@ module system
   character(len=20), parameter :: kinds_of_files(*) = [character(len=20) :: "nothing", "a file", "a folder", &
     "a symbolic link", "a pipe or a device", "hidden by the system"]
 
-  !> Results of `c_lock` other than a descriptor.
+  !> Results of `c_lock` if no lock was acquired: another run holds the lock, the file is not a lock file, or a system call failed.
   integer(c_int), parameter :: taken = -1, foreign = -3, failed = -4     ! -2: the file system has no locks
 
   !> A lock on the output of a run. The operating system releases the lock when the process ends, for whatever reason.
@@ -139,7 +139,7 @@ module system
   procedure(path_call), bind(C, name="system_find_folder") :: c_find_folder
   procedure(path_call), bind(C, name="system_make_folder") :: c_make_folder
   procedure(path_call), bind(C, name="system_what_is") :: c_what_is   !! returns an index of `kinds_of_files`
-  procedure(path_call), bind(C, name="system_lock") :: c_lock         !! returns a descriptor or one of the numbers above
+  procedure(path_call), bind(C, name="system_lock") :: c_lock         !! returns a descriptor, or a negative number: see `taken`
   procedure(path_call), bind(C, name="system_print") :: c_print
   procedure(path_call), bind(C, name="unlink") :: c_unlink
   procedure(size_call), bind(C, name="system_free_bytes") :: c_free_bytes     !! free space on the disk that contains a folder
@@ -327,7 +327,7 @@ contains
     text = buffer(:index(buffer, c_null_char) - 1)
   end function last_problem
 
-  !> Acquires the lock file `path` for this process. On a file system without locks the run continues without one.
+  !> Acquires the lock file `path` for this process. On a file system without locks the run continues without a lock.
   subroutine acquire(self, path, problem)
     class(lock_t), intent(inout) :: self
     character(len=*), intent(in) :: path

@@ -22,7 +22,7 @@ module epochs
   integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
   real(real64), parameter :: shortest = 2.0_real64**(-20)  !! shortest epoch in units of `negligible_time`
   real(real64), parameter :: last_time = 0.5_real64*never
-  real(real64), parameter :: crushing = 1.0e6_real64 !! growth factor of the energy above which disks are considered crushed
+  real(real64), parameter :: crushing = 1.0e6_real64 !! factor of energy growth at which disks are considered crushed
   real(real64), parameter :: densest = 0.9_real64  !! largest packing fraction used in the estimate of the event rate
 
 contains
@@ -98,9 +98,9 @@ contains
     call begin_epoch(sim, length)
   end subroutine move_epoch
 
-  !> Ends the epoch because the disks, the forces or the contact laws have been changed. The following motion may be faster by any
-  !> factor. The origin of time therefore moves exactly to the present time, and the length of the epoch is determined again when
-  !> the evolution starts. Time-stepped dynamics has no epochs; the origin of its times is the start of the run.
+  !> Ends the epoch because the disks, the forces or the contact laws have been changed. After the change disks may be faster than
+  !> before by any factor. The origin of time therefore moves exactly to the present time, and the length of the epoch is determined
+  !> again when the evolution starts. Time-stepped dynamics has no epochs; the origin of its times is the start of the run.
   subroutine restart_epoch(sim)
     type(simulation_t), intent(inout) :: sim
 

@@ -1,9 +1,9 @@
 !> Event-driven dynamics: exact trajectories from event to event. Each disk stores one event, the earliest of its predicted events.
 !> When this event is due, the disks involved collide, and their next events are predicted.
 !>
-!> An event becomes stale when its partner collides with another disk first. Stale events are not searched for. A stale event is
-!> recognised by the collision counter of the partner when the event is due. A stale event is not executed; instead the next event
-!> of the disk is predicted.
+!> The event of a disk becomes stale when its partner collides with a third disk before the event. Stale events are not searched
+!> for. A stale event is recognised by the collision counter of the partner when the event is due. A stale event is not executed;
+!> instead the next event of the disk is predicted.
 module event_driven
   use kinds, only: int32, int64, never, real64
   use box_sides, only: side_time
@@ -113,8 +113,8 @@ contains
     end do
   end subroutine renew_all
 
-  !> Executes events until a limit is reached. Returns early when a stop has been requested. Some predictions may then be missing,
-  !> but the state itself is complete.
+  !> Executes events until a limit is reached. If a stop has been requested, the procedure returns early. Some predictions may then
+  !> be missing, but the state itself is complete.
   subroutine advance(self, sim, limits, error, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -126,7 +126,7 @@ contains
 
     if (self%history_of(i) > 0) call add_moment(self%history(self%history_of(i))%digest, disk(i)%clock)
     if (self%history_of(j) > 0) call add_moment(self%history(self%history_of(j))%digest, disk(j)%clock)
-    call self%record_cell(tag(i)%cell, i)          ! the collision may have changed their cells
+    call self%record_cell(tag(i)%cell, i)          ! the collision may have changed the cells of i and j
     call self%record_cell(tag(j)%cell, j)
   end subroutine record_collision
 

@@ -15,7 +15,7 @@ module stop_rules
   private
   public :: coldness, stop_rule_t, stop_settings_t, whole_collisions
 
-  real(real64), parameter :: coldest = 1.0e-25_real64        !! smallest temperature, relative to the initial temperature
+  real(real64), parameter :: coldest = 1.0e-25_real64        !! temperature at which a run ends, relative to the initial one
   character(len=*), parameter :: coldness = "cooled to 1e-25 of the initial temperature"
 
   !> Stop rules. The default values are never reached.
@@ -32,7 +32,7 @@ module stop_rules
   type :: stop_rule_t
     type(limits_t) :: limits
     real(real64) :: wall_clock = never       !! [s]
-    logical :: cools = .false.               !! the disks are inelastic and the box is periodic, so that they cool without end
+    logical :: cools = .false.               !! inelastic disks in a periodic box, which cool without end
   contains
     procedure :: is_met
     procedure :: rests

@@ -121,7 +121,7 @@ contains
     end do
   end function steps_taken
 
-  !> Whether nothing moves, and no force or side can set anything in motion.
+  !> Whether all disks are at rest, and no force or side can set a disk in motion.
   pure function at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes

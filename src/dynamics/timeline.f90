@@ -169,7 +169,7 @@ contains
     end if
   end function may_lose
 
-  !> Whether disk i slides along an obstacle that is concave towards it.
+  !> Whether disk i slides along an obstacle whose outline is concave towards the disk.
   pure function slides(sim, i, code) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code

@@ -196,7 +196,7 @@ contains
     end subroutine add_run
   end subroutine list_disks
 
-  !> Adds pairs of disks by testing all of them. A stop request ends this early.
+  !> Tests all pairs of disks and adds the pairs whose gap is less than the skin. A stop request ends this procedure early.
   subroutine test_all_pairs(self, x, radius, period)
     type(verlet_list_t), intent(inout) :: self
     real(real64), contiguous, intent(in) :: x(:, :), radius(:)   !! [length]

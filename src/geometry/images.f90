@@ -10,7 +10,7 @@ module images
   private
   public :: image_t, images_t, moving_images
 
-  !> One image of the box, relative to the box itself.
+  !> A periodic image of the box: its displacement and velocity relative to the box itself.
   type :: image_t
     real(real64) :: shift(2) = 0.0_real64       !! displacement of the image at the epoch [length]
     real(real64) :: velocity = 0.0_real64       !! velocity of the image along x [length/time]
@@ -113,8 +113,9 @@ contains
     displacement = rows*(self%offset + self%velocity*now)
   end function displacement
 
-  !> Time at which the image above the box will have moved by `distance` from its present position; `never` if it does not move.
-  !> Until this time a search can use the images that are in reach now, if the search covers displacements of up to `distance`.
+  !> Time at which the image above the box will have moved by `distance` from its present position; `never` if this image does not
+  !> move. Until this time a search can use the images that are in reach now, if the search covers displacements of up to
+  !> `distance`.
   pure function valid_until(self, now, distance) result(t)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: now             !! [time]

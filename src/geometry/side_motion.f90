@@ -364,7 +364,8 @@ contains
       speed = relative + (g*t - motion%velocity_change(tau, t))
     end function gap_rate
 
-    !> Bisects an interval to the last bit. After the result the gap increases or is negative.
+    !> Bisects an interval until `left` and `right` are adjacent numbers. At the time `right` the gap increases (if `to_smallest` is
+    !> true) or is negative (if it is false).
     pure subroutine bisect(to_smallest, left, right)
       logical, intent(in) :: to_smallest
       real(real64), intent(inout) :: left, right

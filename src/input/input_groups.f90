@@ -242,11 +242,11 @@ contains
     end associate
   end subroutine demand
 
-  !> Sets choices that are not given but follow from a variable that is used only with this choice. If several such variables are
-  !> given, the last one in the table determines the choice.
+  !> Sets choices that the user has not given. A choice follows from a given variable that is used only with this choice. If several
+  !> such variables are given, the last one in the table determines the choice.
   pure subroutine infer_choices(self)
     class(group_t), intent(inout) :: self
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of the choice variable, followed by its allowed values
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! words of `goes_with`: see `variable_rows`
     integer :: k
 
     do k = 1, size(self%values)
@@ -262,7 +262,7 @@ contains
   pure subroutine check_choices(self, problems)
     class(group_t), intent(inout) :: self
     type(problem_list_t), intent(inout) :: problems
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of the choice variable, followed by its allowed values
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! words of `goes_with`: see `variable_rows`
     character(len=len(table%goes_with)) :: word
     integer :: j, k
 

@@ -400,7 +400,7 @@ contains
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: cost(3)           !! since the start or the last resume: wall time [s], collisions per
-    !! processor time [1/s], events on one core where there were more
+    !! processor time [1/s], number of events executed by the serial engine
     character(len=*), intent(in) :: note          !! reason why the run ended, if no stop rule was met
     logical, intent(in) :: broken
     type(progress_t) :: before

@@ -20,7 +20,7 @@ contains
   pure subroutine bounds(box, t, lower, upper)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: t               !! time since the epoch [time]
-    real(real64), intent(out) :: lower(2), upper(2)     !! positions of left and bottom, of right and top sides [length]
+    real(real64), intent(out) :: lower(2), upper(2)     !! positions of left and bottom sides, and of right and top sides [length]
     real(real64) :: inwards(n_sides)
     integer :: k
 

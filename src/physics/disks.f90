@@ -26,7 +26,7 @@ module disks
   type :: tag_t
     integer(int32) :: species = 1               !! index of the species
     integer(int32) :: id = 0                    !! number in the order of the input
-    integer(int64) :: collisions = 0            !! number of events since the start of the run
+    integer(int64) :: collisions = 0            !! number of events of the disk since the start of the run
     integer(int32) :: last_partner = 0          !! id of a disk, code of an obstacle, or 0; see `partners: repeated`
     ! Derived data of search and event queue.
     integer(int16) :: cell(2) = 0_int16         !! column and row in the cell grid

@@ -130,7 +130,7 @@ contains
     self%rare = 0
   end subroutine clear
 
-  !> The value of the sum; NaN if it has become too large.
+  !> The value of the sum; NaN if the sum has become too large.
   elemental function value(self)
     class(exact_sum_t), intent(in) :: self
     real(real64) :: value

@@ -103,8 +103,8 @@ contains
     now = total(sim, sums(:, 0))
   end function total_energy
 
-  !> Adds averages per disk over the disks of a species. The temperature is kT in two dimensions. The temperature is computed from
-  !> the kinetic energy relative to the mean velocity and, in a sheared box, relative to the velocity profile.
+  !> Adds the observables that are averages over the disks of a species. The temperature is kT in two dimensions. The temperature is
+  !> computed from the kinetic energy relative to the mean velocity and, in a sheared box, relative to the velocity profile.
   pure subroutine add_means(list, group, sums, rotation)
     type(observable_list_t), intent(inout) :: list
     character(len=*), intent(in) :: group         !! name of the species

@@ -119,7 +119,7 @@ contains
     call self%renew_big(sim, patch, faces)
   end subroutine renew
 
-  !> Lists the big disks again, because their indices may have changed.
+  !> Renews the lists of big disks, because the indices of the disks may have changed.
   subroutine renew_big(self, sim, patch, faces)
     class(reach_lists_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

@@ -28,8 +28,8 @@ module dense_growth
   real(real64), parameter :: smallest_scale = 1.0e-3_real64       !! smallest initial size, relative to the full size
   !> Number of growth steps at given positions; each step reduces the gap to a tenth.
   integer, parameter :: approaches = 6
-  integer, parameter :: run_length = 2                  !! collisions per disk between growth steps
-  integer, parameter :: mixing_length = 10              !! collisions per disk at full size
+  integer, parameter :: run_length = 2                  !! number of collisions per disk between two growth steps
+  integer, parameter :: mixing_length = 10              !! number of collisions per disk after the growth
   !> Number of growth steps in which the difference to the full size must decrease by a tenth.
   integer, parameter :: jumps_per_check = 50
 

@@ -106,7 +106,7 @@ contains
         bytes = max(bytes, read_in)
       case ("dense", "grown")
         bytes = max(bytes, grown + merge(extra, 0.0_real64, any(settings%box%periodic)))
-      case default                                    ! positions by a rule need no more memory
+      case default                                    ! positions that follow a rule need no additional memory
       end select
     end do
   end function starting_bytes

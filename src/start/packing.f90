@@ -161,7 +161,7 @@ contains
     end associate
   end subroutine load_cells
 
-  !> Prefetches the disk that was last added to each of these cells.
+  !> Prefetches the disk that was last added to each cell around a point.
   subroutine load_disks(self, s, p)
     class(packing_t), intent(in) :: self
     integer(int32), intent(in) :: s
