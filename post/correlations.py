@@ -24,8 +24,8 @@ between collisions, only the first definition applies.  Enskog's D_E is shown fo
 of fixed energy.  In two dimensions the long-time tail makes D(t) grow as the logarithm of t without
 limit: a value of D applies to one time and one box, because the size of the box matters once sound
 has crossed it.  The table contains D from both definitions, averaged over the lags from `D_time` /
-2 to `D_time`; the two values must agree.  `D_time` is the time in which sound crosses the box, or
-an eighth of the run if that is shorter.  D requires a periodic box and equally spaced frames.
+2 to `D_time`; the two values must agree.  `D_time` is the time in which sound crosses the box, but
+at most an eighth of the run.  D requires a periodic box and equally spaced frames.
 
 a2 = <v^4> / (2 <v^2>^2) - 1, the second Sonine coefficient with each species at its own
 temperature, is 0 in equilibrium and -1/2 for equal speeds.  S(k) = <|sum of exp(i k x)|^2> / N.
@@ -260,7 +260,7 @@ def parts(shown: dict[str, Curve], panel: str) -> dict[str, Curve]:
 def draw_group(
     panels: dict[str, plt.Axes], found: Found, row: dict, colour: str, count: int, keyed: bool
 ) -> None:
-    """Draw one packing fraction in all panels; `count` is the number of disks of all its runs."""
+    """Draw the curves of one packing fraction; `count` is the number of disks of its runs."""
     line, label, shown = {"color": colour, "lw": 1}, f"η = {row['packing']:.3g}", found.curves
 
     def positive(curve: Curve) -> Curve:

@@ -4,8 +4,8 @@
 
 The script reads the collisions per second of processor time that each run records, and uses the
 fastest of several equal runs.  The lines are powers of N fitted to the points with N in --fit.
-Below that range the cost of the collision itself is not small compared with the search; above that
-range the data of the disks no longer fit into the caches.
+Below that range the cost of the collision itself is not small compared with the cost of the search;
+above that range the data of the disks no longer fit into the caches.
 """
 
 from ricochet import Run

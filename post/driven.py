@@ -165,7 +165,7 @@ def width_law(run: Run) -> Room | None:
 
 
 def balances(run: Run) -> tuple[float, float]:
-    """Return the largest relative changes of enthalpy and momentum of disks and piston."""
+    """Return the largest relative changes of the enthalpy and of the total momentum."""
     k = min(run.piston_positions)
     side = run.sides[k]
     time, energy = run.observable("total_energy")
@@ -187,9 +187,10 @@ def share(run: Run) -> Curves:
 def fuller(share: np.ndarray) -> np.ndarray:
     """Return the fractions (T,) of disks in the fuller half, given the fractions in one half.
 
-    For the first third of the time, the fuller half is determined from the last third, and the
-    other way round.  If the same frames determined it, the fraction would exceed 1/2 by chance
-    alone.  The middle third separates the first third from the last, so that these are independent.
+    For frames in the first third of the time, the fuller half is determined from the last third;
+    for frames in the last third, it is determined from the first third.  If the same frames
+    determined it, the fraction would exceed 1/2 by chance alone.  The middle third separates the
+    first third from the last, so that these are independent.
     """
     third = max(1, len(share) // 3)
     ends = share[:third], share[-third:]

@@ -15,10 +15,10 @@ input (docs/theory.md).  A cell that contained disks in fewer than two blocks ha
 cell has kT, stress and heat flux if at least three disks remain whichever block is left out.  With
 --species the fields are those of one species, relative to the mean flow of that species.
 
---grid also draws the stream function psi of the flux j = n u, j_x = d psi / dy and j_y = -d psi /
-dx: its contour lines are the streamlines of the mean flow.  The longest arrow is the largest
-significant flow; arrows are pale where the flow is within its error (chi^2 of both components below
-5.99, which noise exceeds in 5 % of the cells).
+--grid also draws the stream function psi of the flux j = n u, where j_x = d psi / dy and j_y = -d
+psi / dx.  The contour lines of psi are the streamlines of the mean flow.  The longest arrow is the
+largest significant flow; arrows are pale where the flow is within its error (chi^2 of both
+components below 5.99, which noise exceeds in 5 % of the cells).
 
 For equal disks between two walls, dashed lines show predicted profiles.  They start from
 temperature and flow in the middle and follow from the measured fluxes of momentum and energy at the

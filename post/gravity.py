@@ -5,12 +5,13 @@
 kT is the mean of the kinetic energy in equilibrium.  Equilibrium begins after --equilibration or,
 without that option, when no observable drifts any longer; the figure and the second table state why
 earlier frames are left out. The solid lines are P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~
-exp(-m g h / kT) for the height h of the centre above its lowest position.  They apply to many point
-particles.  The dashed lines include two corrections.  If N disks share a fixed energy, (1 - e / (2
-N kT))^(2 N - 2) replaces exp(-e / kT) for the energy e of a disk.  A disk of species j excludes the
-area pi s_ij^2 for the centre of a disk of species i, which multiplies the density of species i by
-exp(-sum_j pi s_ij^2 n_j(h)) to first order, a few per cent near the floor.  No line is drawn for
-the heights if this sum, computed for point particles, exceeds 0.5.
+exp(-m g h / kT) for the height h of the centre above its lowest position.  These laws apply to a
+large number of point particles.  The dashed lines include two corrections.  If N disks share a
+fixed energy, (1 - e / (2 N kT))^(2 N - 2) replaces exp(-e / kT) for the energy e of a disk.  The
+centres of disks of species i are excluded from the area pi s_ij^2 around each disk of species j.
+To first order this multiplies the density of species i by exp(-sum_j pi s_ij^2 n_j(h)), a
+correction of a few per cent near the floor.  No line is drawn for the heights if this sum, computed
+for point particles, exceeds 0.5.
 
 Slopes are those of weighted lines fitted to the logarithm of the histograms, from 0 to 5 kT in the
 kinetic energy and from 1 to 5 kT in m g h.  The heights below 1 kT are left out, because the finite
@@ -126,7 +127,7 @@ def crowding(run: Run, species: list[Samples], kt: float) -> float:
 
 
 def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Return the accessible heights and the densities of `crowded_heights` (NaN without a law)."""
+    """Return the accessible heights, and `crowded_heights` (NaN if too much is excluded)."""
     free = run.edges - 2 * species[0].radius
     grid = np.linspace(0, free[1], 4001)
     if crowding(run, species, kt) > CROWDED:

@@ -6,10 +6,10 @@ Runs are combined by restitution xi.  The left panel shows the kinetic energy K 
 units of the initial mean free time 1/w0, and Haff's law K0 / (1 + (1 - xi^2) w0 t / 4)^2 (Haff
 1983).  The right panel shows K against collisions per disk, and an exponential law (van Noije and
 Ernst 1998).  The lower panels show the ratios of K to both laws.  Both laws apply while the gas is
-homogeneous.  Later a part of K is the energy of flows, and K decreases more slowly. The boxes must
-be periodic with a total momentum of 0.  w0 follows from the equation of state; for unequal disks it
-is measured from the first collisions.  Both laws assume that all species have the same temperature,
-which is wrong for very different masses.
+homogeneous.  At later times a part of K is the energy of flows, and K decreases more slowly. The
+boxes must be periodic with a total momentum of 0.  w0 follows from the equation of state; for
+unequal disks it is measured from the first collisions.  Both laws assume that all species have the
+same temperature, which is wrong for very different masses.
 
 The cooling rate is -d ln K / d tau, where tau is the number of collisions per disk.  The
 homogeneous state ends at the tau beyond which the rate, averaged over two collisions per disk and

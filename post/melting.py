@@ -2,13 +2,13 @@
 
     python post/melting.py runs/melting/*/*.h5 -o melting.png --csv melting.csv
 
-P* = P d^2 / kT follows from the virial, where d is the diameter.  It is a mean in equilibrium,
+P* = P d^2 / kT follows from the virial, where d is the diameter.  P* is a mean in equilibrium,
 which begins after --equilibration or, without that option, when no observable drifts any longer.
 The disks must be equal and the box periodic.  Between the packing fractions 0.700 and 0.716 liquid
 and hexatic phase coexist at P* = 9.185.  In a finite box the pressure has a loop instead, which is
 caused by the interface between the phases and flattens as N grows.  For comparison: Engel et al.,
-Phys. Rev. E 87, 042134 (2013); N = 128^2: Li et al., J. Chem. Phys. 157, 234111 (2022).
-Correlation times are long near melting, so that the warnings about errors are important.
+Phys. Rev. E 87, 042134 (2013); N = 128^2: Li et al., J. Chem. Phys. 157, 234111 (2022). Correlation
+times are long near melting, so that the warnings about errors are important.
 """
 
 from ricochet import Run

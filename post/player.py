@@ -14,7 +14,7 @@ speeds, energies and, for up to 20 disks, the next events.  Without --count a fi
 evenly spread frames as fit into 30 MB.
 
 --live serves a page that follows a running simulation on this computer until the run ends, and
-prints its address.  --open opens the film or that page in the browser.
+prints its address.  --open opens the film, or the page of --live, in the browser.
 """
 
 import base64
@@ -60,7 +60,7 @@ def frames_that_fit(run: Run, room: float) -> int:
     """Return the number of frames that fit into the file.
 
     Each disk needs two 16-bit positions and velocities, 8 bits of collisions, 32 bits of an angle.
-    Up to half of the size is for collisions between frames.
+    Up to half of the file is reserved for collisions between frames.
     """
     more = (run.event_count is not None) + (run.image is not None)
     more += 4 * ("orientation" in run.disk_data)
@@ -198,7 +198,7 @@ def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
 
 
 def curves(run: Run) -> dict:
-    """Return time, energies of each species and pressure, with as many samples as a plot shows.
+    """Return time, energy of each species, and pressure, at the resolution of a plot.
 
     The values are observables, which are sampled more often than frames.  Missing values are None;
     the pressure is None before the first collision.
@@ -365,7 +365,7 @@ def filled(name: str, fillings: dict[str, str]) -> str:
 
 
 def text_of(name: str) -> str:
-    """Return the text of a file of the page."""
+    """Return the text of a file from which the page is composed."""
     return (PAGE / name).read_text(encoding="utf-8")
 
 

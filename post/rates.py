@@ -14,11 +14,11 @@ The pressure is measured from the virial of the pair collisions and from the mom
 each side.  The pressure on the sides is slightly larger, because centres stay at least a radius
 away from sides.  With an event log the table also contains w_ij, the rate at which a disk of
 species i collides with disks of species j, and the free paths are analysed.  The free path of a
-disk in a frame is its speed times the time between its last collision before and its first
-collision after the frame.  Long paths occur in more frames; therefore each path is weighted with 1
-over its duration.  The errors follow from the scatter of runs or, for a single run, of blocks of
-frames.  The line is for equal disks under molecular chaos (Boltzmann, Enskog).  Free paths are not
-defined for driven disks, whose velocities change between collisions.
+disk in a frame is the product of its speed and the time from its last collision before the frame to
+its first collision after the frame.  Long paths occur in more frames; therefore each path is
+weighted with 1 over its duration.  The errors follow from the scatter of runs or, for a single run,
+of blocks of frames.  The line is the prediction for equal disks and molecular chaos (Boltzmann,
+Enskog).  Free paths are not defined for driven disks, whose velocities change between collisions.
 
 For runs that lose energy, or whose walls differ in temperature, only the free paths are analysed.
 The frames used are those after --equilibration; without that option they are the frames without

@@ -20,7 +20,7 @@ import numpy as np
 
 
 def moving_and_resting(run: Run) -> tuple[int, int]:
-    """Return the index of the disk that moves at the start and that of the disk at rest."""
+    """Return the indices of the disk that moves at the start and of the disk at rest."""
     moving = np.flatnonzero(run.speed(0))
     if run.n_disks != 2 or len(moving) != 1:
         raise Refused(f"{run.path}: needs two disks, one of them at rest")

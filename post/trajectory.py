@@ -37,7 +37,7 @@ def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
 
 
 def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return the path (T, 2); a step across a side is repeated in every cell it may touch."""
+    """Return the path (T, 2); steps across a side are repeated in all images that they touch."""
     rows = [path[:1]]
     gap = np.full((1, 2), np.nan)
     for start, end, jump in zip(path[:-1], path[1:], np.diff(image, axis=0), strict=True):

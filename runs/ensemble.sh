@@ -307,8 +307,8 @@ run_member() {
   printf '%s %s\n' "$1" "$status" >&"$events"
 }
 
-# Arguments: the exit status and the earlier messages. After three kills no further attempt is made, because the member needs more
-# memory or time.
+# Arguments: the exit status and the earlier messages. After a member has been killed three times, no further attempt is made,
+# because the member probably needs more memory or time.
 tell_kill() {
   local how='' given_up=''
   [[ $1 != 137 ]] || how=' (out of memory?)'

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# S1: scattering angle of a light disk off a heavy one, for 81 impact parameters b/R12 in -1.2..1.2.
+# S1: scattering angle of a light disk that collides with a heavy disk, for 81 impact parameters b/R12 in -1.2..1.2.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 # Height of the light disk: 0.5 + b, R12 = 0.1 + 0.001.

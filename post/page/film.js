@@ -48,7 +48,7 @@ const frameAt = time => Math.max(0, upTo(past, time, frame => frame.time) - 1); 
 const frameTime = k => past[clamp(k, 0, past.length - 1)].time;
 
 // Stores in a frame the numbers of periods that the disks have crossed since the first frame, x1 y1
-// x2 y2 .... `moved` returns the numbers since the previous frame.
+// x2 y2 .... `moved` returns the numbers of periods crossed since the previous frame.
 function cross(frame, moved) {
   const before = past.at(-1);
   if (film.periodic.some(Boolean)) frame.crossed = new Int16Array(2 * disks).map((_, k) => before ? before.crossed[k] + moved(before, k) : 0);
@@ -59,8 +59,8 @@ function cross(frame, moved) {
 
 // Between two frames a disk moves from its position in the earlier frame, and its velocity changes
 // at the events of the log. Each flight is straight, or a parabola under gravity. Without an event
-// log disks are shown at their positions in the last frame. Frames of a worker need no log, because
-// their intervals are short enough.
+// log disks are shown at their positions in the last frame. The frames of a worker need no event log,
+// because the intervals between these frames are short enough.
 let ways;    // velocity changes: index of the first change after each frame (start); disk, fraction of the interval and new velocity of each change (turns)
 let events;  // events of the log: time (when), partners (i, j), number of collisions of two disks so far (pairs)
 

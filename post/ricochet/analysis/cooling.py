@@ -228,7 +228,7 @@ def haff(
     end : float
         collisions per disk at which the homogeneous state ends; NaN if it does not end
     end_error : Estimate
-        the same number with its error
+        `end` with its error
 
     Examples
     --------
@@ -309,7 +309,7 @@ def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray
 
 
 def rough_law(run: Run) -> tuple[float, float, float]:
-    """Return the contact parameters of a run of rough disks, if their theory applies.
+    """Return the contact parameters of rough disks if the theory of rough disks applies.
 
     Parameters
     ----------

@@ -19,8 +19,8 @@ conserved, or performs a random walk that noise drives (drive.keep_momentum = .f
 
 Lags are chosen logarithmically: in each twelfth of a power of ten, the lag that occurs for most
 pairs of samples.  This works for samples at equal steps, in logarithmic steps, in bursts, and for
-mixtures of these.  Every sample that has a partner serves as an origin t0.  If this would take too
-long, only the first sample in each sixteenth of a lag is an origin.  This does not make
+mixtures of these.  Every sample with a partner at a lag serves as an origin t0.  If this would take
+too long, only the first sample in each sixteenth of a lag is an origin.  This does not make
 correlations of displacements less accurate, but it makes correlations of velocities less accurate
 at lags of many free times. This is the multiple-tau correlator of Ramirez et al., J. Chem. Phys.
 133, 154103 (2010), without its means over neighbouring samples, so that each lag is exact.

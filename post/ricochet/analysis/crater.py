@@ -95,7 +95,7 @@ def ended_by_time(run: Run, size: Crater) -> bool:
     Returns
     -------
     bool
-        whether more energy is left
+        whether the run ended with more energy than this fraction
 
     Examples
     --------
@@ -256,7 +256,7 @@ def crater(run: Run) -> Crater:
     Raises
     ------
     Refused
-        if the bed is moved by anything except a projectile
+        if anything except a projectile moves the bed
 
     Examples
     --------

@@ -110,7 +110,7 @@ def jackknife(
 
 
 def steady_frames(run: Run, skip: float | None) -> list[int]:
-    """Return the frames after `skip` collisions per disk, by default those of the second half."""
+    """Return the frames after `skip` collisions per disk, by default the second half."""
     if any(side.get("motion") in ("constant_velocity", "piston") for side in run.sides):
         why = "has a side that moves away from its position (motion); fields require fixed cells"
         raise Refused(f"{run.path}: {why}")
@@ -180,8 +180,8 @@ def kinship(members: Members, blocks: list[Block], most: float) -> np.ndarray:
     """Return the correlation of neighbouring blocks, (F,), of fields (G, F, C).
 
     The result is twice the sum of products of neighbouring blocks over the sum of squares.  It is
-    limited to the range from 0 to `most`, and averaged over all cells, because the few blocks of a
-    single cell do not determine it.
+    limited to the range from 0 to `most`, and averaged over all cells, because a single cell has
+    too few blocks for an estimate.
     """
     size, same = len(blocks), [a.run is b.run for a, b in pairwise(blocks)]
     rest = np.nan_to_num(members.rests())

@@ -124,7 +124,7 @@ def by_chance(sample: Sample) -> np.ndarray:
 
 
 def chance(found: float, drawn: np.ndarray) -> float:
-    """Return the fraction of random statistics (S,) above the measured one.
+    """Return the fraction of random statistics (S,) that exceed the measured statistic.
 
     Beyond the largest random statistics an exponential tail is used.
     """

@@ -159,8 +159,8 @@ def means(runs: Sequence[Run], frames: Sequence[Index], name: str) -> tuple[Esti
     Returns
     -------
     tuple of Estimate
-        speed and energy; errors follow from the scatter of the runs, or of the frames of a single
-        run
+        speed and energy; errors follow from the scatter of the runs or, for a single run, of its
+        frames
 
     Examples
     --------

@@ -246,10 +246,10 @@ def cells(series: np.ndarray, count: int) -> np.ndarray:
 def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
     """Estimate the statistical inefficiency 1 + 2 tau of a series.
 
-    tau is the integrated autocorrelation time in samples.  The variance of the mean is that of
-    independent samples times this inefficiency.  The window of the sum and the correction for the
-    unknown mean are those of U. Wolff, Comput. Phys. Commun. 156, 143 (2004), S = 1.5.  Sums that
-    end at the first negative term would underestimate the error of short series.
+    tau is the integrated autocorrelation time in samples.  The variance of the mean is the variance
+    for independent samples times the statistical inefficiency.  The window of the sum and the
+    correction for the unknown mean are those of U. Wolff, Comput. Phys. Commun. 156, 143 (2004), S
+    = 1.5.  Sums that end at the first negative term would underestimate the error of short series.
 
     Parameters
     ----------
@@ -327,10 +327,11 @@ def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> Series
 def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
     """Return standard error of the mean, degrees of freedom and drift of a series (T,).
 
-    The square of the error is the mean square of the first coefficients of the cosine transform
-    over the length: E. Lazarus, D. J. Lewis, J. H. Stock and M. W. Watson, J. Bus. Econ. Stat. 36,
-    541 (2018).  Only so few coefficients are used that their waves are slower than the correlations
-    of the series.  The drift is the ratio of the first coefficient to the following ones.
+    The square of the error is the mean square of the first coefficients of the cosine transform,
+    divided by the length of the series: E. Lazarus, D. J. Lewis, J. H. Stock and M. W. Watson, J.
+    Bus. Econ. Stat. 36, 541 (2018).  Only so few coefficients are used that their waves are slower
+    than the correlations of the series.  The drift is the ratio of the first coefficient to the
+    following ones.
     """
     parts = cells(series, FINE)
     per_sample = max(1e-9, statistical_inefficiency(parts))
@@ -347,8 +348,9 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
 def equilibration(series: np.ndarray) -> int:
     """Return the number of samples at the start of a series before it is stationary.
 
-    The number is twice that of White's rule (MSER; K. P. White, Simulation 69, 323 (1997)), which
-    minimises the standard error of the remaining samples.
+    The result is twice the number of samples that White's rule leaves out (MSER; K. P. White,
+    Simulation 69, 323 (1997)).  The rule minimises the standard error of the mean of the remaining
+    samples.
 
     Parameters
     ----------

@@ -117,8 +117,8 @@ def structure_factor(
     edges : numpy.ndarray
         (B + 1,) edges of the bins of k, in 1 / mean diameter
     pair : tuple of str, optional
-        two species: the product of their two sums, divided by the square root of the product of
-        their numbers [all disks]
+        two species: S(k) is the product of the sums over the disks of each species, divided by the
+        square root of the product of their numbers of disks [all disks]
 
     Returns
     -------

@@ -266,8 +266,8 @@ def unforced(source: Run | Simulation) -> np.ndarray:
     """Return the axes (2,) along which only noise changes the total momentum.
 
     Walls parallel to the axis are not considered; they conserve the momentum along them unless the
-    run has a trait of `ALONG_WALLS`.  An error is raised if noise moves the centre of mass and such
-    walls may stop it.
+    run has a trait of `ALONG_WALLS`.  An error is raised if noise moves the centre of mass and
+    walls with such a trait may stop this motion.
     """
     box, nature = source.parameters.get("box", {}), source.nature
     if nature & (KICKED - {"noise_driven"}) or nature & {"obstacles", "changed"}:
@@ -364,7 +364,7 @@ def kt_at_start(run: Run) -> float:
 
 
 def has_few_observables(run: Run) -> bool:
-    """Return whether frames resolve a run better in time than the observables."""
+    """Return whether the frames of a run are more frequent than samples of the observables."""
     return len(run.collisions_per_disk.time) < min(run.n_frames, 2 * FEWEST)
 
 

@@ -19,7 +19,7 @@ enthalpy.  If energy is dissipated or supplied by noise, the fluctuations do not
 coefficients: in the theory of a cooling gas the moments are correlated with other quantities that
 depend on the unknown distribution of its states (Baskaran, Dufty and Brey, Phys. Rev. E 77, 031311
 (2008)), and noise violates the fluctuation-dissipation theorem.  Rough disks are refused, because
-the moments do not include the rotational energy that they transport.
+the moments do not include the rotational energy that rough disks transport.
 """
 
 from typing import NamedTuple
@@ -172,7 +172,7 @@ def running(moment: np.ndarray, step: float, at: np.ndarray) -> np.ndarray:
 def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
     """Estimate half the slope of the mean square between the lags `lag` / 2 and `lag`.
 
-    Each origin in time contributes one value, as for the diffusion coefficient.
+    Each origin in time contributes one value, as in `diffusion`.
     """
     half = lag // 2
     near, far = squares(moment, half), squares(moment, lag)

@@ -126,8 +126,8 @@ def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
 def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
     """Return the upper end of a colour scale for a film; a few values exceed this end.
 
-    The end is computed from some of the frames or, for displacements, which grow, from the last
-    frame.
+    The end is computed from a selection of frames.  For displacements, which grow with time, it is
+    computed from the last frame.
     """
     some = [] if colour == "displacement" else frames[:: max(1, len(frames) // 40)]
     values = values_of(run, sorted({*some, frames[-1]}), colour)

@@ -384,8 +384,8 @@ def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
     """Return temperature, mean speed and pressure with errors and theoretical values.
 
     For a run that relaxes to equilibrium the values are means over the samples in equilibrium, with
-    errors of the series.  For other runs they are present values, and the pressure is the mean
-    between the first and the last sample.
+    errors that include the autocorrelation.  For other runs they are present values, and the
+    pressure is the mean between the first and the last sample.
     """
     time, kt, speed = samples[[0, 4, 5]]
     found = {

@@ -40,7 +40,7 @@ FLUID = np.array([
     (0.30, 2.06326), (0.35, 2.40150), (0.40, 2.82933), (0.45, 3.38054), (0.50, 4.10636),
     (CLOSE_PACKING / 1.6, 5.4963), (CLOSE_PACKING / 1.5, 6.6074), (CLOSE_PACKING / 1.4, 8.306),
 ])  # fmt: skip
-# From there to freezing no published values are known. The values were computed with this program
+# No published values are known from there to freezing. These values were computed with this program
 # from two runs of 8000 disks and 1000 collisions per disk at each packing fraction, with errors
 # below 0.1 %; the last value is that of 1024^2 disks in `MELTING`.
 FREEZING = np.array([
@@ -267,7 +267,7 @@ def contact_value(z: Number, eta: Number) -> Number:
 def collision_rate(
     z: float, diameter: float, free: float, kt: float = 1.0, mass: float = 1.0
 ) -> float:
-    """Return the number of collisions per disk and time, which follows from the pressure.
+    """Return the collision rate per disk, computed from the pressure.
 
     Parameters
     ----------
@@ -290,7 +290,7 @@ def collision_rate(
     >>> round(hard_disks.collision_rate(2.0, 1.0, 1e4), 3)
     2.257
     """
-    # Mean relative speed at fixed energy divided by that of Maxwell's distribution.
+    # Mean relative speed at fixed energy, over the mean relative speed for Maxwell's distribution.
     c_n = math.exp(math.lgamma(free) - math.lgamma(free + 0.5)) * math.sqrt(free)
     return 4 * (z - 1) * c_n / (math.sqrt(math.pi) * diameter) * math.sqrt(kt / mass)
 
@@ -493,7 +493,7 @@ def contact_values(z: float, density: np.ndarray, diameter: np.ndarray) -> np.nd
 def enskog_mixture(
     z: float, density: np.ndarray, diameter: np.ndarray, mass: np.ndarray, kt: float = 1.0
 ) -> dict[str, float]:
-    """Return the viscosities of a mixture (S,), and the decay time of stress and heat ("memory").
+    """Return viscosities of a mixture (S,), and the decay time of the fluxes ("memory").
 
     Enskog's theory in first Sonine approximation, as in Lopez de Haro, Cohen and Kincaid, J. Chem.
     Phys. 78, 2746 (1983), here in two dimensions.  The kinetic parts are multiplied by 1.022, the

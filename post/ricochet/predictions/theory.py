@@ -147,7 +147,7 @@ def scattering_angle(
     b : array_like
         (...) impact parameter divided by r1 + r2
     mass_ratio : float
-        mass of the disk at rest divided by that of the moving disk
+        mass of the disk at rest divided by the mass of the moving disk
     restitution : float
         normal restitution
 

@@ -206,7 +206,7 @@ def known(value: Any) -> bool:
 
 
 def allow(run: Any, law: str, *traits: str) -> None:
-    """Raise an error for a run with any trait except these; `law` completes the message."""
+    """Raise an error for a run with any trait except these; `law` is a part of the message."""
     for trait, reason in TRAITS.items():
         if trait in run.nature and trait not in traits:
             raise Refused(f"{getattr(run, 'path', 'the simulation')}: {reason}; {law}")

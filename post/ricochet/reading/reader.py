@@ -332,7 +332,7 @@ class Run:
         return 0.5 * self.mass * np.sum(self.velocity[as_index(frame)] ** 2, axis=-1)
 
     def unwrapped(self, frame: Index) -> np.ndarray:
-        """Return positions that are continuous in time, including the periods crossed.
+        """Return positions that are continuous in time, without wrapping at periodic sides.
 
         In a sheared box (Lees-Edwards boundary conditions) the upper periodic image is displaced by
         gamma L_y t along x.
@@ -593,8 +593,8 @@ class Run:
     def collisions_per_disk_at(self, time: np.ndarray) -> np.ndarray:
         """Return the number of pair collisions per disk at given times, by interpolation.
 
-        Between samples of the observables, the number of events in the frames is used for the
-        interpolation if frames are more frequent than these samples.
+        If frames are more frequent than samples of the observables, the numbers of events in the
+        frames are used for the interpolation between these samples.
 
         Parameters
         ----------
@@ -732,7 +732,7 @@ class Run:
         return ((time_mean(time, kinetic) + virial / duration) / area).reshape(2, 2)
 
     def _between(self, name: str, t1: float, t2: float) -> Series:
-        """Return the samples of an observable between those nearest to t1 and nearest to t2."""
+        """Return the samples of an observable from the nearest to t1 to the nearest to t2."""
         time, value = self.observable(name)
         first, last = (int(np.argmin(np.abs(time - t))) for t in (t1, t2))
         if not time[first] < time[last]:

@@ -222,7 +222,7 @@ def remember(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
 
 
 def remember_alone(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
-    """Write both files while this process holds the lock."""
+    """Write input.nml and manifest.txt while this process holds the lock."""
     before = read_manifest(folder)
     path = folder / "input.nml"
     old = path.read_text(encoding="utf-8", errors="surrogateescape") if path.is_file() else text
@@ -246,7 +246,7 @@ def remember_alone(folder: Path, text: str, overrides: Mapping[str, str]) -> Non
 
 
 def may_continue(folder: Path, old: str, new: str) -> bool:
-    """Whether two inputs differ only in variables that may change when a run is continued."""
+    """Return whether inputs differ only in variables that may change when a run continues."""
     program = find_program()
     table = json.loads(subprocess.check_output([program, "--print-variables"]))
     kept = []
@@ -338,7 +338,7 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
 
 
 def is_older(path: Path, other: Path) -> bool:
-    """Whether a file was written before another one."""
+    """Return whether a file was written before another file."""
     return path.stat().st_mtime_ns < other.stat().st_mtime_ns
 
 

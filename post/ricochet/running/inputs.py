@@ -1,4 +1,4 @@
-"""Input files: read their text, and write those of `Simulation.save`."""
+"""Read the text of input files, and write the input files of `Simulation.save`."""
 
 import os
 import zlib

@@ -168,7 +168,7 @@ class Simulation:
         """Write a file from which `ricochet INPUT -o path --resume` continues.
 
         The file contains samples of two states: the initial and the present one.  After a call of
-        `change`, INPUT must be the changed input, which is written to `input`.
+        `change`, INPUT must be the changed input, which this method writes to the file `input`.
 
         Parameters
         ----------
@@ -378,7 +378,7 @@ class Simulation:
         Raises
         ------
         ValueError
-            if no value is given, or a negative one
+            if no value is given, or if a value is negative
 
         Examples
         --------
