@@ -204,8 +204,8 @@ contains
     call run%line%start(run%sim, run%stop_rule, run%started)
     limits%time = run%sim%time()
     call run%output%tighten(limits)
-    ! If no event can occur any more, the run ends with a sample. A run that was stopped just after this sample detects it
-    ! here.
+    ! If no event can occur any more, the run ends with a sample. If a run was stopped just after this sample and is resumed, this
+    ! call detects that no event can occur any more.
     if (run%sim%events_done .and. limits%sampled >= run%sim%time()) call advance_once(run%evolution, run%sim, limits, error)
     do while (.not. (run%stop_rule%is_over(run%sim, run%evolution) .or. allocated(error)))
       limits = run%stop_rule%limits

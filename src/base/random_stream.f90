@@ -148,7 +148,8 @@ contains
     z = z*sqrt(-2*log(s)/s)
   end subroutine draw_normals
 
-  !> Draws a uniform point in the unit disk, except its centre, and returns its squared distance from the centre.
+  !> Draws a uniformly distributed point of the unit disk, and returns the squared distance of the point from the centre of the
+  !> disk. The centre itself is never drawn.
   pure subroutine draw_in_disk(stream, point, s)
     class(random_stream_t), intent(inout) :: stream
     real(real64), intent(out) :: point(2), s

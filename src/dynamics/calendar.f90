@@ -45,7 +45,7 @@ module calendar
     !> array is a circular buffer. A span contains half as many windows as there are buckets. A list may also contain events of
     !> later spans with the same index in the circular buffer.
     integer(int32), allocatable :: list_end(:)
-    !> (0:) all lists, in chunks, each of which is linked to the chunk of its list that was filled before.
+    !> (0:) the chunks of all lists. Each chunk contains a link to the previous chunk of the same list.
     type(filed_t), allocatable :: filed(:)
     integer(int32) :: n_chunks = 0                 !! number of chunks that have been used
     integer(int32) :: vacant = none                !! head of the list of free chunks

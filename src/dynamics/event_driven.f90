@@ -29,7 +29,7 @@ module event_driven
 
   !> Number of events between two checks of the number of collisions against its limit.
   integer(int64), parameter :: events_to_look = 20000
-  !> Largest number of disks that fit into a second-level cache; prefetching saves time for more disks.
+  !> Largest number of disks that fit into a second-level cache. Prefetching saves time if there are more disks.
   integer(int32), parameter :: disks_in_cache = 20000
   integer(int64), parameter :: events_ahead = 8    !! number of events between two prefetches
 

@@ -99,7 +99,7 @@ contains
     text = ""
   end function warning
 
-  !> The first time, not before `time`, at which a change to all disks can occur between two steps of the dynamics.
+  !> The earliest time, at or after `time`, at which a change to all disks can occur between two steps of the dynamics.
   pure function pause_at(self, time) result(t)
     class(evolution_t), intent(in) :: self
     real(real64), intent(in) :: time              !! time since the start of the run

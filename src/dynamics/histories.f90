@@ -1,7 +1,7 @@
 !> Records the motion of disks in one domain during the present time window, in a parallel run. The record of a disk, called its
 !> history, consists of the range of cells in which the disk was and a digest (hash) of its collisions. After the window, the
-!> histories show whether each copy of a disk has moved as the disk itself in the domain that owns it. The module also determines
-!> which collisions a domain counts.
+!> histories show whether each copy of a disk has moved in the same way as the original disk in the domain that owns this disk. The
+!> module also determines which collisions a domain counts.
 module histories
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int16, int32, int64, real64

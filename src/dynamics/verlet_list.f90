@@ -1,4 +1,4 @@
-!> Lists of pairs that are close to each other at the positions of a time step. A pair consists of two disks, or of a disk and an
+!> Lists of the pairs whose members are close to each other in a time step. A pair consists of two disks, or of a disk and an
 !> obstacle. The members of other pairs cannot touch before a disk has moved by half the `skin`, so that a list is valid for many
 !> steps (Verlet, Phys. Rev. 159, 98 (1967)). Loops that run in every step have no branches and are vectorised, as requested by
 !> directives.

@@ -43,8 +43,9 @@ contains
     if (segment%length > 0) segment%along = segment%half/segment%length
   end function new_segment
 
-  !> Tangential velocity of the surface for a unit velocity along the wall: the direction from the first to the second end,
-  !> projected on the tangent. Around an end the surface therefore moves more slowly.
+  !> Tangential velocity of the surface at a point of contact, if the surface moves along the wall with unit speed. The result is
+  !> the unit vector from the first to the second end, projected on the tangent. The surface around an end of the wall therefore
+  !> moves more slowly.
   pure function direction(self, normal) result(along)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: normal(2)

@@ -1,10 +1,10 @@
 !> Checkpoints: the variable state of a simulation and the progress of its output, stored in the output file. A resumed run yields
 !> data that are bit-identical to those of an uninterrupted run.
 !>
-!> During a run its output file contains two slots, datasets with space for one checkpoint each. One slot is valid, and the next
-!> checkpoint is written to the other slot. When the data have been stored on the disk completely, a number in the file is changed,
-!> which makes the new checkpoint the valid one. A complete checkpoint therefore exists at every moment. Each checkpoint has a
-!> checksum. A finished file contains one slot. The file of a run that broke off has no valid checkpoint.
+!> During a run the output file contains two slots. A slot is a dataset with space for one checkpoint. One slot is valid, and the
+!> next checkpoint is written to the other slot. When the data have been stored on the disk completely, a number in the file is
+!> changed, which makes the new checkpoint the valid one. A complete checkpoint therefore exists at every moment. Each checkpoint
+!> has a checksum. A finished file contains one slot. The file of a run that broke off has no valid checkpoint.
 module checkpoint
   use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int8

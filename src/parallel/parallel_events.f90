@@ -31,7 +31,7 @@ module parallel_events
   integer, parameter :: no_engine = 0, serial_engine = 1, all_domains = 2
 
   type, extends(evolution_t) :: parallel_events_t
-    !> Initial state of the serial engine; a copy of it is used when the serial engine is needed.
+    !> Initial state of the serial engine. A copy of this state is used when the serial engine is needed.
     type(event_driven_t) :: serial
     type(partition_t) :: parts
     !> Smallest number of disks in a domain; it is doubled in a periodic box, in which each slab is bounded by twice as many cuts.

@@ -119,7 +119,7 @@ contains
       mass_j = sim%own_mass(j)
     end if
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
-    ! A division, because rounding errors of a stored reciprocal mass would always have the same sign.
+    ! Divides by the mass, because the rounding error of a stored reciprocal mass would be the same in all collisions.
     sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     dv = sim%disk(j)%v - sim%disk(i)%v

@@ -13,7 +13,7 @@ module partners
   integer(int32), parameter :: n_sides = 4
   integer(int32), parameter :: first_crossing = -2000000000
   !> Code of an event that requires a new search: the disk leaves the region in which contacts were searched, but stays in its cell.
-  !> The code is reduced by 1 if the disk leaves this region through its right or upper edge.
+  !> The code is reduced by 1 if the disk leaves this region through the right or upper edge of the region.
   integer(int32), parameter :: looks_again = first_crossing - n_sides
   integer(int32), parameter :: nothing = -huge(1_int32)
   !> Largest length of a series of simultaneous collisions that can be stored.

@@ -18,7 +18,7 @@ module simulation_state
   !> heaviest disks, and `rare` times a typical term of the lightest disks.
   real(real64), parameter :: common = 2.0_real64**7, rare = 2.0_real64**22
   !> The work of walls and kicks may be far less than their parameters suggest, and it is zero before they first act. The units of
-  !> sums are therefore refined by this factor, so that they also resolve the energies of the undriven disks.
+  !> sums are therefore multiplied by this factor, so that the sums also resolve the energies of the undriven disks.
   real(real64), parameter :: finer = 2.0_real64**(-30)
 
   !> The system: box, contact law, driving and features, which together determine the motion of the disks.

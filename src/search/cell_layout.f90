@@ -14,8 +14,8 @@ module cell_layout
 
 contains
 
-  !> Chooses the cells for all disks and obstacles of a simulation. An obstacle counts like a disk, because disks have to be tested
-  !> against obstacles that reach into their cells.
+  !> Chooses the cells for all disks and obstacles of a simulation. In this choice an obstacle counts as a disk, because each disk
+  !> has to be tested against the obstacles that reach into its cell.
   pure function whole_box(sim, undivided) result(patch)
     type(simulation_t), intent(in) :: sim
     logical, intent(in) :: undivided

@@ -168,8 +168,8 @@ contains
     fraction = settings%n_disks()*pi*radius**2/product(settings%box%edges())
   end function crowding
 
-  !> The smaller of the memory available on the machine and the limit of the control group, because a batch job that exceeds this
-  !> limit is killed without a message. The result is huge if neither is known. [bytes]
+  !> The available memory: the smaller of the free memory of the machine and the limit of the control group. A batch job that
+  !> exceeds the limit of its control group is killed without a message. The result is huge if neither is known. [bytes]
   function free_memory(root) result(bytes)
     character(len=*), intent(in) :: root                  !! root of the file system; empty except in tests
     integer(int64) :: bytes

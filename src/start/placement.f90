@@ -44,7 +44,7 @@ contains
 
   !> Sets the positions and radii of all disks. Also sets the velocities of the disks if a file contains velocities.
   subroutine place_disks(species, groups, seed, line, sim, problems)
-    !> The species; the procedure deallocates their tables of disks that were read from files.
+    !> The species. The procedure deallocates the tables of disks that were read from files.
     type(species_settings_t), intent(inout) :: species(:)
     type(group_t), intent(in) :: groups(:)                  !! groups of the species
     integer(int64), intent(in) :: seed
@@ -264,8 +264,8 @@ contains
     end subroutine place_densely
   end subroutine place_disks
 
-  !> Represents the region, without the parts that displaced sides cover, as a box. Placed disks (and periodic images of disks) that
-  !> reach into this box become obstacles in this box.
+  !> Creates a box that represents the region without the parts covered by displaced sides. Placed disks (and periodic images of
+  !> disks) that reach into this box become obstacles in this box.
   function growth_box(packing, region) result(box)
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: region(4)

@@ -1,9 +1,10 @@
 !> Random sequential insertion: each disk is inserted at a point that is uniformly distributed among all points where the disk fits
-!> between the previous disks. Points are drawn only from voxels (small rectangles) of the region from which no single disk excludes
-!> the centre completely. Voxels are halved along both axes when attempts fail too often. An attempt outside of these voxels would
-!> always fail. The distribution is therefore that of simple insertion, up to saturation (Zhang and Torquato, Phys. Rev. E 88,
-!> 053312 (2013)). If radii differ, the largest disks are inserted first. Voxels are then not eliminated, because a voxel without
-!> space for one disk may have space for a smaller disk. The insertion ends when many attempts to insert a disk have failed.
+!> between the previous disks. The region is divided into voxels (small rectangles). A voxel is eliminated if a single disk excludes
+!> the centre of a new disk from the whole voxel. Points are drawn only from the remaining voxels. Voxels are halved along both axes
+!> when attempts fail too often. An attempt in an eliminated voxel would always fail. The distribution is therefore that of simple
+!> insertion, up to saturation (Zhang and Torquato, Phys. Rev. E 88, 053312 (2013)). If radii differ, the largest disks are inserted
+!> first. In this case no voxels are eliminated, because a voxel without space for one disk may have space for a smaller disk. The
+!> insertion ends when many attempts to insert a disk have failed.
 module random_insertion
   use kinds, only: int32, real64
   use memory_hints, only: prefetch

@@ -81,8 +81,9 @@ contains
     if (.not. allocated(me%in_file%error)) call fail(me%in_file%error, exit_usage, why)
   end subroutine refuse
 
-  !> Completes the table with values from the input. A quantity is reported if neither the file nor the input contains it, and also
-  !> if both contain it; in the output file of a run, however, the input may override values.
+  !> Completes the table with values from the input. Reports each quantity that neither the file nor the input contains. Also
+  !> reports each quantity that both a text file and the input contain; values from the output file of a run may be overridden by
+  !> the input.
   subroutine join(me)
     type(species_settings_t), intent(inout) :: me
     logical :: wanted(radius_row:mass_row)
