@@ -50,7 +50,7 @@ Results, in the format H5MD. Until the run has finished: OUT.h5.part.
 
 
 def roff(text: str) -> str:
-    """Return the text with all characters escaped that are special in roff."""
+    """Return the text with the special characters of roff escaped."""
     text = text.replace("\\", "\\e").replace("-", "\\-")
     return "\n".join("\\&" + line if line[:1] in {".", "'"} else line for line in text.split("\n"))
 

@@ -130,7 +130,7 @@ def fitted_values(curve: list[Point], axis: str) -> int:
 
 
 def unfitted(scans: Scans, runs: list[Run]) -> list[str]:
-    """Return the reason why curves have no fit, and the bed size that would allow one."""
+    """Return the reason why curves have no fit, and the bed size that would allow a fit."""
     notes, fraction = [], energy_fraction(runs[0])
     for axis, curve in ((axis, curve) for axis, scan in scans.items() for curve in scan):
         cut = [p for p in curve if not p.free]

@@ -11,8 +11,9 @@ Thermal walls and driving are allowed if they all impose the same temperature; i
 measured mean whose error is included.  Walls exclude disks from a layer, so that the density in the
 interior is higher: the wall pressure therefore refers to the area accessible to the centres, and
 differs from the bulk pressure by a fraction of about 1/sqrt(N).  For disks of many radii r the
-curves are the equation of state of a fluid by Santos, Yuste and Lopez de Haro 1999.  This equation
-depends on the radii only through <r>^2 / <r^2>, a ratio that must be the same for all runs.
+curves show the equation of state that Santos, Yuste and Lopez de Haro (1999) derived for fluids.
+This equation depends on the radii only through <r>^2 / <r^2>, a ratio that must be the same for all
+runs.
 """
 
 from ricochet import Run, RunError, hard_disks

@@ -11,9 +11,10 @@ per area) and the kinetic part of the heat flux (the sum of m c^2 c / 2 per area
 parts of stress and heat flux are not included.  Within a cell u is interpolated linearly from the
 neighbouring cells.  The frames after --equilibration are used; by default this is the second half
 of each run.  Errors follow from the differences between blocks of time, taken from all runs of one
-input (docs/theory.md).  A cell that contained disks in fewer than two blocks has a density only.  A
-cell has kT, stress and heat flux if at least three disks remain whichever block is left out.  With
---species the fields are those of one species, relative to the mean flow of that species.
+input (docs/theory.md).  A cell that contained disks in fewer than two blocks has a density only.
+The table contains kT, stress and heat flux of a cell only if at least three disks remain in the
+cell, whichever block of time is left out.  With --species the fields are those of one species,
+relative to the mean flow of that species.
 
 --grid also draws the stream function psi of the flux j = n u, where j_x = d psi / dy and j_y = -d
 psi / dx.  The contour lines of psi are the streamlines of the mean flow.  The longest arrow is the

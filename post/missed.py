@@ -74,7 +74,7 @@ def rate_and_temperature(run: Run, skip: float | None) -> tuple[SeriesMean, floa
 
 
 def missed_of_pairs(rates: list[SeriesMean], exact: list[SeriesMean]) -> Estimate:
-    """Return the fraction of collisions that time steps miss, from pairs of runs of one seed.
+    """Return the fraction of collisions that time steps miss, from runs with equal seeds.
 
     The error follows from the scatter of the pairs or, for a single pair, from the fluctuations of
     both rates.
@@ -89,7 +89,7 @@ def missed_of_pairs(rates: list[SeriesMean], exact: list[SeriesMean]) -> Estimat
 
 
 def compare(runs: list[Run], skip: float | None) -> list[dict]:
-    """Return a row for each time step, in percent, after the event-driven runs (dt = 0)."""
+    """Return a row in percent for the event-driven runs (dt = 0) and for each time step."""
     groups = grouped(runs, lambda run: run.time_step)
     if groups[0][0] != 0 or len(groups) < 2:
         raise RunError("event-driven and time-stepped runs are required")

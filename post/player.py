@@ -314,7 +314,7 @@ def view() -> str:
 
 
 def paged(film: dict | None, words: dict[str, str]) -> str:
-    """Return the page with these texts; without a film, the page may request it from its server."""
+    """Return the page with these texts; a page without a film may request one from its server."""
     style = text_of("style.css")
     script = "\n".join(text_of(f"{name}.js") for name in SCRIPTS)
     fillings = {name: html.escape(text) for name, text in words.items()} | {
@@ -375,7 +375,7 @@ def enclosed(data: object) -> str:
 
 
 def policy(style: str, script: str, *more: str) -> str:
-    """Return the content security policy: only the page's script and style, and `more` requests."""
+    """Return the content security policy, which allows only the page's own code, and `more`."""
     rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'", *more]
     for tag, own in (("script", script), ("style", style)):
         digest = base64.b64encode(hashlib.sha256(own.encode()).digest()).decode()

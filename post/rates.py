@@ -22,7 +22,7 @@ Enskog).  Free paths are not defined for driven disks, whose velocities change b
 
 For runs that lose energy, or whose walls differ in temperature, only the free paths are analysed.
 The frames used are those after --equilibration; without that option they are the frames without
-drift or, in a gas that cools, those later than 15 collisions per disk.
+drift or, in a gas that cools, the frames later than 15 collisions per disk.
 """
 
 from ricochet import Run, RunError, statistics, thermodynamics as td

@@ -31,7 +31,7 @@ replace "$data/lorentz.nml" <<NML
 /
 NML
 
-# A frame every ten mean free times 1/(2 n R v).
+# Frames are written every ten mean free times 1/(2 n R v).
 for density in 0.0025 0.005 0.01 0.02 0.04 0.08; do
   for seed in 1 2 3 4; do
     file=$data/scatterers_${scatterers}_${density}_$seed.txt

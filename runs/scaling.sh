@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Speedup of a run on several cores of this machine. The script takes about five minutes, during which no other program should run.
-# It is not part of `make figures`. The runs are gases at a packing fraction of 0.5 in a box with walls, for 6 million collisions
+# The script is not part of `make figures`. The runs are gases at a packing fraction of 0.5 in a box with walls, for 6 million collisions
 # (15 million for a million disks). Each is run three times, alternately with 1, 2, 4, ... threads up to the number of cores.
 #
 #   runs/scaling.sh

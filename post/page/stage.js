@@ -249,8 +249,8 @@ function drawMarks() {
   if (state.arrows) drawArrowKey();
 }
 
-// Draws a line from the centre to the rim of each disk that is large enough, which shows its
-// orientation.
+// Shows the orientation of each disk by a line from its centre to its rim, if the disk is large
+// enough.
 const LEAST_TO_TURN = 2;
 function drawRadii() {
   marks.strokeStyle = ink.stage;

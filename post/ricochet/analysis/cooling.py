@@ -107,7 +107,7 @@ def moving_energy(run: Run, name: str = "all") -> np.ndarray:
 
 
 def first_rate(run: Run) -> float:
-    """Return the initial collision rate per disk, from the equation of state or by counting.
+    """Return the initial collision rate from the equation of state or from counted collisions.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def first_rate(run: Run) -> float:
 
 
 def counted_rate(run: Run) -> float:
-    """Return w0 from the first collision of each disk, corrected for the cooling until then."""
+    """Return w0 from the first collisions of disks, corrected for the preceding cooling."""
     time, tau = run.collisions_per_disk
     first = min(int(np.searchsorted(tau, 1.0)), len(tau) - 1)
     slower = (1 - run.restitution**2) * tau[first] / 4

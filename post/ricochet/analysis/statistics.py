@@ -77,7 +77,7 @@ class PowerLaw(NamedTuple):
     free: int = 0  # degrees of freedom
 
     def misses(self, runs: int) -> bool:
-        """Return whether the points deviate from the law by more than their errors explain.
+        """Return whether the points deviate from the power law by more than their errors explain.
 
         The test, that of Welch (1951), allows for errors that were estimated from `runs` runs.
         """
@@ -238,7 +238,7 @@ class SeriesMean(NamedTuple):
 
 
 def cells(series: np.ndarray, count: int) -> np.ndarray:
-    """Return the means of `count` equal parts of a series (T,); a rest at its start is left out."""
+    """Return the means of `count` equal parts of a series (T,), which end at its last sample."""
     width = max(1, len(series) // count)
     return series[len(series) % width :].reshape(-1, width).mean(axis=1)
 
@@ -346,7 +346,7 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
 
 
 def equilibration(series: np.ndarray) -> int:
-    """Return the number of samples at the start of a series before it is stationary.
+    """Return the number of samples before a series becomes stationary.
 
     The result is twice the number of samples that White's rule leaves out (MSER; K. P. White,
     Simulation 69, 323 (1997)).  The rule minimises the standard error of the mean of the remaining

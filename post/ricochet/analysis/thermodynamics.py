@@ -102,10 +102,10 @@ def after_start(run: Run, skip: float | None = None) -> float:
 def start_of_steady_state(run: Run, skip: float | None = None) -> float:
     """Return the time after which a run is in a steady state.
 
-    The collision rate and the energies of each species, as far as they can change, are tested for
-    drifts at the times of observables or, if these are few, of frames.  The result is at least
-    `SPEEDS_FORGET` collisions per disk after the start, so that speed distributions are steady; for
-    a shorter run it is at most half of the time.
+    The collision rate and the energies of the species, if they can change, are tested for drifts.
+    The tests use the samples of the observables or, if there are only few samples, the frames.  The
+    result is at least `SPEEDS_FORGET` collisions per disk after the start, so that speed
+    distributions are steady; for a shorter run it is at most half of the time.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
 def frames_from(
     run: Run, start: float, apart: float = 0.0, frames: list[int] | None = None
 ) -> list[int]:
-    """Select frames after a given time that are some collisions apart.
+    """Select frames after a given time with a minimum number of collisions between them.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ def later(run: Run, skip: float | None = None) -> slice:
 
 
 def motion_notes(runs: Sequence[Run]) -> list[str]:
-    """Return a note that motion is relative to the centre of mass, if noise moves the latter."""
+    """If noise moves the centre of mass, return a note that motion is relative to it."""
     walks = any("random_walk" in run.nature for run in runs)
     note = "noise moves the centre of mass (drive.keep_momentum): motion is measured relative to it"
     return [note] * walks

@@ -179,7 +179,7 @@ def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
     return correlated_mean((far - near[: len(far)]) / (2 * step * (lag - half)))
 
 
-# --- coefficients relative to those of Enskog ---
+# --- coefficients divided by Enskog's coefficients ---
 
 
 class Found(NamedTuple):

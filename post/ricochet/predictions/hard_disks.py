@@ -40,9 +40,9 @@ FLUID = np.array([
     (0.30, 2.06326), (0.35, 2.40150), (0.40, 2.82933), (0.45, 3.38054), (0.50, 4.10636),
     (CLOSE_PACKING / 1.6, 5.4963), (CLOSE_PACKING / 1.5, 6.6074), (CLOSE_PACKING / 1.4, 8.306),
 ])  # fmt: skip
-# No published values are known from there to freezing. These values were computed with this program
-# from two runs of 8000 disks and 1000 collisions per disk at each packing fraction, with errors
-# below 0.1 %; the last value is that of 1024^2 disks in `MELTING`.
+# Up to freezing at 0.698 no published values are known. These values were computed with this
+# program from two runs of 8000 disks and 1000 collisions per disk at each packing fraction, with
+# errors below 0.1 %; the last value is that of 1024^2 disks in `MELTING`.
 FREEZING = np.array([
     (0.66, 8.875), (0.67, 9.350), (0.68, 9.839), (0.69, 10.234),
     (0.698, 9.16934 * math.pi / 4 / 0.698),
@@ -421,7 +421,7 @@ def speed_of_sound(eta: float, kt: float = 1.0, mass: float = 1.0) -> float:
     Parameters
     ----------
     eta : float
-        packing fraction; Z is that of Henderson
+        packing fraction; Z follows from Henderson's formula
     kt, mass : float
         temperature and mass of a disk
 

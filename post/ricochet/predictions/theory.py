@@ -267,10 +267,10 @@ def demon_share(climb: float, layers: float, xi: float) -> float:
 
     A sawtooth floor of velocity V supplies the power n m g V to the n disks of a chamber.  In a
     column of uniform temperature collisions dissipate n^2 m g s sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w,
-    where s is the diameter and w the width.  The balance is T/m = (2 V w / (n s sqrt(pi) (1 -
-    xi^2)))^2.  The flux through a hole at the height h is proportional to n^2 exp(-m g h / T) (J.
-    Eggers, Phys. Rev. Lett. 83, 5322 (1999)).  In a steady state the fluxes in both directions are
-    equal; equal fractions are unstable if m g h > T.
+    where s is the diameter and w the width.  In a steady state the dissipation equals the power, so
+    that T/m = (2 V w / (n s sqrt(pi) (1 - xi^2)))^2.  The flux through a hole at the height h is
+    proportional to n^2 exp(-m g h / T) (J. Eggers, Phys. Rev. Lett. 83, 5322 (1999)).  In a steady
+    state the fluxes in both directions are equal; equal fractions are unstable if m g h > T.
 
     Parameters
     ----------

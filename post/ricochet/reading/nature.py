@@ -43,7 +43,7 @@ TRAITS = {
     "walls": "has walls",
     "mixture": "has disks of different mass or radius",
 }
-#: Traits that change the energy by other processes than dissipation in collisions.
+#: Traits of runs whose energy changes by processes other than dissipation in collisions.
 SOURCES = {
     "changed",
     "sheared",

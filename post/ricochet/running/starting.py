@@ -23,7 +23,7 @@ NUMBERS = itertools.count(1)
 
 
 def with_start(group: Mapping[str, Any], place: Path | None) -> Mapping[str, Any]:
-    """Return a species whose values for each disk, if there are any, are in a starting file.
+    """Return a species whose arrays with a value for each disk are in a starting file.
 
     The name of the file begins with `place`; without it the file exists until this process ends.
     """
