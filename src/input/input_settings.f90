@@ -308,7 +308,7 @@ contains
       end associate
     end subroutine refuse
 
-    !> Reports an interval that would occur too often before stop.time.
+    !> Reports an interval that is so short that it would elapse more than `most` times before stop.time.
     subroutine limit(group, name, of_what, most)
       character(len=*), intent(in) :: group, name, of_what
       real(real64), intent(in) :: most

@@ -34,7 +34,7 @@ module settings
   type :: disks_in_file_t
     real(real64), allocatable :: table(:, :)          !! (column_names,n) see `position_file`; deallocated when the disks are placed
     logical, allocatable :: there(:)                  !! (column_names) for each column, whether the file contains it
-    integer, allocatable :: rows(:)                   !! (n) lines of a text file, or rows in the last frame of a run
+    integer, allocatable :: rows(:)                   !! (n) line numbers in a text file, or row numbers in the last frame of a run
     type(error_t), allocatable :: error               !! reason why the disks cannot be used
   end type disks_in_file_t
 
@@ -65,7 +65,7 @@ module settings
     real(real64) :: speed
     real(real64) :: temperature                       !! kT for 'maxwell' [energy]
     real(real64) :: exact_temperature = -1.0_real64   !! kT to which velocities are scaled; negative if it is not given [energy]
-    real(real64), allocatable :: velocity(:, :)       !! (2,count), or (2,1) for all disks, for 'explicit'; otherwise (2,0)
+    real(real64), allocatable :: velocity(:, :)       !! velocities for 'explicit': (2,count), or (2,1) for all disks; else (2,0)
     real(real64) :: angular_velocity = 0.0_real64     !! angular velocity of all disks [1/time]
     !> kT of rotation, the mean of I omega**2; negative if it is not given [energy]
     real(real64) :: rotational_temperature = -1.0_real64

@@ -399,8 +399,8 @@ contains
   subroutine write_end(self, sim, cost, note, broken)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: cost(3)           !! since the start or the last resume: wall time [s], collisions per
-    !! processor time [1/s], number of events executed by the serial engine
+    real(real64), intent(in) :: cost(3)           !! three values since the start or the last resume:
+    !! wall time [s], collisions per processor time [1/s], number of events executed by the serial engine
     character(len=*), intent(in) :: note          !! reason why the run ended, if no stop rule was met
     logical, intent(in) :: broken
     type(progress_t) :: before

@@ -163,8 +163,9 @@ contains
     end associate
   end subroutine apply_tangential_impulse_at_wall
 
-  !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk is the work of the moving
-  !> surface, plus the heat from a thermal wall or minus the energy dissipated at any other wall.
+  !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk is the sum of the work of the
+  !> moving surface and a remainder. The remainder is heat if the wall is thermal; at any other wall it is the negative of the
+  !> dissipated energy.
   pure subroutine add_wall_sums(sim, i, k, heats, u, v, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

@@ -55,7 +55,7 @@ contains
       if (motion%moves()) then
         since = disk%clock
         v = -sense*disk%v(axis)
-        if (motion%kind == piston) then             ! the clocks of the disk and of the piston are not later than the contact
+        if (motion%kind == piston) then             ! the contact is not before the clock of the disk or of the piston
           since = max(since, state%clock)
           after = since - disk%clock
           gap = gap + flight(0.0_real64, v, -sense*box%gravity(axis), after)

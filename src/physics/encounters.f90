@@ -317,7 +317,7 @@ contains
     dv(1) = dv(1) + image%velocity
   end subroutine use_nearest_image
 
-  !> True if disks i and j, which touch at the time t, are still in contact after their last collision, through the same periodic
+  !> Whether disks i and j, which touch at the time t, are still in contact after a collision with each other in the same periodic
   !> image. There are no forces between the disks. An approach of two such disks is therefore a rounding error, which results from
   !> the shift of one disk by a period.
   pure function are_in_contact(sim, i, j, t) result(yes)

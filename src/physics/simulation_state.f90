@@ -44,7 +44,7 @@ module simulation_state
     real(real64) :: now = 0.0_real64              !! present time, since the epoch [time]
     logical :: events_done = .false.              !! all events up to and including `now` have been executed
     real(real64) :: epoch_begin = 0.0_real64      !! start of the epoch, relative to the origin of time of this epoch [time]
-    real(real64) :: epoch_end = 0.0_real64        !! end of the epoch, since the epoch; 0: not known yet [time]
+    real(real64) :: epoch_end = 0.0_real64        !! end of the epoch, relative to the origin of time; 0 if not known yet [time]
     integer(int64) :: epoch_events = 0            !! number of events before the start of the epoch
     ! For the detection of a collapse, an infinite series of events during which time does not advance:
     real(real64) :: negligible_time = 0.0_real64  !! time in which no disk moves noticeably; 0 if it is not known yet [time]

@@ -219,7 +219,7 @@ contains
     integer(int32), intent(in) :: c, stride, i
     integer(int32), intent(out) :: list(list_capacity)
     integer(int32), intent(out) :: n               !! number of disks in `list`
-    integer(int64) :: below, here, above, m, own   ! 64 bits, as an address, so that no conversion is needed
+    integer(int64) :: below, here, above, m, own   ! 64 bits, like addresses, so that no conversion is needed
 
     here = c
     below = here - stride

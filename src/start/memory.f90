@@ -23,7 +23,7 @@ module memory
   real(real64), parameter :: listed = 264                    !! neighbour list
   !> Random numbers for the driving; Verlet lists of time-stepped dynamics.
   real(real64), parameter :: kicked = 16, stepped = 100
-  !> Additional memory with domains: in a box with walls, in a periodic box.
+  !> Additional memory with domains. The first value is for a box with walls, the second value for a periodic box.
   real(real64), parameter :: divided(2) = [143, 205]
   real(real64), parameter :: listed_twice = 80               !! additional memory with domains and neighbour lists
   ! Total memory during the placement of disks: at given positions, at random positions, at positions from a file, and by

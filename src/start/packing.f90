@@ -179,7 +179,7 @@ contains
   end subroutine load_disks
 
   !> Finds a disk of species s that excludes disks of the given radius from every point of the rectangle p +- half. The result is 0
-  !> if there is no such disk. The cell in the middle is searched first, because it is the most likely one to contain such a disk.
+  !> if there is no such disk. The cell in the middle is searched first, because such a disk is most likely in this cell.
   pure subroutine search_layer(packing, s, p, half, radius, blocker)
     type(packing_t), intent(in) :: packing
     integer, intent(in) :: s
