@@ -7,11 +7,11 @@ xi, show the mean kinetic energy per disk against time in the units of the input
 contains 95 % of single runs.  The band is measured if there are at least four runs; otherwise it is
 estimated from the numbers of disks. The row below compares all xi on a logarithmic axis.  It shows
 the kinetic energy per disk of each species in units of the initial mean over all disks; bands are
-errors of the means.  The lowest row shows the temperature of the heaviest species over that of the
-lightest, which is 1 in equilibrium; it is omitted if all masses are equal.  With fewer than four
-runs the half-width of its band is twice the standard deviation over single runs.  The table
-contains the energies against collisions per disk in these reduced units, and the energies against
-time in the units of the input.
+errors of the means.  The lowest row shows the ratio of the temperatures of the heaviest and the
+lightest species, which is 1 in equilibrium.  This row is omitted if all masses are equal.  With
+fewer than four runs the half-width of its band is twice the standard deviation over single runs.
+The table contains the energies against collisions per disk in these reduced units, and the energies
+against time in the units of the input.
 """
 
 from itertools import chain, cycle

@@ -9,9 +9,10 @@ once; `displaced`, the number of bed disks that are further than one radius from
 position in the last frame; `width` and `depth`, the extent of the first positions of the displaced
 disks, where the depth is measured downwards from the surface of the bed; `hole_width` and
 `hole_depth`, the extent of the hole, in which the packing fraction, smoothed over a few disks, is
-below half of that of the bed.  Runs in which the bed moves without a projectile, for example under
-gravity, are refused.  A crater is marked if the walls affect it (their collisions exceed 1 % of the
-number of disks), or if the run ended with more energy left than `stop.energy_fraction`.
+below half of the packing fraction of the bed.  Runs in which the bed moves without a projectile,
+for example under gravity, are refused.  A crater is marked if the walls affect it (their collisions
+exceed 1 % of the number of disks), or if the run ended with more energy left than
+`stop.energy_fraction`.
 """
 
 from ricochet import Run, crater, drawing

@@ -77,7 +77,7 @@ def temperature(run: Run) -> Curves:
 
 
 def components(run: Run) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return kT_x and kT_y of all disks about their mean velocity at the observables' times."""
+    """Return kT_x and kT_y of all disks, relative to their mean velocity, against time."""
     time, tensor = run.observable("kinetic_tensor")
     motion = 0 if run.shear_rate else run.observable("momentum").value ** 2 / run.mass.sum()
     kt = (tensor[:, [0, 3]] - motion) / (run.n_disks - 1)

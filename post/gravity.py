@@ -77,7 +77,7 @@ def sharers(run: Run) -> float:
 
 
 def sharing(energy: np.ndarray, temperature: float, count: float) -> np.ndarray:
-    """Return the weight of an energy of one disk if `count` disks share a fixed total energy."""
+    """Return the probability weight of an energy of one of `count` disks of fixed total energy."""
     if np.isinf(count):
         return np.exp(-energy / temperature)
     return np.maximum(1 - energy / (2 * count * temperature), 0) ** (2 * count - 2)

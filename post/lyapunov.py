@@ -5,11 +5,12 @@
 The runs are paired in the given order.  The two runs of a pair start from almost the same state and
 have frames at the same times.  Their distance is the Euclidean distance of the positions of all
 disks, with the nearest images at periodic sides.  This distance grows as exp(lambda t) until it
-reaches the size of the billiard.  A straight line is fitted to its logarithm for each pair, in the
-same interval of time for all pairs.  The interval ends when the first pair reaches the distance
---largest, and begins at the fraction --fit-from of its end.  Before this interval the separation
-still turns into the direction of fastest growth.  lambda is the mean of the slopes, with its error.
-Gases that cool are refused, because they have no constant rate of divergence.
+reaches the size of the billiard.  A straight line is fitted to the logarithm of the distance of
+each pair, in the same interval of time for all pairs.  The interval ends when the first pair
+reaches the distance --largest, and begins at the fraction --fit-from of its end.  Before this
+interval the separation still turns into the direction of fastest growth.  lambda is the mean of the
+slopes, with its error. Gases that cool are refused, because they have no constant rate of
+divergence.
 """
 
 from typing import NamedTuple

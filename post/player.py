@@ -59,8 +59,9 @@ MOST_AT_ONCE = 200000  # number of disks, over all frames, that are read togethe
 def frames_that_fit(run: Run, room: float) -> int:
     """Return the number of frames that fit into the file.
 
-    Each disk needs two 16-bit positions and velocities, 8 bits of collisions, 32 bits of an angle.
-    Up to half of the file is reserved for collisions between frames.
+    Each disk requires two position and two velocity components of 16 bits each, 8 bits for its
+    collisions, and 32 bits for its angle. Up to half of the file is reserved for collisions between
+    frames.
     """
     more = (run.event_count is not None) + (run.image is not None)
     more += 4 * ("orientation" in run.disk_data)

@@ -425,8 +425,8 @@ const actions = {
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());
 const keys = { r: 'run', p: 'pause', k: 'keep', s: 'settings', l: 'larger' };
 
-// Keyboard shortcuts of the laboratory work whichever element has the focus. The shortcuts of a
-// film apply to all films unless one of the films has the focus.
+// Keyboard shortcuts of the laboratory do not depend on which element has the focus. The shortcuts of
+// a film apply to all films unless one of the films has the focus.
 function typed(event) {
   const { key, target } = event, own = target.ownerDocument === document;
   if (target.matches('input:not([type=range]), select') || event.ctrlKey || event.metaKey || event.altKey || $('inputs').open) return;

@@ -48,7 +48,7 @@ class SpeedTest(NamedTuple):
 def shares(run: Run, frames: Index, name: str) -> np.ndarray:
     """Return the energies (F, n) of a species divided by the mean energy of the frame.
 
-    In equilibrium the mean is over all disks, otherwise over the disks of the species.
+    In equilibrium the mean energy is that of all disks, otherwise that of the species.
     """
     energy, own = thermal_energy(run, frames), run.of_species(name)
     unit = energy if run.nature.in_equilibrium else energy[:, own]

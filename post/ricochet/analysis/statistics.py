@@ -378,8 +378,8 @@ def equilibration(series: np.ndarray) -> int:
 def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
     """Combine the means of independent runs into one mean.
 
-    The error follows from the errors of the runs.  It follows from the scatter of the runs if this
-    scatter is larger than the errors explain, or if a run has no error.
+    The error follows from the errors of the runs.  If the runs scatter by more than these errors
+    explain, or if a run has no error, the error follows from the scatter of the runs instead.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def all_settle(runs: Sequence[Run]) -> bool:
 
 
 def after_start(run: Run, skip: float | None = None) -> float:
-    """Return the time after `skip` collisions per disk, or by default after `SPEEDS_FORGET`.
+    """Return the time after `skip`, or by default `SPEEDS_FORGET`, collisions per disk.
 
     For a shorter run, the time is half of the duration of the run.
     """

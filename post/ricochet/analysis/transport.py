@@ -268,7 +268,7 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
 
 
 def frames_in_step(run: Run, start: float) -> slice:
-    """Return the equally spaced frames in equilibrium, without the last one."""
+    """Return the equally spaced frames in equilibrium, without the last frame."""
     frames = slice(int(np.searchsorted(run.time, start)), run.n_frames - 1)
     if len(run.time[frames]) < 17 or not in_step(run.time[frames]):
         raise RunError(

@@ -632,9 +632,9 @@ class Run:
     def accessible_area(self, time: float | np.ndarray) -> np.ndarray:
         """Return the accessible area at given times: the area of the box without its obstacles.
 
-        If disks are in a round container, the area is that of the container.  Sides that move at
-        constant velocity and pistons are at their positions at the given time.  Oscillating sides
-        are at their mean positions, as in the pressure that the program writes.
+        If disks are in a round container, the accessible area is the area of the container.  Sides
+        that move at constant velocity and pistons are at their positions at the given time.
+        Oscillating sides are at their mean positions, as in the pressure that the program writes.
 
         Parameters
         ----------
@@ -664,9 +664,9 @@ class Run:
     def pressure(self, t1: float, t2: float) -> float:
         """Return the mean pressure between two times, which are rounded to the nearest samples.
 
-        It is (<K> + dW / 2 dt) / <A>: K is the kinetic energy relative to the flow of a sheared
-        box, W the virial, A the accessible area.  Means over time are computed with the trapezoidal
-        rule.
+        The pressure is (<K> + dW / 2 dt) / <A>, where K is the kinetic energy relative to the flow
+        of a sheared box, W the virial, A the accessible area.  Means over time are computed with
+        the trapezoidal rule.
 
         Parameters
         ----------
@@ -700,9 +700,9 @@ class Run:
     def pressure_tensor(self, t1: float, t2: float) -> np.ndarray:
         """Return the mean pressure tensor (2, 2) between two times, rounded to the nearest samples.
 
-        It is (<sum of m v_a v_b> + dW_ab / dt) / <A>, with the virial tensor W; its trace is twice
-        the `pressure`.  Some runs contain the virial tensor only with `output.virial_tensor =
-        .true.`.
+        The tensor is (<sum of m v_a v_b> + dW_ab / dt) / <A>, where W is the virial tensor.  The
+        trace of the pressure tensor is twice the `pressure`.  Some runs contain the virial tensor
+        only with `output.virial_tensor = .true.`.
 
         Parameters
         ----------

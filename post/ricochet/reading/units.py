@@ -1,7 +1,7 @@
 """Names of the units of an input for the labels of axes.
 
-An input consists of numbers without units, for which its author can choose for example metres or
-diameters.  The names of units change labels only, never numbers.
+An input consists of numbers without units.  The author of an input chooses the units, for example
+metres or diameters.  The names of units change labels only, never numbers.
 """
 
 from typing import NamedTuple
