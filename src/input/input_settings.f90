@@ -256,7 +256,7 @@ contains
       call refuse(alone .and. (shear .or. kicks) .and. .not. timed, "stop", &
         "a single disk in a periodic box that is sheared (box.shear_rate) or driven (drive.kind): no event ever occurs; give time")
     end associate
-    call check_samples()
+    call check_columns()
     if (settings%run%dynamics == "steps") call limit("run", "dt", "steps", 1.0e18_real64)
     call limit("drive", "interval", "kicks", 1.0e15_real64)
     call limit("output", "frames_every_time", "samples", 1.0e9_real64)
@@ -264,35 +264,19 @@ contains
 
   contains
 
-    !> Reports sampling times that are all later than the end of the run, and columns of frames that the input names twice or that
-    !> do not exist in this run.
-    subroutine check_samples()
-      character(len=*), parameter :: late = "no sample would be taken until stop.time"
+    !> Reports columns of frames that are named twice.
+    subroutine check_columns()
       integer :: g, k
 
       g = place_of("output", groups%name)
-      if (g == 0) return
-      associate (output => settings%output, group => groups(g), last => settings%stop%time)
-        do k = 1, size(sampled)
-          associate (sampling => output%sampling(k))
-            if (allocated(sampling%at)) then
-              if (all(sampling%at > last)) call group%complain(trim(sampled(k))//"_at", late, problems)
-            end if
-          end associate
-        end do
-        if (any(output%sampling%per_decade > 0 .and. output%sampling%from > last .and. output%sampling%from < never)) &
-          call group%complain("decades_from", late, problems)
-        if (.not. allocated(output%frame_columns)) return
-        do k = 1, size(output%frame_columns)
-          associate (name => output%frame_columns(k))
-            if (any(output%frame_columns(:k - 1) == name)) call group%complain("frame_columns", &
-              "'"//trim(name)//"' is named twice", problems)
-            if (name == "image" .and. .not. any(settings%box%periodic)) call group%complain("frame_columns", &
-              "'image' needs a periodic axis (box.boundary)", problems)
-          end associate
+      if (g == 0 .or. .not. allocated(settings%output%frame_columns)) return
+      associate (columns => settings%output%frame_columns)
+        do k = 1, size(columns)
+          if (any(columns(:k - 1) == columns(k))) call groups(g)%complain("frame_columns", &
+            "'"//trim(columns(k))//"' is named twice", problems)
         end do
       end associate
-    end subroutine check_samples
+    end subroutine check_columns
 
     !> Reports that a variable or group cannot be combined with another setting.
     subroutine refuse(together, variable, other)

@@ -77,7 +77,7 @@ def test_a_part_of_the_frames_has_the_turns_between_them(simulated):
 @pytest.mark.parametrize(
     ("more", "why"),
     [
-        ("&drive kind = 'andersen' fraction = 0.1 interval = 0.1 temperature = 1 /\n", "kicks"),
+        ("&drive kind = 'andersen' fraction = 0.1 interval = 0.1 temperature = 1 /\n", "driving"),
         ("&box boundary = 'periodic', 'periodic' shear_rate = 1 /\n", "images"),
     ],
 )

@@ -220,7 +220,7 @@ def test_scripts_see_each_disk_and_refuse_laws_of_equal_ones(ricochet, tmp_path,
     assert (radii[own] == by_species(bed)["radius"]).all()
     assert run_script("mixture", run.path, "-o", tmp_path / "mixture.png") == 1
     message = capsys.readouterr().err
-    assert "the disks of 'bed' are not of one mass and radius" in message
+    assert "the disks of 'bed' differ in mass or radius" in message
     mass = run.mass[:108]
     assert run.by_species[0].label == f"bed, m = {mass.min():g} to {mass.max():g}"
 
