@@ -119,7 +119,7 @@ module run_variables
       //"In other systems .true. adds them at a small cost."), &
     variable_t("output", "helfand", "logical", 1, "default", ".false.", &
       "Accumulation of the Helfand moments of momentum and energy, from which the shear and the bulk viscosity and the " &
-      //"thermal conductivity follow (post/transport.py). It excludes gravity and shear."), &
+      //"thermal conductivity follow (script transport.py). It excludes gravity and shear."), &
     variable_t("output", "checkpoint_every", "real", 1, "optional", "600", &
       "Wall-clock time between checkpoints, from which a run that was killed can be resumed.", positive, "s", &
       may_change=on_resume, otherwise="a checkpoint only when the run stops or ends")]

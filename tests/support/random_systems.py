@@ -462,6 +462,9 @@ def random_system(rng: random.Random, most: int = 10**6) -> System:
     obstacles = draw.obstacles()
     disks = draw.species(bool(obstacles))
     parts = [draw.run(), draw.box(), *walls, *obstacles, *disks, draw.contact(), draw.drive()]
+    alone = draw.disks == 1 or ("species = 's0'" in parts[-1] and " count = 1 " in disks[0])
+    if alone:  # the momentum of a single driven disk is its velocity: only a free one is driven
+        parts[-1] = parts[-1].replace("keep_momentum = .true.", "keep_momentum = .false.")
     parts += [draw.stop(), draw.output()]
     table = draw.table[:, : len(draw.columns)]
     text = "\n".join(parts) + "\n"
