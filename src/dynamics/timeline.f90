@@ -46,7 +46,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(event_log_t), intent(inout), optional :: log
     type(limits_t) :: goal
-    real(real64) :: due, kick_time, before         ! [time]
+    real(real64) :: due, until, kick_time, before  ! [time]
     integer(int64) :: events
     integer(int32), allocatable :: kicked(:)
     logical :: arrived, epoch_is_over
@@ -56,7 +56,9 @@ contains
     kick_time = next_kick(evolution, sim)
     due = min(limits%time, kick_time)
     goal = limits
-    goal%time = due - sim%box%epoch
+    until = due - sim%box%epoch
+    if (sim%box%epoch + until < due) until = nearest(until, 1.0_real64)   ! rounded down, it would never be reached
+    goal%time = until
     if (sim%epoch_end > 0) then                    ! time-stepped dynamics has no epochs
       goal%time = min(goal%time, sim%epoch_end)
       goal%events = min(goal%events, most_events(sim))
@@ -67,7 +69,7 @@ contains
       epoch_is_over = sim%tally%events >= most_events(sim)
       if (arrived .and. evolution%idle) then
         call wait()
-      else if (arrived .and. due - sim%box%epoch > sim%epoch_end) then
+      else if (arrived .and. until > sim%epoch_end) then
         epoch_is_over = .true.
         arrived = .false.                          ! the evolution stopped at the end of the epoch, before the intended time
       end if
@@ -84,7 +86,7 @@ contains
     !> of the last collision.
     subroutine wait()
       if (due < last_time) then
-        sim%now = max(sim%now, due - sim%box%epoch)
+        sim%now = max(sim%now, until)
       else                                           ! a stale event, or the end of the epoch, may have advanced the time
         sim%now = max(maxval(sim%disk%clock), limits%sampled - sim%box%epoch)
       end if

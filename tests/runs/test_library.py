@@ -8,6 +8,7 @@ import copy
 import ctypes
 import gc
 import json
+import math
 import multiprocessing
 import os
 import pickle
@@ -571,6 +572,20 @@ def test_a_damaged_input_in_a_file_is_called_damaged(tmp_path):
         with pytest.raises(ProgramError, match="input is damaged") as caught:
             Simulation.load(path)
         assert caught.value.code == 3 and "\n" not in caught.value.message
+
+
+def test_a_simulation_reaches_each_representable_time():
+    """A time since the epoch that is rounded down would stay before the intended time for ever."""
+    for seed in range(1, 101):
+        rng = random.Random(seed)
+        few = {"species": {"count": 5, "radius": 0.05, "temperature": 1}, "run": {"seed": seed}}
+        with Simulation(few) as box:
+            box.advance(time=10 ** rng.uniform(-6, -1))
+            box.velocity *= 0.9  # begins an epoch
+            box.advance_by(time=10 ** rng.uniform(-3, 0))
+            for _ in range(4):
+                goal = math.nextafter(box.time, math.inf)
+                assert not box._go_on((goal, NEVER, NEVER), 1.0) and box.time >= goal
 
 
 @pytest.mark.parametrize(
