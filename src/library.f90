@@ -30,10 +30,10 @@ module library
   use variables, only: change_of, in_motion, obstacle_groups, row_of
   implicit none
   private
-  public :: advance_to, answer, begin, changes_of, goal_of, renew, session_of, session_t, text_of
+  public :: advance_to, answer, begin, goal_of, renew_changed, session_of, session_t, text_of
 
   integer(c_int), parameter :: going_on = 1          !! the only result of `advance` that is not an exit code
-  integer, parameter :: most_logged = 1000000         !! smallest number of latest events that the log keeps
+  integer, parameter :: least_logged = 1000000        !! number of latest events that the log keeps at least
 
   type :: session_t
     type(run_input_t) :: input
@@ -156,7 +156,7 @@ contains
       limits%iterations = session%iterations
       if (session%logged) then
         call advance_once(session%evolution, session%sim, limits, error, session%log)
-        call session%log%keep(most_logged)
+        call session%log%keep(least_logged)
       else
         call advance_once(session%evolution, session%sim, limits, error)
       end if
@@ -318,10 +318,7 @@ contains
     if (all([(abs(v(:, changed%tag(i)%id) - changed%velocity(i)) <= 0, i=1, changed%n_disks())])) return
     call change_velocities(changed, v)
     call check_motion(changed, session%input%path, error)
-    if (.not. allocated(error)) then
-      session%input%changes = changes_of(session)//written_exactly(changed%time())//" velocity"//eol
-      call renew(session, changed)
-    end if
+    if (.not. allocated(error)) call renew_changed(session, changed, "velocity")
     code = answer(error, message, room)
   end function give_velocities
 
@@ -344,6 +341,16 @@ contains
     call check_speeds(sim, problems)
     call problems%report(path, error)
   end subroutine check_motion
+
+  !> Continues the simulation with a changed state, and adds this change to the list of changes.
+  subroutine renew_changed(session, sim, what)
+    type(session_t), intent(inout) :: session
+    type(simulation_t), intent(in) :: sim
+    character(len=*), intent(in) :: what              !! name of the quantity that was changed
+
+    session%input%changes = changes_of(session)//written_exactly(sim%time())//" "//what//eol
+    call renew(session, sim)
+  end subroutine renew_changed
 
   !> Continues the simulation with a changed state.
   subroutine renew(session, sim)

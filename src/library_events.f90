@@ -6,11 +6,10 @@ module library_events
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
   use kinds, only: int32, int64, real64
-  use library, only: advance_to, answer, begin, changes_of, goal_of, renew, session_of, session_t
+  use library, only: advance_to, answer, begin, goal_of, renew_changed, session_of, session_t
   use moved_disks, only: check_positions
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
-  use texts, only: eol, written_exactly
   use timeline, only: advance_once
   implicit none
   private
@@ -131,10 +130,7 @@ contains
       call change_positions(changed, x)
       call check_positions(changed, error)
     end if
-    if (.not. allocated(error)) then
-      session%input%changes = changes_of(session)//written_exactly(changed%time())//" position"//eol
-      call renew(session, changed)
-    end if
+    if (.not. allocated(error)) call renew_changed(session, changed, "position")
     code = answer(error, message, room)
   end function give_positions
 
