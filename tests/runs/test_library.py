@@ -588,6 +588,27 @@ def test_a_simulation_reaches_each_representable_time():
                 assert not box._go_on((goal, NEVER, NEVER), 1.0) and box.time >= goal
 
 
+def test_a_settled_time_is_reached_exactly_by_another_simulation():
+    """A change at that time then has the same effect to the last bit."""
+    for seed in range(1, 251):
+        rng = random.Random(seed)
+        few = {"species": {"count": 5, "radius": 0.05, "temperature": 1}, "run": {"seed": seed}}
+        start, more, after = (10 ** rng.uniform(low, low + 3) for low in (-6, -3, -2))
+        with Simulation(few) as box, Simulation(few) as other:
+            box.advance(time=start)
+            first = box._settle()
+            box.velocity *= 0.9
+            box.advance_by(time=more)
+            second = box._settle()
+            assert second == box.time == box._settle()
+            other.advance(time=first).velocity *= 0.9
+            other.advance(time=second)
+            for one in box, other:
+                one.velocity *= 1.1
+                one.advance_by(time=after)
+            assert box.time == other.time and np.array_equal(box.position, other.position)
+
+
 @pytest.mark.parametrize(
     "groups",
     [

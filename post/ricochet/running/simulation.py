@@ -465,11 +465,14 @@ class Simulation:
         """Complete all events up to the present time, and return a time with a reproducible state.
 
         At the end of a call `time` may be rounded, and a shift of the engine's origin of time may
-        be due.  At the next representable time both are complete, and another run has the same
-        state at that time.
+        be due.  At a later time that the engine reaches exactly, both are complete, and another run
+        has the same state at that time.  The engine measures time from its origin, and the sum of
+        both may skip every second representable time.
         """
-        if self.time != self._settled:
-            self._settled = math.nextafter(self.time, math.inf) if self.time > 0 else 0.0
+        ulps = 0
+        while self.time != self._settled:
+            ulps += 1
+            self._settled = self.time + ulps * math.ulp(self.time) if self.time > 0 else 0.0
             self.advance(time=self._settled)
         return self._settled
 
