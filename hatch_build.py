@@ -17,11 +17,12 @@ class Commands(MetadataHookInterface):
 
     def update(self, metadata: dict) -> None:
         names = (f"ricochet-{script.stem.replace('_', '-')}" for script in SCRIPTS)
-        metadata["scripts"] = dict.fromkeys(["ricochet", *names], "ricochet.commands:main")
+        commands = ["ricochet", "ricochet-ensemble", *names]
+        metadata["scripts"] = dict.fromkeys(commands, "ricochet.commands:main")
 
 
 class Package(BuildHookInterface):
-    """Builds the program and the library, and puts them, scripts, their page and inputs inside."""
+    """Builds program and library; adds them, `ensemble.sh`, scripts, their page and inputs."""
 
     def initialize(self, version: str, build_data: dict) -> None:
         if version == "editable":  # a clone has them in its folders
@@ -34,6 +35,8 @@ class Package(BuildHookInterface):
         except (OSError, subprocess.CalledProcessError) as problem:
             tools = "make, bash, gfortran and HDF5 with its compiler h5fc (Debian: libhdf5-dev)"
             raise SystemExit(f"cannot build Ricochet ({problem}); it needs {tools}") from None
+        sweep_script = str(ROOT / "runs/ensemble.sh")
+        build_data["force_include"][sweep_script] = "ricochet/bin/ricochet-ensemble"
         for name, place in BUILT.items():
             build_data["force_include"][str(folder / name)] = f"ricochet/{place}/{name}"
         build_data |= {"pure_python": False, "infer_tag": False, "tag": f"py3-none-{platform()}"}

@@ -14,13 +14,20 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 #: pip installs the scripts inside the package; in a source tree they are in the folder above.
 SCRIPTS = HERE / "post" if (HERE / "post").is_dir() else HERE.parent
+#: Commands that are no scripts of `post/`, with their paths in a clone (after `pip install -e .`).
+IN_CLONE = {"ricochet": "build/ricochet", "ricochet-ensemble": "runs/ensemble.sh"}
 
 
 def main() -> None:
     """Run the script that has the name of the command."""
     command = Path(sys.argv[0]).absolute()
-    if command.stem == "ricochet":  # of pip
-        os.execv(HERE / "bin/ricochet", [sys.argv[0], *sys.argv[1:]])
+    if command.stem in IN_CLONE:
+        path = HERE / "bin" / command.stem
+        if not path.parent.is_dir():
+            path = HERE.parents[1] / IN_CLONE[command.stem]
+        if not path.exists():
+            sys.exit(f"{command.stem}: there is no {path}: run make")
+        os.execv(path, [sys.argv[0], *sys.argv[1:]])
     program = command.with_name("ricochet")
     if program.is_file() and not (HERE / "bin").is_dir():
         os.environ.setdefault("RICOCHET", str(program))

@@ -287,7 +287,7 @@ def test_pip_brings_program_library_package_commands_and_inputs(tmp_path):
     pip = [sys.executable, "-m", "pip", "--python", python, "install", *alone]
     ran(*pip, ROOT, check=True)
     commands = {path.name for path in (own / "bin").glob("ricochet-*")}
-    scripts = {path.stem for path in ROOT.glob("post/*.py")}
+    scripts = {path.stem for path in ROOT.glob("post/*.py")} | {"ensemble"}
     assert commands == {f"ricochet-{name.replace('_', '-')}" for name in scripts}
     inputs = packages / "ricochet/input"
     code = "from ricochet import Simulation, simulation; print(simulation.__file__)"
@@ -297,6 +297,11 @@ def test_pip_brings_program_library_package_commands_and_inputs(tmp_path):
     assert done.returncode == 0, done.stderr
     done = ran(own / "bin/ricochet-player", "lab.h5", "-o", "lab.html", cwd=tmp_path)
     assert done.returncode == 0 and (tmp_path / "lab.html").exists(), done.stderr
+    sweep = [own / "bin/ricochet-ensemble", inputs / "lab.nml", "-d", "sweep", "--seeds", "1-2"]
+    alone = {name: value for name, value in environment().items() if name != "RICOCHET"}
+    done = ran(*sweep, cwd=tmp_path, env=alone)
+    assert done.returncode == 0, done.stderr
+    assert sorted(path.name for path in tmp_path.glob("sweep/*.h5")) == ["seed_1.h5", "seed_2.h5"]
 
 
 @pytest.mark.parametrize("script", [".ci/set-up", "src/install.sh", "runs/ensemble.sh"])
