@@ -357,8 +357,9 @@ def main() -> None:
     rows, notes = table(groups, results)
     notes += motion_notes(args.runs)
     if not all("vacf" in found.curves for found in results):
-        notes.append("no steady state without flow: time correlations and diffusion coefficients "
-            "are omitted")
+        notes.append(
+            "no steady state without flow: time correlations and diffusion coefficients are omitted"
+        )
     figure = draw(groups, results, rows, args.wavenumber)
     report(args, figure, rows, data=curves(groups, results), notes=notes)
 

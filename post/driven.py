@@ -65,8 +65,10 @@ Curves = dict[str, tuple[np.ndarray, np.ndarray]]  # time and value by species, 
 def temperature(run: Run) -> Curves:
     """Return the temperature about the mean velocity at the times of the observables."""
     if run.n_disks < 2:
-        raise Refused(f"{run.path}: holds one disk; a temperature requires at least two, as it is "
-            "about their mean velocity")
+        raise Refused(
+            f"{run.path}: holds one disk; a temperature requires at least two, as it is "
+            "about their mean velocity"
+        )
     time, value = run.observable("all/temperature")
     curves = {"": (time, value * run.n_disks / (run.n_disks - 1))}
     for kind in run.by_species if len(run.names) > 1 else ():

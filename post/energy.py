@@ -55,8 +55,9 @@ def change(run: Run) -> tuple[np.ndarray, np.ndarray]:
     """Return time and relative change of the conserved quantity."""
     time, total = run.observable("total_energy")
     if len(time) < 2:
-        raise RunError(f"{run.path}: has only one sample of the energies; at least two are "
-            "required")
+        raise RunError(
+            f"{run.path}: has only one sample of the energies; at least two are required"
+        )
     if not np.any(total):
         raise Refused(f"{run.path}: all disks are at rest, so that the energy is zero")
     energy, _ = balance(run)

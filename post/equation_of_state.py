@@ -36,9 +36,7 @@ def likeness(runs: list[Run]) -> float:
     other = (np.abs(found - found[0]) > UNLIKE) | (equal != equal[0])
     if other.any():
         path = runs[int(np.argmax(other))].path
-        raise RunError(
-            f"{path}: the radii are not equal or not distributed as in {runs[0].path}"
-        )
+        raise RunError(f"{path}: the radii are not equal or not distributed as in {runs[0].path}")
     return 1.0 if equal.all() else float(found.mean())
 
 

@@ -213,11 +213,16 @@ def main() -> None:
     parser = command_line(__doc__, "fields.png", equilibration=None)
     parser.add_argument("--across", choices=("x", "y"), default="x", help="axis of the profile [x]")
     shape = parser.add_mutually_exclusive_group()
-    whole = {"type": cells_of, "metavar": "N", "default": (20,), "help": "number of cells of the "
-        "profile [20]"}
+    whole = {
+        "type": cells_of,
+        "metavar": "N",
+        "default": (20,),
+        "help": "number of cells of the profile [20]",
+    }
     shape.add_argument("--cells", **whole)
-    shape.add_argument("--grid", type=cells_of, metavar="NX,NY", help="cells of a map, instead of "
-        "a profile")
+    shape.add_argument(
+        "--grid", type=cells_of, metavar="NX,NY", help="cells of a map, instead of a profile"
+    )
     parser.add_argument("--species", metavar="NAME", help="species whose fields are measured [all]")
     args = parser.parse_args()
     runs, axis, tables = args.runs, "xy".index(args.across), []
@@ -253,8 +258,9 @@ def main() -> None:
             data |= spread({"_expected": inner})
             tables.append(at_walls(runs[0], axis, law))
         elif tables:
-            notes.append("no profile agrees with these fluxes and the temperature in the middle: "
-                "run longer")
+            notes.append(
+                "no profile agrees with these fluxes and the temperature in the middle: run longer"
+            )
         figure = draw_profile(runs, axis, x, found, law)
         tables = [{name: v for name, v in data.items() if "stress" not in name}, *tables]
     report(args, figure, *tables, data=data, notes=notes)

@@ -75,8 +75,9 @@ def main() -> None:
     parser.add_argument("inputs", nargs="*", type=Path, metavar="INPUT.nml", help="more inputs")
     opened = "open the page in your browser [no]"
     parser.add_argument("--open", action=BooleanOptionalAction, help=opened)
-    parser.add_argument("--port", type=port, default=0, metavar="N", help="port of the server "
-        "[any free port]")
+    parser.add_argument(
+        "--port", type=port, default=0, metavar="N", help="port of the server [any free port]"
+    )
     more = "further folder from which inputs may read files"
     parser.add_argument("--files", type=Path, action="append", default=[], metavar="DIR", help=more)
     args = parser.parse_args()

@@ -56,8 +56,9 @@ def divergence(time: np.ndarray, apart: np.ndarray, largest: float, begin: float
     last = int(np.argmax(far)) if far.any() else len(time)
     first = int(np.ceil(begin * last))
     if last - first < 3 or not np.all(np.isfinite(logarithm[:, first:last])):
-        raise RunError("no fit is possible: the starts are equal or too far apart, or there are "
-            "too few frames")
+        raise RunError(
+            "no fit is possible: the starts are equal or too far apart, or there are too few frames"
+        )
     fitted = time[first:last]
     slope = np.polyfit(fitted, logarithm[:, first:last].T, 1)[0]
     ends = float(fitted[0]), float(fitted[-1])
@@ -86,11 +87,15 @@ def draw(found: Divergence, units: Units) -> plt.Figure:
 def main() -> None:
     parser = command_line(__doc__, "lyapunov.png")
     parser.set_defaults(paired=True)
-    parser.add_argument("--largest", type=float, default=0.01, help="distance at which the fit "
-        "ends [0.01]")
     parser.add_argument(
-        "--fit-from", type=float, default=0.2, metavar="SHARE", help="fraction of that time at "
-            "which the fit begins [0.2]"
+        "--largest", type=float, default=0.01, help="distance at which the fit ends [0.01]"
+    )
+    parser.add_argument(
+        "--fit-from",
+        type=float,
+        default=0.2,
+        metavar="SHARE",
+        help="fraction of that time at which the fit begins [0.2]",
     )
     args = parser.parse_args()
     if len(args.runs) % 2:

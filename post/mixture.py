@@ -123,8 +123,10 @@ def main() -> None:
         allow(run, "its species do not reach a common temperature", *SETTLED)
         tracks = [run.observable(f"{name}/kinetic_energy").value for name in run.names]
         if not any(np.ptp(track) > 1e-9 * np.max(track) for track in tracks):
-            raise Refused(f"{run.path}: its species have not collided with each other: each still "
-                "has its initial energy")
+            raise Refused(
+                f"{run.path}: its species have not collided with each other: each still "
+                "has its initial energy"
+            )
     frames = [late_frames(run, args) for run in runs]
     result = table(runs, frames, args.equilibration)
     report(args, draw(runs, frames, result), result)

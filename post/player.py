@@ -401,10 +401,12 @@ def main() -> None:
     parser = command_line(
         __doc__, "RUN.html", one=True, csv=False, frames=None, count=None, colour=None, disks=None
     )
-    parser.add_argument("--live", action="store_true", help="show an unfinished run while it "
-        "continues")
-    parser.add_argument("--open", action="store_true", help="open the film or the page in the "
-        "browser")
+    parser.add_argument(
+        "--live", action="store_true", help="show an unfinished run while it continues"
+    )
+    parser.add_argument(
+        "--open", action="store_true", help="open the film or the page in the browser"
+    )
     args = parser.parse_args()
     (run,) = args.runs
     if args.colour in ("psi6", "spin"):

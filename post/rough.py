@@ -57,8 +57,9 @@ def main() -> None:
     row |= {"maxwellian": theory.rough_ratio(*law), "boltzmann": exact}
     notes = []
     if exact is None:
-        notes = ["the theory assumes Maxwell's velocities; the Boltzmann equation yields up to 6 "
-            "% less"]
+        notes = [
+            "the theory assumes Maxwell's velocities; the Boltzmann equation yields up to 6 % less"
+        ]
     figure = draw(args.runs, law, exact, found)
     report(args, figure, [row], data=spread({"": found}), notes=notes)
 

@@ -29,8 +29,9 @@ def main() -> None:
     parser.add_argument("density", type=float, help="number of circles per unit of area")
     parser.add_argument("--radius", type=float, default=0.9, help="radius of each circle [0.9]")
     parser.add_argument("--seed", type=int, default=1, help="seed of the random numbers [1]")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="name of the text file "
-        "to be written")
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, help="name of the text file to be written"
+    )
     args = parser.parse_args()
     if args.number < 1 or not args.density > 0 or not args.radius > 0:
         parser.error("number, density and radius must be positive")

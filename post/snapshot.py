@@ -105,8 +105,9 @@ def main() -> None:
     parser = command_line(__doc__, "snapshot.png", one=True, frames=None, count=None, colour=None)
     parser.add_argument("--quiver", action="store_true", help="draw velocities as arrows")
     parser.add_argument("--log", action="store_true", help="use a logarithmic colour scale")
-    parser.add_argument("--per-frame", action="store_true", help="use a separate colour scale for "
-        "each frame")
+    parser.add_argument(
+        "--per-frame", action="store_true", help="use a separate colour scale for each frame"
+    )
     args = parser.parse_args()
     (run,) = args.runs
     which = args.frames or (None if args.count else frame_list("-1"))

@@ -71,8 +71,10 @@ ABOUT_A2 = (
 def state_of(run: Run) -> str:
     """Return the state of the late frames: equilibrium, a steady state, or a changing state."""
     if run.n_disks < 3:
-        raise Refused(f"{run.path}: needs at least three disks, whose collisions establish a "
-            "distribution of speeds")
+        raise Refused(
+            f"{run.path}: needs at least three disks, whose collisions establish a "
+            "distribution of speeds"
+        )
     known = set(TRAITS) - {"changed", "collapsed", "sliding_surfaces"}
     allow(run, "its speed distribution depends on the position; see fields.py", *known)
     if run.nature.cooling or "moving_sides" in run.nature:
@@ -283,8 +285,9 @@ def main() -> None:
     state, *others = map(state_of, args.runs)
     if any(other != state for other in others):
         odd = args.runs[1 + [other != state for other in others].index(True)]
-        raise RunError(f"{odd.path}: differs in kind from {args.runs[0].path}: draw them "
-            "separately")
+        raise RunError(
+            f"{odd.path}: differs in kind from {args.runs[0].path}: draw them separately"
+        )
     groups = grouped(args.runs, lambda run: run.n_disks)
     for _, runs in groups:
         refuse_others(runs)

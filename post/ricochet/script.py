@@ -192,8 +192,12 @@ def command_line(
     place = {"default": None if output.startswith("RUN") else Path(output), "metavar": "FILE"}
     parser.add_argument("-o", "--output", type=Path, help=f"output file [{output}]", **place)
     if csv:
-        parser.add_argument("--csv", type=Path, metavar="FILE", help="file to which the numbers "
-            "are written as a table")
+        parser.add_argument(
+            "--csv",
+            type=Path,
+            metavar="FILE",
+            help="file to which the numbers are written as a table",
+        )
     names = "names of units for the axes, such as length=cm,time=s,mass=g [reduced units]"
     parser.add_argument("--units", type=unit_names, default=UNNAMED, metavar="NAMES", help=names)
     for name, default in defaults.items():
@@ -258,8 +262,9 @@ def recorded(run: Run, name: str) -> float:
     value = float(run.provenance.get(name, 0))
     if value <= 0:
         what = name.replace("_", " ")
-        raise RunError(f"{run.path}: contains no {what}: the run is not finished, or this number "
-            "was 0")
+        raise RunError(
+            f"{run.path}: contains no {what}: the run is not finished, or this number was 0"
+        )
     return value
 
 

@@ -92,8 +92,9 @@ def reduced_speeds(
         own = energy[:, kind.disks]
         kt = np.mean(own, axis=1 if each else None, keepdims=True)
         if not kt.all():
-            raise Refused(f"{run.path}: '{kind.name}' is at rest (kT = 0), so that its thermal "
-                "speed is 0")
+            raise Refused(
+                f"{run.path}: '{kind.name}' is at rest (kT = 0), so that its thermal speed is 0"
+            )
         energy[:, kind.disks] /= kt
     return np.sqrt(energy[:, slice(None) if species is None else run.of_species(species)]).ravel()
 

@@ -77,8 +77,9 @@ def all_settle(runs: Sequence[Run]) -> bool:
     settled = [run.nature.in_equilibrium for run in runs]
     if any(settled) and not all(settled):
         one, other = runs[settled.index(False)], runs[settled.index(True)]
-        raise RunError(f"{one.path}: has no equilibrium, but {other.path} has one: draw them "
-            "separately")
+        raise RunError(
+            f"{one.path}: has no equilibrium, but {other.path} has one: draw them separately"
+        )
     return all(settled)
 
 

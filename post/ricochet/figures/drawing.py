@@ -154,8 +154,9 @@ def chosen_colour(run: Run, wish: str | None) -> str:
     if wish == "collisions" and run.event_count is None:
         raise RunError(f"{run.path}: has no collisions per disk")
     if wish == "spin" and "angular_velocity" not in run.disk_data:
-        raise RunError(f"{run.path}: its disks cannot rotate, or the frames do not contain their "
-            "spins")
+        raise RunError(
+            f"{run.path}: its disks cannot rotate, or the frames do not contain their spins"
+        )
     return wish or ("species" if len(run.names) > 1 else "speed")
 
 

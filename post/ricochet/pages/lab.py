@@ -194,8 +194,9 @@ class Lab:
         """Raise an error for a starting file outside the folders of the inputs."""
         path = Path(re.fullmatch(r"""(['"]?)([^'"]*)\1""", file.strip())[2]).resolve()
         if not any(path.is_relative_to(folder) for folder in self.folders):
-            raise RunError(f"{file}: is outside the allowed folders; start the laboratory with "
-                "--files FOLDER")
+            raise RunError(
+                f"{file}: is outside the allowed folders; start the laboratory with --files FOLDER"
+            )
 
 
 async def send(socket: web.WebSocketResponse, message: dict) -> None:

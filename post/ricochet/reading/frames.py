@@ -139,8 +139,9 @@ class Frames(Values):
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         """Return all frames, for functions of NumPy."""
         if copy is False:
-            raise ValueError(f"{self.path}: {self.name} is read from the file, which requires a "
-                "copy")
+            raise ValueError(
+                f"{self.path}: {self.name} is read from the file, which requires a copy"
+            )
         return self[:] if dtype is None else self[:].astype(dtype)
 
     @property
