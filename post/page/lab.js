@@ -176,9 +176,14 @@ function addGroup(kind, name) {
 
 // ---------- choosing an input ----------
 
-// The run starts before the form is complete, so that disks appear early.
+// The run starts before the form is complete, so that disks appear early. Kept runs of another input
+// are removed, because runs of different inputs cannot be compared in one plot.
 async function choose(name) {
   const input = lab.inputs.find(one => one.name === name);
+  if (name !== state.input?.name) {
+    state.boxes.slice(0, -1).forEach(remove);
+    current().letter = 'A';
+  }
   Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: [], settings: {}, has: {}, waiting: {}, added: [] });
   scan = scanner?.leave();
   run();

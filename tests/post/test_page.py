@@ -258,6 +258,20 @@ def test_kept_runs_stand_beside_the_next_in_equal_boxes_and_plots(opened):
     assert opened.run("return state.boxes.map(box => box.letter)") == ["B"]
 
 
+def test_another_input_removes_the_kept_runs_and_the_same_input_keeps_them(opened):
+    """Plots never contain curves of different inputs."""
+    opened.press("k")
+    moving(opened, 1)
+    for name, letters in (("gas", ["A", "B"]), ("cooling", ["A"])):
+        before = opened.run("return current().run")
+        opened.run("choose(arguments[0])", name)
+        moving(opened, before)
+        assert opened.run("return state.boxes.map(box => box.letter)") == letters
+        wait_for(lambda count=len(letters): len(inside(opened, "overlaid")) == count - 1)
+    assert opened.run("return document.querySelectorAll('iframe').length") == 1
+    assert "A: as in the file" in opened.run("return $('shelf').textContent")
+
+
 def test_a_paused_run_goes_back_step_by_step_and_on(opened):
     opened.press("p")
     wait_for(lambda: not inside(opened, "state.playing"))
