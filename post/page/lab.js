@@ -186,6 +186,7 @@ async function choose(name) {
   }
   Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: [], settings: {}, has: {}, waiting: {}, added: [] });
   scan = scanner?.leave();
+  drawScan();
   run();
   $('name').textContent = input.title;
   $('own').hidden = !input.picture;
@@ -386,12 +387,19 @@ function beginScan() {
   const spec = state.input.sliders[$('scanned').value], { key, log } = spec, values = valuesOf(spec, 4), texts = values.map(value => textWith(spec, String(value)));
   scan = { x: spec.words, y: MEASURED[$('measured').value], log, points: [], values, said: '' };
   drawScan();
+  $('points').scrollIntoView({ block: 'nearest' });
   scanner?.leave();
   scanner = filmOf(current()).talk({ do: 'scan', ...wish(), variable: key, values: texts, of: $('measured').value }, addToScan);
   tell('scanning …');
 }
 
-function drawScan() { if (scan && isThere(current()) && filmOf(current()).inside().film) filmOf(current()).showScan(scan); }
+function drawScan() {
+  $('curve').hidden = $('points').hidden = !scan;
+  if (!scan || !$('curve').clientWidth || !filmOf(current()).inside?.().film) return;
+  const text = `${scan.y} against ${scan.x}`, found = filmOf(current()).plotScan($('curve'), scan);
+  $('points').textContent = `${text}. ${found}`;
+  $('curve').setAttribute('aria-label', $('points').textContent);
+}
 
 function addToScan({ is, index, mean, error, problems }) {  // values that cannot be measured appear as a gap
   if (problems) scan.said = (is === 'scan' ? `${short(scan.values[index])}: ` : '') + problems[0].text;
@@ -445,6 +453,7 @@ addEventListener('keydown', typed);
 addEventListener('resize', () => arrangeAll());
 $('form').addEventListener('submit', event => event.preventDefault());
 $('everything').addEventListener('toggle', buildEverything);
+$('scanning').addEventListener('toggle', drawScan);
 for (const button of $('heat').querySelectorAll('button')) button.addEventListener('click', () => filmOf(current()).send({ do: 'heat', factor: +button.dataset.factor }));
 $('measured').replaceChildren(...Object.entries(MEASURED).map(([name, text]) => new Option(text, name)));
 addEventListener('pageshow', event => { if (event.persisted) location.reload(); });

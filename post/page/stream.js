@@ -25,7 +25,6 @@ const isStarting = () => document.documentElement.classList.contains('starting')
 function start(run) {
   const same = stream.wish?.input === run.input, wish = { do: 'start', ...run, pace: same ? stream.sent : null, playing: !parent.isPaused() };
   if (!same) [stream.sent, usual] = [0, usual || !!stream.wish];
-  $('scan').hidden ||= !same;
   stream.wish = run;
   starts(true);
   if (stream.socket?.readyState === 1) { send(wish); return; }
@@ -215,14 +214,12 @@ function arrange(size, bare) {
   layout();
 }
 
-// Plots the measured values of a scan with their errors against the variable.
-function showScan({ x: variable, y: measured, log, points, values }) {
-  const canvas = $('curve'), scaled = value => log ? Math.log10(value) : value;
-  $('scan').hidden = false;
-  $('scan').querySelector('h2').textContent = `Scan: ${measured}`;
+// Plots the measured values of a scan with their errors against the variable, on a canvas of the laboratory.
+function plotScan(canvas, { log, points, values }) {
+  const scaled = value => log ? Math.log10(value) : value, ends = points.flatMap(([, mean, error]) => [mean - error, mean + error]);
   Object.assign(canvas, { width: canvas.clientWidth * page.dots, height: canvas.clientHeight * page.dots });
-  const plot = prepare(canvas), { pen } = plot, ends = points.flatMap(([, mean, error]) => [mean - error, mean + error]);
-  const low = Math.min(0, ...ends), high = Math.max(...ends, low + 1e-9), from = scaled(values[0]), to = scaled(values.at(-1)), more = 0.04 * (to - from);
+  const plot = prepare(canvas), { pen } = plot, from = scaled(values[0]), to = scaled(values.at(-1)), more = 0.04 * (to - from);
+  const low = Math.min(0, ...ends), high = Math.max(...ends, low + 1e-9);
   const { x, y } = axes(plot, [from - more, to + more], [low, low + 1.1 * (high - low)], '', value => short(log ? +(10 ** value).toPrecision(1) : value), short);
   Object.assign(pen, { strokeStyle: ink.accent, fillStyle: ink.accent, lineWidth: 1.6 });
   pen.beginPath();
@@ -233,7 +230,5 @@ function showScan({ x: variable, y: measured, log, points, values }) {
   }
   pen.stroke();
   for (const [value, mean] of points) pen.fillRect(x(scaled(value)) - 3, y(mean) - 3, 6, 6);
-  const words = points.map(([value, mean, error]) => `${short(value)}: ${withError({ value: mean, error })}`).join('; ');
-  $('scan').querySelector('p').textContent = `Against ${variable}. ${words}`;
-  canvas.setAttribute('aria-label', `${measured} against ${variable}. ${words}`);
+  return points.map(([value, mean, error]) => `${short(value)}: ${withError({ value: mean, error })}`).join('; ');
 }

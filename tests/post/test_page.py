@@ -267,7 +267,7 @@ def test_another_input_removes_the_kept_runs_and_the_same_input_keeps_them(opene
         opened.run("choose(arguments[0])", name)
         moving(opened, before)
         assert opened.run("return state.boxes.map(box => box.letter)") == letters
-        wait_for(lambda count=len(letters): len(inside(opened, "overlaid")) == count - 1)
+        wait_for(lambda kept=letters[1:]: len(inside(opened, "overlaid")) == len(kept))
     assert opened.run("return document.querySelectorAll('iframe').length") == 1
     assert "A: as in the file" in opened.run("return $('shelf').textContent")
 
@@ -320,9 +320,31 @@ def test_what_is_clicked_is_downloaded_or_measured(opened, tmp_path):
     wait_for(lambda: opened.run("return scan.points.length") == 5)
     for speed, mean, _ in opened.run("return scan.points"):
         assert mean == pytest.approx(speed**2 / 2)
-    assert "mean kinetic energy" in opened.run(
-        "return filmOf(current()).document.getElementById('scan').innerText"
-    )
+    assert "mean kinetic energy against speed" in opened.run("return $('points').innerText")
+
+
+def test_a_scan_beside_a_kept_run_is_seen_and_moves_nothing(opened):
+    """The figure is in the form, in the visible part of the window, and covers no other element."""
+    opened.press("k")
+    moving(opened, 1)
+    places = """const parts = ['stage', 'controls', 'speeds', 'energy', 'pressure'];
+        return films().flatMap(one => parts.map(id => one.document.getElementById(id)))
+          .map(one => one.getBoundingClientRect().toJSON());"""
+    before = opened.run(places)
+    opened.run("$('scanning').open = true")
+    opened.click("scan")
+    wait_for(lambda: opened.run("return scan.points.length"))
+    for _ in range(2):
+        seen = """const canvas = $('curve'), box = canvas.getBoundingClientRect();
+            const { left, top, right, bottom } = box;
+            return document.elementFromPoint((left + right) / 2, (top + bottom) / 2) === canvas
+              && top >= 0 && bottom <= innerHeight && right - left > 200"""
+        assert opened.run(seen)
+        drawn = "const image = $('curve').toDataURL(); $('curve').width += 0; "
+        drawn += "const empty = $('curve').toDataURL(); drawScan(); return image !== empty"
+        assert opened.run(drawn)
+        assert opened.run(places) == before
+        wait_for(lambda: opened.run("return scan.points.length") == 5)
 
 
 SIZES = [(1280, 800, False), (1920, 1080, False), (820, 1180, False), (390, 844, True)]
