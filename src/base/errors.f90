@@ -1,5 +1,5 @@
-!> Errors as values. An allocated `error_t` indicates a failure. A procedure returns the error to its caller, and `main` finally
-!> reports it.
+!> The type `error_t` of error values. An allocated `error_t` indicates a failure. A procedure that fails returns the `error_t` to
+!> its caller, and `main` finally prints the message.
 module errors
   use texts, only: legible
   implicit none
@@ -16,7 +16,7 @@ module errors
 
   !> A failure: its message and the exit status of the program.
   type :: error_t
-    character(len=:), allocatable :: message   !! text that states the problem, its place, and the remedy; one line per problem
+    character(len=:), allocatable :: message   !! cause, location and remedy of the failure; one line per problem
     integer :: code = exit_usage               !! exit status of the program
   end type error_t
 

@@ -1,6 +1,7 @@
-/* Memory services that Fortran lacks: hints, which affect only the speed and the memory use of a run, and a message
-   when memory runs out. All of it depends on the compiler, the linker and the system. Without MEMORY_HINTS (see HINTS
-   in the Makefile) this file does nothing, and the compiler's own message answers a failed `allocate`. */
+/* Memory functions that Fortran does not provide: hints, which affect only the speed and the memory use of a run, and
+   an error message when no memory is left. The code depends on the compiler, the linker and the operating system. If
+   the macro MEMORY_HINTS is not defined (see HINTS in the Makefile), the functions in this file have no effect, and a
+   failed `allocate` leads to the error message of the Fortran run-time library. */
 #include <stdint.h>
 
 #ifdef MEMORY_HINTS
@@ -17,8 +18,9 @@
 
 static const size_t line = 64, large = 128*1024, page = 2*1024*1024;
 
-/* Checks the result of every allocation, explicit or of a temporary array. If there is no memory left, it prints one
-   line and ends the program with the exit code for files and system. Data already committed to files stay valid. */
+/* Checks the result of every memory allocation, including those of temporary arrays. If no memory is left, the function
+   prints an error message and ends the program with exit code 3. Data that have already been committed to files stay
+   valid. */
 static void *obtained(void *memory, size_t bytes)
 {
     if (!memory && bytes) {
@@ -33,8 +35,9 @@ static void *obtained(void *memory, size_t bytes)
 }
 
 /* Aligns large arrays to cache lines, so that a record of 64 bytes occupies a single line. Arrays of at least 2 MB are
-   placed on huge pages if the system offers them, because the TLB covers few pages. The linker redirects malloc here
-   (--wrap=malloc), because `allocate` has no control over alignment or page size. */
+   placed on huge pages if the system provides huge pages, because the TLB (the cache of page addresses) can hold only
+   few pages. The linker option --wrap=malloc redirects all calls of malloc to this function, because the Fortran
+   statement `allocate` cannot control alignment or page size. */
 void *__real_malloc(size_t bytes);
 __attribute__((used)) void *__wrap_malloc(size_t bytes)
 {
@@ -53,9 +56,10 @@ __attribute__((used)) void *__wrap_realloc(void *memory, size_t bytes)
     return obtained(__real_realloc(memory, bytes), bytes);
 }
 
-/* Fixes the size above which arrays are mapped and unmapped. By default the C library raises this size with use; large
-   arrays that are allocated again and again can then end up behind each other, and the heap of a long run grows without
-   end. The shared library leaves the size alone: its heap belongs to the program that has loaded it. */
+/* Fixes the size above which the C library allocates an array by a separate memory mapping instead of on the heap. By
+   default the C library increases this size during a run. Large arrays that are allocated repeatedly would then
+   fragment the heap, and the memory use of a long run would grow without limit. The shared library does not change this
+   size, because the heap belongs to the program that has loaded the library. */
 #if defined(M_MMAP_THRESHOLD) && (defined(__PIE__) || !defined(__PIC__))
 __attribute__((constructor, used)) static void map_large_arrays(void)
 {

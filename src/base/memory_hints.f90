@@ -1,5 +1,6 @@
-!> Hints about memory that Fortran cannot express. Hints affect only the speed of a run, never its results. The C file with the same
-!> name contains the parts that depend on the compiler and the system. Without the C file a prefetch has no effect.
+!> Prefetch hints, which the Fortran language cannot express. Hints affect only the speed of a run, never its results. The file
+!> `memory_hints.c` contains the code that depends on the compiler and the operating system. If the macro `MEMORY_HINTS` is not
+!> defined, a prefetch has no effect.
 module memory_hints
   use, intrinsic :: iso_c_binding, only: c_double, c_int32_t
   implicit none

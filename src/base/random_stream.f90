@@ -1,21 +1,22 @@
-!> Reproducible random numbers: xoshiro256** (Blackman and Vigna, ACM Trans. Math. Softw. 47, 36 (2021)), seeded by SplitMix64
-!> (Steele, Lea and Flood, OOPSLA 2014), so that the streams of consecutive seeds are unrelated. A stream is a value: a copy
-!> continues with the same numbers as the original.
+!> Reproducible random numbers from the generator xoshiro256** (Blackman and Vigna, 2021, doi:10.1145/3460772). The generator
+!> SplitMix64 (Steele, Lea and Flood, 2014, doi:10.1145/2660193.2660195) seeds xoshiro256**, so that the streams of consecutive
+!> seeds are unrelated. A copy of a random stream yields the same numbers as the original stream.
 !>
-!> Both generators work modulo 2**64. Fortran has no unsigned integers, and overflow of signed ones is not allowed, so sums and
-!> products are formed in a longer integer.
+!> Both generators, xoshiro256** and SplitMix64, use unsigned arithmetic modulo 2**64. Fortran has no unsigned integers and does not
+!> allow overflow of signed integers. Sums and products are therefore calculated with longer integers.
 module random_stream
   use kinds, only: int32, int64, int128, real64
   implicit none
   private
   public :: random_stream_t
 
-  !> Purposes of the random numbers that are drawn during a run. The random numbers of the initial state have separate streams.
+  !> Codes of the purposes for which random numbers are drawn during a run. Random numbers for the initial state are drawn from
+  !> separate streams.
   integer, parameter, public :: thermal_walls = 3, kicks = 4, orientations = 5
 
   real(real64), parameter :: unit_53 = 2.0_real64**(-53)
 
-  !> The state of a generator.
+  !> A random stream: the state of a generator xoshiro256**.
   type :: random_stream_t
     integer(int64) :: word(4) = 0_int64         !! state; at least one word is nonzero after seeding
   contains
@@ -30,8 +31,8 @@ module random_stream
 
 contains
 
-  !> Starts the random stream that belongs to a seed and a key. Streams with different keys are independent, so that drawing more
-  !> numbers for one purpose never changes the numbers for another.
+  !> Starts the random stream that belongs to a seed and a key. Streams with different keys are independent, so that the number of
+  !> draws for one purpose never affects the random numbers for another purpose.
   pure subroutine seed(self, number, key)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(in) :: number        !! seed from the input; any value is allowed
@@ -46,14 +47,14 @@ contains
     call fill(self, state)
   end subroutine seed
 
-  !> Starts the stream of a single draw during a run. The numbers depend only on the arguments. The numbers depend neither on the
-  !> order of the draws nor on the procedure or thread that makes a draw.
+  !> Starts a separate random stream for a single draw during a run. The random numbers depend only on the arguments of the
+  !> procedure `seed_draw`, not on the order of the draws or on the thread that makes the draw.
   pure subroutine seed_draw(self, number, purpose, id, count)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(in) :: number        !! seed from the input
     integer, intent(in) :: purpose              !! purpose of the draw, one of the constants above such as `thermal_walls`
     integer(int32), intent(in) :: id            !! id of the disk
-    integer(int64), intent(in) :: count         !! number of the draw, or of the event that requires it
+    integer(int64), intent(in) :: count         !! number of the draw, or of the event that requires the draw
 
     integer(int64) :: state
 
@@ -65,7 +66,7 @@ contains
     call fill(self, state)
   end subroutine seed_draw
 
-  !> Mixes one part of a key into the state of the seed generator.
+  !> Mixes one element of a key into the state of the generator SplitMix64, which seeds a random stream.
   pure subroutine add_key(state, part)
     integer(int64), intent(inout) :: state
     integer, intent(in) :: part
@@ -75,7 +76,7 @@ contains
     state = ieor(word, int(part, int64))
   end subroutine add_key
 
-  !> Fills the state of a stream with numbers of the seed generator.
+  !> Fills the state of a random stream with numbers from the generator SplitMix64.
   pure subroutine fill(self, state)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(inout) :: state
@@ -86,7 +87,7 @@ contains
     end do
   end subroutine fill
 
-  !> The next 64 random bits.
+  !> Draws the next 64 random bits.
   pure subroutine draw_word(self, word)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(out) :: word
@@ -105,7 +106,7 @@ contains
     end associate
   end subroutine draw_word
 
-  !> A uniform number in [0, 1): the upper 53 bits as a multiple of 2**-53.
+  !> Draws a number that is uniformly distributed in [0, 1): the upper 53 random bits as a multiple of 2**-53.
   pure subroutine draw_uniform(self, u)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: u
@@ -115,7 +116,7 @@ contains
     u = real(ishft(word, -11), real64)*unit_53
   end subroutine draw_uniform
 
-  !> A uniform integer from 1 to n.
+  !> Draws an integer that is uniformly distributed from 1 to n.
   pure subroutine draw_index(self, n, k)
     class(random_stream_t), intent(inout) :: self
     integer(int32), intent(in) :: n             !! > 0
@@ -126,8 +127,8 @@ contains
     k = 1 + int(n*u, int32)
   end subroutine draw_index
 
-  !> A unit vector of random direction: a random point of the unit disk, normalised. Sine and cosine are
-  !> avoided because their last bits depend on the mathematical library.
+  !> Draws a unit vector of random direction by normalising a random point of the unit disk. The functions sine and cosine are not
+  !> used, because the last bits of their results depend on the mathematical library.
   pure subroutine draw_direction(self, e)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: e(2)
@@ -137,8 +138,8 @@ contains
     e = e/sqrt(s)
   end subroutine draw_direction
 
-  !> Two independent Gaussian deviates of mean 0 and variance 1, by the polar method (Marsaglia and Bray, SIAM Rev. 6, 260 (1964)).
-  !> The last bit of the deviates may depend on the mathematical library, because the method uses a logarithm.
+  !> Draws two independent Gaussian random numbers of mean 0 and variance 1 by the polar method (Marsaglia and Bray, 1964,
+  !> doi:10.1137/1006063). The last bit of the numbers may depend on the mathematical library, because the method uses a logarithm.
   pure subroutine draw_normals(self, z)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: z(2)
@@ -163,7 +164,7 @@ contains
     end do
   end subroutine draw_in_disk
 
-  !> Advances the seed generator by one step of SplitMix64 and returns its next number.
+  !> Advances the generator SplitMix64 by one step and returns its next number.
   pure subroutine draw_seed(state, word)
     integer(int64), intent(inout) :: state
     integer(int64), intent(out) :: word
@@ -177,8 +178,8 @@ contains
     word = ieor(word, ishft(word, -31))
   end subroutine draw_seed
 
-  !> The number modulo 2**64, as a signed word. The result consists of the lower 64 bits of the number; the highest of these bits is
-  !> the sign bit. The argument may be the product of two words, whose absolute value is at most 2**126.
+  !> Reduces a number modulo 2**64. The result consists of the lower 64 bits of the number, interpreted as a signed integer. The
+  !> argument may be the product of two 64-bit integers, whose absolute value is at most 2**126.
   pure function wrapped(number) result(word)
     integer(int128), intent(in) :: number
     integer(int64) :: word

@@ -1,8 +1,8 @@
 !> Signals that stop a run or request a checkpoint. The signal handler and the variables that it sets are in `system_calls.c`.
 !>
-!> While the files of a run are open, a sudden end could lose data. During this time a stop signal is only recorded. The main loop
-!> then writes a checkpoint and ends the run. If the signal arrives after the end of the main loop, the signal has no effect: the
-!> file is completed, and the run is finished.
+!> If the program ended suddenly while the files of a run are open, data could be lost. A stop signal that arrives while files are
+!> open is therefore only recorded, and the main loop then writes a checkpoint and ends the run. A stop signal that arrives after
+!> the end of the main loop has no effect: the program completes the file and finishes the run.
 module signals
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_int, c_null_char
   use system, only: talks_to_terminal
@@ -11,9 +11,9 @@ module signals
   public :: watch_signals, end_at_signals, record_signals, stop_requested, checkpoint_requests
 
   interface
-    !> Installs the signal handler. TERM, INT, HUP and XCPU request a stop with a checkpoint, USR1 requests a checkpoint. Signals
-    !> that were ignored when the program was started (for example by nohup) are still ignored. If a file exceeds its size limit,
-    !> the write fails and no signal is sent.
+    !> Installs the signal handler. The signals TERM, INT, HUP and XCPU request a stop with a checkpoint, and the signal USR1
+    !> requests a checkpoint. Signals that were ignored when the program was started (for example by nohup) are still ignored. The
+    !> signal XFSZ is ignored, so that a write beyond the size limit of files fails without a signal.
     subroutine watch_signals() bind(C, name="system_watch_signals")
     end subroutine watch_signals
 
@@ -23,7 +23,7 @@ module signals
       logical(c_bool) :: yes
     end function stop_requested
 
-    !> Number of times that USR1 has requested a checkpoint.
+    !> Number of signals USR1 received so far; each signal requests a checkpoint.
     function checkpoint_requests() result(requests) bind(C, name="system_checkpoint_requests")
       import :: c_int
       integer(c_int) :: requests
@@ -42,9 +42,9 @@ module signals
 
 contains
 
-  !> From this call on, a stop signal ends the program immediately, with the given message and exit status. A signal that was
-  !> recorded before this call also ends the program. This mode is used in parts of the program in which a sudden end cannot lose
-  !> data.
+  !> From this call on, a stop signal ends the program immediately, with the given message and exit status. A stop signal that was
+  !> recorded before this call ends the program in this call. The procedure is called before parts of the program in which a sudden
+  !> end cannot lose data.
   subroutine end_at_signals(message, code)
     character(len=*), intent(in) :: message
     integer, intent(in) :: code                        !! exit status

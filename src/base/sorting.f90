@@ -1,4 +1,4 @@
-!> Sorting by counting, for items with small integer keys such as cell numbers.
+!> Counting sort for items whose keys are small integers, such as the numbers of cells.
 module sorting
   use kinds, only: int32
   implicit none
@@ -7,14 +7,14 @@ module sorting
 
 contains
 
-  !> Finds the position of each item in the order of ascending keys. Items with equal keys keep their order (counting sort).
+  !> Finds the position of each item in the order of ascending keys. Items with equal keys keep their relative order.
   pure subroutine sort_by_count(key, n_keys, first, place)
     integer(int32), intent(in) :: key(:)                  !! (n) key of each item, from 1 to n_keys
     integer(int32), intent(in) :: n_keys
-    !> (n_keys+1) position of the first item of each key; the last element is n+1.
+    !> (n_keys+1) sorted position of the first item with each key; the last element is n+1.
     integer(int32), allocatable, intent(out) :: first(:)
     integer(int32), intent(out) :: place(:)               !! (n) position of each item in the sorted order
-    integer(int32), allocatable :: next(:)                ! (n_keys+1) position of the next item of each key
+    integer(int32), allocatable :: next(:)                ! (n_keys+1) sorted position of the next item with each key
     integer(int32) :: k
 
     allocate (next(n_keys + 1), source=0_int32)

@@ -1,5 +1,5 @@
-!> One line on standard error that shows the progress of the program. On a terminal the line is updated in place. If the output is a
-!> file or pipe, a new line is written every half minute.
+!> A status line on standard error that shows the progress of the program. On a terminal the status line is updated in place. If
+!> standard error is a file or a pipe, a new line is written every half minute.
 module status_line
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: real64
@@ -10,7 +10,7 @@ module status_line
 
   real(real64), parameter :: terminal_pause = 0.2_real64, file_pause = 30.0_real64   !! time between two updates of the line [s]
   character(len=*), parameter :: erase_rest = achar(27)//"[K", &   !! erases the rest of the line on the terminal
-    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"          !! switch the wrapping of long lines off and on
+    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"          !! disable and enable the wrapping of long lines
 
   type :: status_line_t
     logical, private :: quiet = .true.
@@ -28,7 +28,7 @@ module status_line
 
 contains
 
-  !> Prepares the line. A line for which this procedure has not been called shows nothing.
+  !> Prepares a status line. Before `open_line` has been called, the status line shows nothing.
   subroutine open_line(self, quiet)
     class(status_line_t), intent(inout) :: self
     logical, intent(in) :: quiet
@@ -39,7 +39,7 @@ contains
     self%next_update = seconds() + self%pause
   end subroutine open_line
 
-  !> Whether the next update is due.
+  !> Whether the next update of the status line is due.
   function is_due(self) result(yes)
     class(status_line_t), intent(in) :: self
     logical :: yes
@@ -48,7 +48,7 @@ contains
     if (.not. self%quiet) yes = seconds() >= self%next_update
   end function is_due
 
-  !> Shows a text in the line.
+  !> Shows a text in the status line.
   subroutine show(self, text)
     class(status_line_t), intent(inout) :: self
     character(len=*), intent(in) :: text
@@ -63,7 +63,7 @@ contains
     flush (error_unit)
   end subroutine show
 
-  !> Shows the completed fraction of a task, if an update is due.
+  !> Shows the completed fraction of a task in the status line, if an update is due.
   subroutine show_share(self, task, share)
     class(status_line_t), intent(inout) :: self
     character(len=*), intent(in) :: task
@@ -75,7 +75,7 @@ contains
     call self%show(task//": "//trim(adjustl(percent)))
   end subroutine show_share
 
-  !> Erases the line on the terminal, so that the next message does not follow the text on the same line.
+  !> Erases the status line on the terminal, so that the next message starts on an empty line.
   subroutine clear(self)
     class(status_line_t), intent(inout) :: self
 

@@ -1,5 +1,5 @@
 !> Services of the operating system that Fortran does not provide: a monotonic clock, the detection of terminals, file locks, atomic
-!> renames, the free disk space, and an exit without a message. Parts that need a C header are in `system_calls.c`.
+!> renames, the free disk space, and an exit without a message. Functions that need a C header file are in `system_calls.c`.
 module system
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_double, c_int, c_int64_t, c_null_char, c_size_t
   use, intrinsic :: iso_fortran_env, only: error_unit
@@ -20,7 +20,7 @@ module system
   !> Results of `c_lock` if no lock was acquired: another run holds the lock, the file is not a lock file, or a system call failed.
   integer(c_int), parameter :: taken = -1, foreign = -3, failed = -4     ! -2: the file system has no locks
 
-  !> A lock on the output of a run. The operating system releases the lock when the process ends, for whatever reason.
+  !> A lock on the output of a run. The operating system releases the lock when the process ends, even after a crash.
   type :: lock_t
     character(len=:), allocatable :: path
     integer(c_int), private :: descriptor = -1
@@ -53,14 +53,14 @@ module system
   end interface
 
   interface
-    !> The time of a clock that never goes backwards. [s]
+    !> Present time of a monotonic clock, which never runs backwards. [s]
     function seconds() result(t) bind(C, name="system_seconds")
       import :: c_double
       real(c_double) :: t
     end function seconds
 
-    !> Opens /dev/null for each standard stream that the caller has closed. Otherwise the system would assign the numbers of these
-    !> streams to the first files that are opened, and messages would be written into these files.
+    !> Opens /dev/null for each standard stream that the caller has closed. If a standard stream stayed closed, the system would
+    !> assign its descriptor to the next file that is opened, and messages would be written into that file.
     subroutine fill_standard_streams() bind(C, name="system_fill_standard_streams")
     end subroutine fill_standard_streams
 
@@ -70,7 +70,7 @@ module system
       logical(c_bool) :: yes
     end function talks_to_terminal
 
-    ! The functions below are described in system_calls.c.
+    ! The file system_calls.c describes the functions of the following interfaces.
     function cores_of_process() result(n) bind(C, name="system_cores")
       import :: c_int
       integer(c_int) :: n
@@ -139,17 +139,17 @@ module system
   procedure(path_call), bind(C, name="system_find_folder") :: c_find_folder
   procedure(path_call), bind(C, name="system_make_folder") :: c_make_folder
   procedure(path_call), bind(C, name="system_what_is") :: c_what_is   !! returns an index of `kinds_of_files`
-  procedure(path_call), bind(C, name="system_lock") :: c_lock         !! returns a descriptor, or a negative number: see `taken`
+  procedure(path_call), bind(C, name="system_lock") :: c_lock  !! returns a file descriptor, or a negative number such as `taken`
   procedure(path_call), bind(C, name="system_print") :: c_print
   procedure(path_call), bind(C, name="unlink") :: c_unlink
-  procedure(size_call), bind(C, name="system_free_bytes") :: c_free_bytes     !! free space on the disk that contains a folder
+  procedure(size_call), bind(C, name="system_free_bytes") :: c_free_bytes  !! free space in the file system that contains a folder
   procedure(size_call), bind(C, name="system_file_size") :: c_file_size
   procedure(naming_call), bind(C, name="rename") :: c_rename
 
 contains
 
-  !> Writes a text to standard output. The `write` statement of Fortran is not used, because it reports no error if standard output
-  !> is a file on a full disk.
+  !> Writes a text to standard output. The `write` statement of Fortran is not used, because `write` reports no error if standard
+  !> output is a file on a full disk.
   subroutine print_text(text, error)
     character(len=*), intent(in) :: text               !! one or more lines; a line end is added after the last line
     type(error_t), allocatable, intent(out) :: error
@@ -166,7 +166,7 @@ contains
     call c_exit(int(code, c_int))
   end subroutine end_program
 
-  !> The name of this machine.
+  !> Host name of the computer on which the program runs.
   function host_name() result(name)
     character(len=:), allocatable :: name
     character(len=256, kind=c_char) :: buffer
@@ -175,8 +175,8 @@ contains
     name = buffer(:index(buffer, c_null_char) - 1)
   end function host_name
 
-  !> Renames a file. A file that already has the new name is replaced atomically. `moved` is .true. even if the folder cannot be
-  !> synchronised with the disk. In this case only a crash of the whole machine could undo the renaming.
+  !> Renames a file. A file that already has the new name is replaced atomically. `moved` is .true. after a renaming even if the
+  !> folder cannot be synchronised with the disk; only a crash of the operating system could then undo the renaming.
   subroutine move_file(from, to, moved)
     character(len=*), intent(in) :: from, to
     logical, intent(out) :: moved
@@ -209,7 +209,7 @@ contains
     made = is_folder(folder_of(path))
   end subroutine make_folders_of
 
-  !> Waits until the contents of a file, or the names in a folder, are stored on the disk.
+  !> Waits until the contents of a file, or the entries of a folder, are stored on the disk.
   subroutine synchronize(path, done)
     character(len=*), intent(in) :: path
     logical, intent(out) :: done
@@ -217,8 +217,8 @@ contains
     done = c_synchronize(path//c_null_char) == 0
   end subroutine synchronize
 
-  !> The reason why a file cannot be opened; empty if the file can be opened. A file with a second name (a symbolic or hard link)
-  !> must not be opened for writing.
+  !> Reason why a file cannot be opened; empty if the file can be opened. A file with a second name (a symbolic or hard link) must
+  !> not be opened for writing.
   function opening_problem(path, writable) result(text)
     character(len=*), intent(in) :: path
     logical, intent(in) :: writable
@@ -237,8 +237,8 @@ contains
     kind = trim(kinds_of_files(c_what_is(path//c_null_char)))
   end function what_is
 
-  !> Inode, size and modification time of a file, which identify the file and its contents. The result is zero if the file does not
-  !> exist. A copy of a file has another identity.
+  !> Inode, size and modification time of a file, which together identify the file and its contents. All three values are 0 if the
+  !> file does not exist. A copy of a file has a different inode.
   function identity_of(path) result(identity)
     character(len=*), intent(in) :: path
     integer(int64) :: identity(3)
@@ -254,8 +254,8 @@ contains
     bytes = c_file_size(path//c_null_char)
   end function file_size
 
-  !> Reads the first bytes of a regular file. The `open` statement of Fortran is not used, because it removes trailing blanks from
-  !> the name.
+  !> Reads the first bytes of a regular file. The `open` statement of Fortran is not used, because `open` removes trailing blanks
+  !> from the name of the file.
   subroutine read_bytes(path, bytes, n)
     character(len=*), intent(in) :: path
     character(len=*), intent(out) :: bytes
@@ -264,8 +264,8 @@ contains
     n = c_read_bytes(path//c_null_char, bytes, len(bytes, int64))
   end subroutine read_bytes
 
-  !> Reads all bytes of a regular file. The `read` statement of Fortran is not used, because it can return `iostat` 0 without
-  !> reading anything, which would lead to an infinite loop.
+  !> Reads all bytes of a regular file. The `read` statement of Fortran is not used, because `read` can return `iostat` 0 without
+  !> reading any bytes, which would lead to an infinite loop.
   subroutine read_file(path, text, problem)
     character(len=*), intent(in) :: path
     character(len=:), allocatable, intent(out) :: text
@@ -273,7 +273,7 @@ contains
     character(len=:), allocatable :: failure
     integer(int64) :: n
 
-    allocate (character(len=max(file_size(path), 8192_int64)) :: text)  ! files in /proc have size 0
+    allocate (character(len=max(file_size(path), 8192_int64)) :: text)  ! the size of files in /proc is reported as 0
     call read_bytes(path, text, n)
     text = text(:max(n, 0_int64))
     problem = ""
@@ -283,7 +283,7 @@ contains
     if (problem == "") problem = failure
   end subroutine read_file
 
-  !> Overwrites eight bytes of a file with a number, lowest byte first.
+  !> Overwrites eight bytes of a file with a 64-bit integer in little-endian order.
   subroutine write_word(path, position, word, done)
     character(len=*), intent(in) :: path
     integer(int64), intent(in) :: position             !! position of the first byte; the first byte of the file has the position 0
@@ -293,7 +293,7 @@ contains
     done = c_write_word(path//c_null_char, position, word) == 0
   end subroutine write_word
 
-  !> Whether a path names a folder, possibly through links.
+  !> Whether a path names a folder, or a symbolic link to a folder.
   function is_folder(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
@@ -301,7 +301,7 @@ contains
     yes = c_find_folder(path//c_null_char) == 0
   end function is_folder
 
-  !> The folder part of a path.
+  !> Path of the folder that contains the file with the given path.
   pure function folder_of(path) result(folder)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: folder
@@ -310,7 +310,7 @@ contains
     if (folder == "") folder = "."
   end function folder_of
 
-  !> Free space on the disk that contains, or will contain, a file; huge if it is unknown. [bytes]
+  !> Free space in the file system that contains, or will contain, a file; huge if the free space is unknown. [bytes]
   function free_bytes(path) result(bytes)
     character(len=*), intent(in) :: path
     integer(int64) :: bytes

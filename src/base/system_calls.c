@@ -1,5 +1,6 @@
-/* System calls whose constants, structures or errno are defined only in C headers (POSIX, flock, CPU affinity). The
-   Fortran interfaces are in system.f90. Functions that can fail return -1 and leave the reason in errno. */
+/* System calls that need constants, structures or the variable errno from C headers (POSIX, flock, CPU affinity). The
+   Fortran interfaces of these functions are in system.f90. A function that fails returns -1 and stores the reason in
+   errno. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
@@ -28,13 +29,14 @@ double system_seconds(void)
     return (double)now.tv_sec + 1e-9*(double)now.tv_nsec;
 }
 
-/* All variables that the signal handler writes. It may run in any thread. */
+/* All variables that the signal handler writes. The variables are atomic, because the signal handler may run in any
+   thread. */
 static atomic_int stop_signal, checkpoint_signals;
 static _Atomic double first_stop_at;
 
-/* The way in which the program ends at a stop signal while no data can be lost. */
+/* Exit code and message with which the program ends immediately after a stop signal while no data can be lost. */
 static struct {
-    atomic_bool at_once;  /* else there is something to lose */
+    atomic_bool at_once;  /* false while data could be lost */
     int code;
     char message[256];
 } ending;
@@ -45,9 +47,10 @@ static void end_at_once(void)
     _exit(ending.code);
 }
 
-/* Signal handler. While no data can be lost, a stop signal ends the program at once. Otherwise it is only recorded, and
-   the main loop responds. Launchers often send a signal twice within a fraction of a second; a second stop signal that
-   arrives later than that ends the program at once. */
+/* Signal handler. While no data can be lost, a stop signal ends the program immediately. While data could be lost, the
+   first stop signal is only recorded, and the main loop ends the run. Job launchers often send a signal twice within a
+   fraction of a second. A further stop signal therefore ends the program immediately only if it arrives more than half
+   a second after the first stop signal. */
 static void note_signal(int number)
 {
     const double moments = 0.5;
@@ -79,7 +82,8 @@ void system_watch_signals(void)
 
 void system_record_signals(void) { ending.at_once = false; }
 
-/* A signal that was recorded before also ends the program. */
+/* From this call on, a stop signal ends the program immediately. A stop signal that was recorded before this call ends
+   the program in this call. */
 void system_end_at_signals(const char *message, int code)
 {
     system_record_signals();
@@ -116,8 +120,9 @@ void system_fill_standard_streams(void)
 
 bool system_talks_to_terminal(void) { return isatty(STDERR_FILENO) == 1; }
 
-/* Writes all bytes, also to a pipe that accepts only some at a time. A pipe that repeatedly reports that it is ready
-   and then refuses data is given up, without a failure. */
+/* Writes a text to standard output completely, even if standard output is a pipe that accepts only a part of the bytes
+   in each call. If a pipe repeatedly reports that it is ready but refuses data, the rest of the text is discarded
+   without an error. */
 int system_print(const char *bytes)
 {
     size_t count = strlen(bytes);
@@ -138,7 +143,7 @@ int system_print(const char *bytes)
     return 0;
 }
 
-/* A resource limit of the process, as shown by `ulimit`; INT64_MAX if there is none. */
+/* A resource limit of the process, as shown by `ulimit`; INT64_MAX if the resource is not limited. */
 static int64_t limit_of(int resource)
 {
     struct rlimit limit;
@@ -148,8 +153,8 @@ static int64_t limit_of(int resource)
 
 int64_t system_largest_file(void) { return limit_of(RLIMIT_FSIZE); }
 
-/* Reason of the last failure. If the limit of open files was reached, the text names it and the option of `ulimit` that
-   raises it. */
+/* Reason for the last failure of a system call. If too many files are open, the text also contains the limit of open
+   files and the option of `ulimit` that raises this limit. */
 void system_describe_problem(char *text, size_t size)
 {
     const int problem = errno;
@@ -167,13 +172,15 @@ void system_name_host(char *text, size_t size)
 
 /* --- Files --- */
 
-/* Opens a file by a name that the user chose; no other function does. Never waits for the other end of a pipe. */
+/* Opens a file whose name was chosen by the user. The other functions of this module open such files only through this
+   function. The function does not wait if the file is a named pipe (O_NONBLOCK). */
 static int open_file(const char *path, int flags)
 {
     return open(path, flags | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0644);
 }
 
-/* Closes a file without changing errno, and passes on the status that the caller will return. */
+/* Closes a file without changing errno, and returns the given status, so that the caller can return the result
+   directly. */
 static int closed(int descriptor, int status)
 {
     const int kept = errno;
@@ -182,9 +189,9 @@ static int closed(int descriptor, int status)
     return status;
 }
 
-/* Opens an existing regular file. A file with a second name, by a symbolic or hard link, is refused for writing,
-   because that would change a file that does not belong to the run. Returns -1 and the reason if the file cannot be
-   opened. */
+/* Opens an existing regular file. A file with a second name (a symbolic or hard link) is not opened for writing,
+   because the write could change a file that does not belong to the run. If the file cannot be opened, the function
+   returns -1 and stores the reason in `problem`. */
 static int open_regular(const char *path, int flags, const char **problem)
 {
     struct stat file;
@@ -205,7 +212,7 @@ static int open_regular(const char *path, int flags, const char **problem)
     return -1;
 }
 
-/* Reason why a file cannot be opened for reading, or for writing; empty if it can. */
+/* Reason why a file cannot be opened for reading or, with `writable`, for writing; empty if the file can be opened. */
 void system_opening_problem(const char *path, bool writable, char *text, size_t size)
 {
     const char *problem;
@@ -215,7 +222,8 @@ void system_opening_problem(const char *path, bool writable, char *text, size_t 
     text[size - 1] = '\0';
 }
 
-/* Reads the first bytes of a file; returns the number of bytes read, at most `count`. */
+/* Reads the first `count` bytes of a file. Returns the number of bytes read, which is smaller than `count` if the file
+   is shorter, or -1 after a failure. */
 int64_t system_read_bytes(const char *path, char *bytes, int64_t count)
 {
     const char *problem;
@@ -230,7 +238,7 @@ int64_t system_read_bytes(const char *path, char *bytes, int64_t count)
     return closed(descriptor, 0) + (more < 0 ? -1 : total);
 }
 
-/* Overwrites eight bytes of a file with a number, lowest byte first. */
+/* Overwrites eight bytes of a file with a 64-bit integer in little-endian order. */
 int system_write_word(const char *path, int64_t position, int64_t word)
 {
     const char *problem;
@@ -247,8 +255,8 @@ int system_find_folder(const char *path)
     return stat(path, &found) == 0 && S_ISDIR(found.st_mode) ? 0 : -1;
 }
 
-/* Kind of the object that a path names, as numbered in system.f90. Links are not followed. "Nothing" is returned only
-   if it is certain that no such file exists. */
+/* Kind of the object that a path names, as an index of `kinds_of_files` in system.f90. Symbolic links are not followed.
+   The result `nothing` is returned only if it is certain that no object with this path exists. */
 int system_what_is(const char *path)
 {
     enum { nothing = 1, file, folder, symbolic_link, pipe_or_device, hidden };
@@ -269,15 +277,15 @@ void system_identify(const char *path, int64_t identity[3])
     identity[2] = (int64_t)found.st_ctim.tv_sec*1000000000 + found.st_ctim.tv_nsec;
 }
 
-/* Size of a file in bytes; 0 for pipes and devices, -1 if there is no file. */
+/* Size of a file in bytes; 0 for pipes and devices, -1 if the file does not exist. */
 int64_t system_file_size(const char *path)
 {
     struct stat found;
     return stat(path, &found) == 0 ? (int64_t)found.st_size : -1;
 }
 
-/* Waits until a file or folder is stored on the disk. Two failures are not errors: some file systems cannot synchronize
-   a folder (EINVAL), and a folder can be writable without being readable (EACCES). */
+/* Waits until a file or folder is stored on the disk. Two failures of system calls do not count as errors: some file
+   systems cannot synchronize a folder (EINVAL), and a folder can be writable but not readable (EACCES). */
 int system_synchronize(const char *path)
 {
     const int descriptor = open_file(path, O_RDONLY);
@@ -285,7 +293,8 @@ int system_synchronize(const char *path)
     return closed(descriptor, fsync(descriptor) == 0 || errno == EINVAL ? 0 : -1);
 }
 
-/* Creates a folder. Succeeds also if another process has just created it. */
+/* Creates a folder. The function also succeeds if the folder already exists, because another process may just have
+   created the folder. */
 int system_make_folder(const char *path)
 {
     return mkdir(path, 0777) == 0 || errno == EEXIST ? 0 : -1;
@@ -305,9 +314,9 @@ static bool is_name_of(const char *path, const struct stat *file)
     return lstat(path, &named) == 0 && named.st_dev == file->st_dev && named.st_ino == file->st_ino;
 }
 
-/* Acquires a lock file. Returns a descriptor, or one of the negative numbers below, which are repeated in system.f90. A
-   lock file is empty and has one name; any other file was not made by a run. A lock file that this user may not write
-   belongs to the run of another user. */
+/* Acquires a lock file. Returns a file descriptor, or one of the negative numbers of the enumeration below, which
+   system.f90 defines again. A lock file of a run is an empty regular file without a second name; any other file is
+   `foreign`. A lock file to which the user has no write permission belongs to a run of another user and is `taken`. */
 int system_lock(const char *path)
 {
     enum { taken = -1, without_locks = -2, foreign = -3, failed = -4 };
@@ -321,14 +330,15 @@ int system_lock(const char *path)
         if (descriptor < 0) return exists && errno == EACCES ? taken : failed;
         if (flock(descriptor, LOCK_EX | LOCK_NB) != 0)
             return closed(descriptor, errno == EWOULDBLOCK ? taken : without_locks);
-        /* The previous holder may have removed the file meanwhile. A lock on a file without a name protects nothing. */
+        /* The run that held the lock before may have removed the file in the meantime. A lock on a removed file would
+           have no effect, because other runs would create a new file. */
         if (is_name_of(path, &file)) return descriptor;
         close(descriptor);
     }
     return taken;
 }
 
-/* Removes the lock file, unless its name now belongs to another file. */
+/* Releases the lock, and removes the lock file unless the path now names a different file. */
 void system_unlock(const char *path, int descriptor)
 {
     struct stat file;

@@ -1,8 +1,9 @@
-/* A barrier for threads that meet thousands of times per second, on cores that other programs may also use. A thread
-   spins if its recent waits were short, and sleeps otherwise. On idle cores no time is lost; on busy cores no thread
-   uses up its time slice while it waits for another one that is not running. OpenMP's own barriers either spin for
-   milliseconds each time or never, depending on environment variables that are read before the program begins. The
-   interfaces are in team.f90. */
+/* A barrier for threads that reach the barrier thousands of times per second, on cores that other programs may also
+   use. A thread waits in a loop (spins) if its recent waits were short; if its recent waits were long, the thread
+   sleeps. If the cores are otherwise idle, no time is lost. If the cores are busy, no thread uses up its time slice
+   while it waits for a thread that is not running. The barriers of OpenMP either spin for milliseconds each time or
+   never, depending on environment variables that are read when the program starts. The Fortran interfaces of this
+   barrier are in team.f90. */
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -12,7 +13,7 @@ double system_seconds(void);
 
 struct barrier {
     atomic_int threads; /* number of threads that have joined */
-    atomic_int arrived; /* number that have arrived in this round */
+    atomic_int arrived; /* number of threads that have arrived in this round */
     atomic_int round;
     pthread_mutex_t lock;
     pthread_cond_t released;
@@ -62,7 +63,8 @@ static void wait_for_release(struct barrier *self, int round)
     usual_wait += ((waited < 2*longest_spin ? waited : 2*longest_spin) - usual_wait)/8;
 }
 
-/* Returns true at once to the last thread that arrives. The others wait until it releases them. */
+/* Returns true immediately for the last thread that arrives. For all other threads the function returns false after the
+   last thread has called barrier_release. */
 bool barrier_arrive(struct barrier *self)
 {
     const int round = self->round;
@@ -77,6 +79,6 @@ void barrier_release(struct barrier *self)
     pthread_mutex_lock(&self->lock);
     self->round++;
     pthread_mutex_unlock(&self->lock);
-    /* Called after unlocking, so that a thread that wakes up does not have to wait for the lock. */
+    /* The broadcast follows the unlocking, so that a thread that wakes up does not have to wait for the lock. */
     pthread_cond_broadcast(&self->released);
 }

@@ -1,4 +1,4 @@
-!> The threads of a run: their number, and the barriers at which they wait while one of them performs a serial step. The
+!> The threads of a run: the number of threads, and the barriers at which threads wait while one thread performs a serial step. The
 !> barriers are implemented in `team.c`.
 module team
   use, intrinsic :: iso_c_binding, only: c_bool, c_int64_t
@@ -12,13 +12,13 @@ module team
   !> or milliseconds if other programs use the cores.
   integer, parameter :: many = 50000
 
-  !> A barrier for threads. A barrier must not be copied while threads use it.
+  !> A barrier for threads. A barrier must not be copied while threads use the barrier.
   type, bind(C) :: barrier_t
     integer(c_int64_t) :: storage(32)
   end type barrier_t
 
   interface
-    !> Initialises a barrier with which no thread is registered yet.
+    !> Initialises a barrier, with which no threads are registered at first.
     subroutine open_barrier(barrier) bind(C, name="barrier_open")
       import :: barrier_t
       type(barrier_t), intent(out) :: barrier
@@ -30,15 +30,17 @@ module team
       type(barrier_t), intent(inout) :: barrier
     end subroutine join
 
-    !> Waits at the barrier until all threads have arrived and the last one calls `release`. The last thread to arrive does not
-    !> wait. For this thread the result is .true.; this thread performs the serial step and then releases the other threads.
+    !> Registers the arrival of the calling thread at the barrier. The result is .true. for the last thread to arrive, which does
+    !> not wait: it performs the serial step and then calls `release`. All other threads wait until the last thread has called
+    !> `release`.
     function is_last_at(barrier) result(yes) bind(C, name="barrier_arrive")
       import :: barrier_t, c_bool
       type(barrier_t), intent(inout) :: barrier
       logical(c_bool) :: yes
     end function is_last_at
 
-    !> Releases the waiting threads. All data that the calling thread has written are then visible to the other threads.
+    !> Releases the threads that wait at the barrier. All data that the calling thread has written before are then visible to the
+    !> released threads.
     subroutine release(barrier) bind(C, name="barrier_release")
       import :: barrier_t
       type(barrier_t), intent(inout) :: barrier
@@ -53,7 +55,8 @@ module team
 
 contains
 
-  !> Sets the number of threads for loops that do not specify another number. Without OpenMP there is one thread.
+  !> Sets the number of threads for parallel loops that do not specify a number of threads. In a build without OpenMP the number is
+  !> always 1.
   subroutine make_team(n)
     integer, intent(in) :: n
 

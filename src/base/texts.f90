@@ -1,4 +1,4 @@
-!> Short texts: lists of texts, numbers as text, and the known word that is closest to a misspelt one.
+!> Short texts: lists of texts, numbers as text, and suggestions for misspelt words.
 module texts
   use, intrinsic :: ieee_arithmetic, only: ieee_is_normal
   use kinds, only: int64, real64
@@ -7,7 +7,7 @@ module texts
   public :: text_t, growing_text_t, written, written_exactly, lower_case, legible, shown, joined, place_of, nearest_word, suggestion
   public :: about, counted, line_at, lines_of, size_text, wrapped
 
-  !> A text of any length, as an element of a list.
+  !> A text of any length; arrays of this type are lists of texts.
   type :: text_t
     character(len=:), allocatable :: text
   end type text_t
@@ -22,7 +22,7 @@ module texts
     procedure :: text => text_so_far
   end type growing_text_t
 
-  !> A number as text, in a short and readable form.
+  !> Converts a number to a text in a short and readable form.
   interface written
     procedure :: written_integer, written_long_integer, written_real
   end interface written
@@ -52,7 +52,7 @@ contains
     self%length = needed
   end subroutine add
 
-  !> All pieces so far as one text.
+  !> The text that consists of all pieces added so far.
   pure function text_so_far(self) result(text)
     class(growing_text_t), intent(in) :: self
     character(len=:), allocatable :: text
@@ -61,7 +61,7 @@ contains
     if (allocated(self%buffer)) text = self%buffer(:self%length)
   end function text_so_far
 
-  !> A default integer as decimal digits.
+  !> Converts an integer of default kind to decimal digits.
   pure function written_integer(number) result(text)
     integer, intent(in) :: number
     character(len=:), allocatable :: text
@@ -69,7 +69,7 @@ contains
     text = written_long_integer(int(number, int64))
   end function written_integer
 
-  !> A 64-bit integer as decimal digits.
+  !> Converts a 64-bit integer to decimal digits.
   pure function written_long_integer(number) result(text)
     integer(int64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -79,7 +79,7 @@ contains
     text = trim(buffer)
   end function written_long_integer
 
-  !> A real number without trailing zeros, with an exponent only where that is shorter.
+  !> Converts a real number to a text without trailing zeros; the text has an exponent only if the exponent makes the text shorter.
   pure recursive function written_real(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -99,7 +99,7 @@ contains
     end if
   end function written_real
 
-  !> A real number with as many digits as are needed to read back exactly the same number.
+  !> Converts a real number to a text with as many digits as are needed to recover exactly the same number.
   pure function written_exactly(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -148,7 +148,7 @@ contains
 
     last = min(len(text), longest)
     do while (last > longest - 4 .and. last < len(text))
-      if (iand(iachar(text(last + 1:last + 1)), 192) /= 128) exit   ! do not truncate inside a UTF-8 character
+      if (iand(iachar(text(last + 1:last + 1)), 192) /= 128) exit   ! do not split a UTF-8 character
       last = last - 1
     end do
     quoted = legible(text(:last))
@@ -156,7 +156,7 @@ contains
     quoted = '"'//quoted//'"'
   end function shown
 
-  !> The words in one line, separated by `glue`.
+  !> Joins words to one line, with the separator `glue` between consecutive words.
   pure function joined(words, glue) result(line)
     character(len=*), intent(in) :: words(:)
     character(len=*), intent(in) :: glue
@@ -171,8 +171,8 @@ contains
     line = growing%text()
   end function joined
 
-  !> The text in lines of at most `width` characters, broken at blanks. All lines except the first start with `margin`. A word that
-  !> is longer than `width` is on a line of its own.
+  !> Breaks a text at blanks into lines of at most `width` characters. All lines except the first line start with `margin`. A word
+  !> that is longer than `width` is placed on a separate line.
   pure function wrapped(text, width, margin) result(lines)
     character(len=*), intent(in) :: text, margin
     integer, intent(in) :: width
@@ -191,7 +191,7 @@ contains
     lines = lines//trim(text(first:))
   end function wrapped
 
-  !> The position of a word in a list; 0 if the list does not contain the word.
+  !> Position of a word in a list of words; 0 if the list does not contain the word.
   pure function place_of(word, words) result(place)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: words(:)
@@ -203,7 +203,8 @@ contains
     place = 0
   end function place_of
 
-  !> Advice after an unknown word: the known word that was probably meant or, if there is none, a list of the known words.
+  !> Advice for a user who entered an unknown word: the most similar known word or, if no known word is similar, a list of the known
+  !> words.
   pure function suggestion(word, known, listed) result(advice)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
@@ -220,8 +221,8 @@ contains
     end if
   end function suggestion
 
-  !> The known word that was probably meant: a known word that starts with `word`, or a known word in which at most a third of the
-  !> letters differ. Empty if there is no such word.
+  !> The known word that a user probably meant by `word`: a known word that starts with `word`, or a known word in which at most a
+  !> third of the letters differ. The result is empty if no known word is so similar.
   pure function nearest_word(word, known) result(nearest)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
@@ -246,7 +247,7 @@ contains
   end function nearest_word
 
   !> Number of insertions, deletions, substitutions and swaps of adjacent letters that turn `a` into `b`
-  !> (optimal string alignment; Damerau, Commun. ACM 7, 171 (1964)).
+  !> (optimal string alignment; Damerau, 1964, doi:10.1145/363958.363994).
   pure function edit_distance(a, b) result(distance)
     character(len=*), intent(in) :: a, b
     integer :: distance
@@ -267,7 +268,7 @@ contains
     distance = d(len(a), len(b))
   end function edit_distance
 
-  !> A number of bytes as text, in kB or MB, for messages.
+  !> Converts a number of bytes to a text in kB or MB, for messages.
   pure function size_text(bytes) result(text)
     integer(int64), intent(in) :: bytes
     character(len=:), allocatable :: text
@@ -279,7 +280,7 @@ contains
     end if
   end function size_text
 
-  !> A positive number rounded to three significant digits.
+  !> Rounds a positive number to three significant digits and converts the number to a text.
   pure function about(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -289,7 +290,7 @@ contains
     text = written(anint(number/unit)*unit)
   end function about
 
-  !> A number with its noun: `1 value`, `2 values`.
+  !> A number followed by a noun, which is in the plural unless the number is 1. Examples are `1 value` and `2 values`.
   pure function counted(number, noun) result(text)
     integer(int64), intent(in) :: number
     character(len=*), intent(in) :: noun
@@ -299,7 +300,7 @@ contains
     if (number /= 1) text = text//"s"
   end function counted
 
-  !> The line of a text that contains character k. The position k may be just after the end of the text.
+  !> Number of the line that contains character k of a text; k may also be the position just after the end of the text.
   pure function line_at(text, k) result(line)
     character(len=*), intent(in) :: text
     integer, intent(in) :: k                      !! position of the character
@@ -321,7 +322,7 @@ contains
     do while (first <= len(text))
       last = first - 1 + index(text(first:)//eol, eol)
       line%text = text(first:last - 1)
-      ! A constructor text_t(...) would leak memory with gfortran 12: see `command_line: take_option`.
+      ! A constructor text_t(...) is not used, because it would leak memory with gfortran 12.
       lines = [lines, line]
       first = last + 1
     end do
