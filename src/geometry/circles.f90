@@ -1,4 +1,4 @@
-!> Circular obstacles. The disks are outside of the circle, or the circle encloses the disks.
+!> Circular obstacles. The disks are either outside the circle or inside the circle.
 module circles
   use free_flight, only: time_to_circle
   use kinds, only: pi, real64
@@ -21,7 +21,7 @@ module circles
 
 contains
 
-  !> The circle with the given centre and radius. With `encloses` the disks are inside the circle.
+  !> Creates the circle with the given centre and radius. If `encloses` is .true., the disks are inside the circle.
   pure function new_circle(centre, radius, encloses) result(circle)
     real(real64), intent(in) :: centre(2)       !! [length]
     real(real64), intent(in) :: radius          !! [length]
@@ -35,7 +35,7 @@ contains
     circle%area = pi*radius**2
   end function new_circle
 
-  !> Distance between the centres of the circle and of a disk at contact.
+  !> Distance between the centre of the circle and the centre of a disk that touches the circle.
   pure function distance_at_contact(self, radius) result(rho)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: radius          !! radius of the disk [length]
@@ -54,7 +54,7 @@ contains
     s = time_to_circle(d, v, g, self%distance_at_contact(radius), self%encloses, within)
   end function contact_time
 
-  !> Distance between the circle and the boundary of a disk.
+  !> Shortest distance between the circle and the boundary of a disk.
   pure function gap(self, d, radius) result(length)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2), radius
@@ -64,7 +64,7 @@ contains
     if (self%encloses) length = -length
   end function gap
 
-  !> Unit vector from the circle to a disk that touches it.
+  !> Unit vector from the point of contact on the circle to the centre of a disk that touches the circle.
   pure function normal(self, d) result(direction)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -86,7 +86,7 @@ contains
     end if
   end function reaches
 
-  !> Whether the circle excludes disks from a whole rectangle.
+  !> Whether the circle excludes the centres of disks from a whole rectangle.
   pure function covers(self, d, half, radius) result(yes)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius

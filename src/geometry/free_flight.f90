@@ -1,24 +1,24 @@
-!> Kinematics of free flight as pure functions: the position of a disk after some time, and the time until a disk touches a line or
-!> a circle. Times are relative to the time of the state that is passed as argument. Contacts of two disks are predicted in
-!> `neighbour_search`.
+!> Kinematics of free flight: the position of a disk after a given time, and the time until a disk touches a line or a circle. All
+!> times are measured from the moment at which the disk has the position and velocity that are passed as arguments. The module
+!> `neighbour_search` predicts the contacts of two disks.
 module free_flight
   use kinds, only: never, real64
   implicit none
   private
   public :: flight, flight_velocity, time_to_line, time_to_circle, slowest
 
-  !> Speeds below this value are treated as zero, because times would overflow. [length/time]
+  !> Speeds below this value are treated as zero, because contact times would overflow. [length/time]
   real(real64), parameter :: slowest = 1/never
 
-  !> Relative margin that exceeds all rounding errors. Because of this margin a test may fail to exclude a contact that does not
-  !> occur, but it never excludes a contact that occurs.
+  !> Relative safety margin, larger than all rounding errors, of tests that exclude contacts. With the margin, a test never excludes
+  !> a contact that occurs, but may fail to exclude a contact that does not occur.
   real(real64), parameter :: spare = 1.0e-6_real64
-  !> Largest number of times that an interval is halved to obtain a bound on the distance in each part.
+  !> Largest number of times that a time interval is halved to find a lower bound of the distance in each part of the interval.
   integer, parameter :: most_halvings = 3
 
 contains
 
-  !> Position after the time s on the parabola x + v s + g s**2/2, for one coordinate.
+  !> One coordinate of the position after the time s on a parabolic path, x + v s + g s**2/2.
   elemental function flight(x, v, g, s) result(there)
     real(real64), intent(in) :: x         !! [length]
     real(real64), intent(in) :: v         !! [length/time]
@@ -29,7 +29,7 @@ contains
     there = x + (v + 0.5_real64*g*s)*s
   end function flight
 
-  !> Velocity after the time s, for one component.
+  !> One component of the velocity after the time s, v + g s.
   elemental function flight_velocity(v, g, s) result(then)
     real(real64), intent(in) :: v, g, s
     real(real64) :: then
@@ -37,12 +37,12 @@ contains
     then = v + g*s
   end function flight_velocity
 
-  !> Time until a point crosses a line in the forward direction; `never` if the point does not cross the line. Each branch uses the
-  !> form of the root of the quadratic that is free of cancellation.
+  !> Time until a point crosses a line in the forward direction; `never` if the point does not cross the line. Each branch
+  !> calculates the root of a quadratic equation by the formula that avoids cancellation.
   pure function time_to_line(distance, speed, acceleration) result(s)
-    real(real64), intent(in) :: distance      !! distance to the line along its normal; negative if the line is behind [length]
-    real(real64), intent(in) :: speed         !! along the normal [length/time]
-    real(real64), intent(in) :: acceleration  !! along the normal [length/time**2]
+    real(real64), intent(in) :: distance  !! distance to the line, negative if the line is behind the point [length]
+    real(real64), intent(in) :: speed         !! velocity component towards the line [length/time]
+    real(real64), intent(in) :: acceleration  !! acceleration component towards the line [length/time**2]
     real(real64) :: s, root
 
     s = never
@@ -63,16 +63,16 @@ contains
     end if
   end function time_to_line
 
-  !> Time until the centre of a disk reaches a circle of radius rho around the origin, from outside or, with `inside`, from inside.
-  !> If the disk is already on the circle (or beyond the circle because of rounding) and moves further in this direction, the result
-  !> is 0.
+  !> Time until the centre of a disk reaches a circle of radius rho around the origin, from inside if `inside` is .true., otherwise
+  !> from outside. If the centre is already on the circle (or beyond the circle because of rounding) and would cross the circle, the
+  !> result is 0.
   pure function time_to_circle(d, v, g, rho, inside, within) result(s)
     real(real64), intent(in) :: d(2)      !! centre of the disk relative to the centre of the circle [length]
     real(real64), intent(in) :: v(2)      !! [length/time]
     real(real64), intent(in) :: g(2)      !! [length/time**2]
     real(real64), intent(in) :: rho       !! [length]
     logical, intent(in) :: inside
-    real(real64), intent(in), optional :: within      !! for contacts later than this time the result may be `never` [time]
+    real(real64), intent(in), optional :: within  !! latest time of interest: for a later contact the result may be `never` [time]
     real(real64) :: s, b, c, speed2, disc
 
     s = never
@@ -100,17 +100,17 @@ contains
     end if
   end function time_to_circle
 
-  !> Whether a falling point certainly does not enter a circle around the origin during a given time. The point may start on the
-  !> circle. The squared distance of the point minus the squared radius is a quartic polynomial in time. A polynomial is never below
-  !> the smallest of its Bernstein coefficients. The coefficients converge to the values of the polynomial when the interval is
-  !> halved repeatedly.
+  !> Whether an accelerated point certainly does not enter a circle around the origin during a given time. The point may start on
+  !> the circle. The squared distance of the point from the origin minus the squared radius is a quartic polynomial in time. In a
+  !> time interval, the value of a polynomial is never smaller than the smallest of its Bernstein coefficients. The Bernstein
+  !> coefficients converge to the values of the polynomial when the interval is halved repeatedly.
   pure function misses_circle(d, v, g, rho, within) result(yes)
     real(real64), intent(in) :: d(2), v(2), g(2), rho, within
     logical :: yes
     real(real64) :: c(0:4), step(4), slack
 
     yes = .false.
-    if (within > sqrt(never)) return                   ! the length of the path may overflow
+    if (within > sqrt(never)) return                   ! the length of the path might overflow
     step(1) = 0.5_real64*within*(d(1)*v(1) + d(2)*v(2))
     step(2) = within**2*((v(1)*v(1) + v(2)*v(2)) + (d(1)*g(1) + d(2)*g(2)))/6
     step(3) = 0.25_real64*within**3*(v(1)*g(1) + v(2)*g(2))
@@ -125,8 +125,8 @@ contains
 
   contains
 
-    !> Whether the quartic with the given Bernstein coefficients is certainly positive in the interval. With `from_start` the start
-    !> of the interval is excluded.
+    !> Whether the quartic polynomial with the given Bernstein coefficients is certainly positive in the whole interval. If
+    !> `from_start` is .true., the polynomial may be 0 or negative at the start of the interval.
     pure recursive function is_positive(c, from_start, halvings) result(yes)
       real(real64), intent(in) :: c(0:4)
       logical, intent(in) :: from_start
@@ -145,10 +145,11 @@ contains
     end function is_positive
   end function misses_circle
 
-  !> Like `time_to_circle`, for a disk on a parabolic path. F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic. F is monotonic
-  !> between the roots of F', which in turn are bracketed by the roots of the quadratic F''. Each root is therefore found by
-  !> bisection in an interval that contains exactly one root, and the first contact cannot be missed. F itself is evaluated from the
-  !> actual position, so that the squared radius of a small circle is not lost in rounding.
+  !> Like `time_to_circle`, for a disk on a parabolic path. The function F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic
+  !> polynomial, which is 0 at a contact. F is monotonic between the roots of its derivative F', and F' is monotonic between the
+  !> roots of its derivative F''. Bisection therefore starts with an interval that contains exactly one root, and the first contact
+  !> cannot be missed. F is calculated from the position at the time s and not from polynomial coefficients, because rounding errors
+  !> of the coefficients could exceed the squared radius of a small circle.
   pure function time_to_circle_falling(d, v, g, rho, inside) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside
@@ -163,7 +164,7 @@ contains
 
     ends = [0.0_real64, min(max(bend, 0.0_real64), bound), bound, bound]
     s = never
-    from = 0                                           ! ends of an interval in which F is monotonic
+    from = 0                                           ! `from` and `to`: ends of an interval in which F is monotonic
     do k = 1, 4
       if (k < 4) then
         if ((value(cubic, ends(k)) > 0) .eqv. (value(cubic, ends(k + 1)) > 0)) cycle
@@ -183,7 +184,7 @@ contains
 
   contains
 
-    !> F, or -F if the disk is inside. A contact is a zero crossing from positive to negative values.
+    !> The function F, or -F if the disk is inside the circle. At a contact the value of `apart` changes from positive to negative.
     pure function apart(s) result(f)
       real(real64), intent(in) :: s
       real(real64) :: f, x(2)
@@ -193,8 +194,8 @@ contains
       if (inside) f = -f
     end function apart
 
-    !> The last time before contact, if the centre crosses the circle once between lo and hi. Bisection to the last bit uses the
-    !> distance itself, which is more precise than the polynomial.
+    !> Latest representable time before a contact, if the centre of the disk crosses the circle exactly once between the times lo
+    !> and hi. The bisection uses the distance from the origin, which is more precise than the coefficients of the polynomial.
     pure function last_apart(lo, hi) result(left)
       real(real64), intent(in) :: lo, hi
       real(real64) :: left, middle, right, x(2)
@@ -214,8 +215,9 @@ contains
     end function last_apart
   end function time_to_circle_falling
 
-  !> A power of two larger than all roots of a cubic (Fujiwara's bound), and larger than the square root of `time2`, which is
-  !> used if all roots are zero. With powers of two, results scale exactly when the units change by a power of two.
+  !> A power of two that is larger than all roots of a cubic polynomial (Fujiwara's bound) and larger than the square root of
+  !> `time2`. The argument `time2` determines the bound if all roots are zero. The bound is a power of two, so that all results
+  !> scale exactly if a unit is changed by a power of two.
   pure function root_bound(cubic, time2) result(bound)
     real(real64), intent(in) :: cubic(0:3), time2
     real(real64) :: bound
@@ -228,8 +230,8 @@ contains
     bound = scale(2.0_real64, power)
   end function root_bound
 
-  !> The root of a cubic in the interval from lo to hi. The cubic must have exactly one change of sign in this interval. The root is
-  !> found by bisection to the last bit.
+  !> Root of a cubic polynomial in the interval from lo to hi, in which the polynomial must change its sign exactly once. The root
+  !> is found by bisection to the last bit.
   pure function root_between(cubic, lo, hi) result(s)
     real(real64), intent(in) :: cubic(0:3), lo, hi
     real(real64) :: s, left, right
@@ -247,10 +249,10 @@ contains
         right = s
       end if
     end do
-    s = left                                           ! the end of the interval before contact
+    s = left  ! the last representable time at which `cubic` still has the sign of its value at lo
   end function root_between
 
-  !> Value of a cubic by Horner's rule.
+  !> Value of a cubic polynomial by Horner's method.
   pure function value(cubic, s) result(p)
     real(real64), intent(in) :: cubic(0:3)
     real(real64), intent(in) :: s

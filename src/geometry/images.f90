@@ -1,9 +1,9 @@
-!> Periodic images of the box: their displacements and velocities. The search, the placement of disks, obstacles and collisions use
-!> this module.
+!> Displacements and velocities of the periodic images of the box. The modules for neighbour search, placement of disks, obstacles
+!> and collisions use this module.
 !>
-!> In a sheared box (Lees and Edwards, J. Phys. C 5, 1921 (1972)) the image above the box moves along x. The position of an image
-!> depends on the time alone: it follows from its displacement at the epoch and its velocity. The separation of a disk from an image
-!> of another disk is therefore a function of the states of the two disks and of the time.
+!> In a sheared box (Lees and Edwards, 1972, doi:10.1088/0022-3719/5/15/006) the image above the box moves along x. The position of
+!> an image of the box depends only on the time, because the image has a constant velocity. The separation between a disk and an
+!> image of another disk therefore depends only on the states of the two disks and on the time.
 module images
   use kinds, only: never, real64
   implicit none
@@ -16,13 +16,14 @@ module images
     real(real64) :: velocity = 0.0_real64       !! velocity of the image along x [length/time]
   end type image_t
 
-  !> All images of the box. An image has an index along each axis: (0, 0) is the box itself, (0, 1) the image above the box. Indices
-  !> are integers stored as reals, because disks may be any number of periods apart.
+  !> All periodic images of the box. Each image is identified by two indices, one along each axis: (0, 0) is the box itself, and (0,
+  !> 1) is the image above the box. The indices are whole numbers stored as reals, because two disks may be any number of periods
+  !> apart.
   type :: images_t
-    real(real64) :: period(2) = never           !! `never` along axes with walls [length]
+    real(real64) :: period(2) = never           !! edges of the box; `never` along an axis with walls [length]
     real(real64) :: velocity = 0.0_real64       !! velocity of the image above the box [length/time]
-    real(real64) :: offset = 0.0_real64         !! displacement of the image above the box at the epoch, modulo the period [length]
-    real(real64) :: removed_periods = 0.0_real64  !! number of periods by which `offset` has been reduced
+    real(real64) :: offset = 0.0_real64  !! displacement, at the epoch, of the image above the box, modulo the period [length]
+    real(real64) :: removed_periods = 0.0_real64  !! number of periods that were subtracted from `offset`
   contains
     procedure :: count => count_around
     procedure :: around
@@ -37,9 +38,9 @@ module images
 
 contains
 
-  !> The images of a box, for clocks relative to `epoch`. The image above the box is displaced by velocity*t at the time t of the
-  !> run. The displacement is reduced modulo the period without rounding error, so that the precision does not decrease at late
-  !> times.
+  !> Creates the images of a box; later calls pass times that are measured from `epoch`. At the time t of the run, the image above
+  !> the box is displaced along x by velocity*t. The displacement is reduced modulo the period without rounding errors, so that the
+  !> precision does not decrease at late times.
   pure function moving_images(period, velocity, epoch) result(images)
     real(real64), intent(in) :: period(2)       !! [length]
     real(real64), intent(in) :: velocity        !! [length/time]
@@ -58,18 +59,18 @@ contains
     end associate
   end function moving_images
 
-  !> Splits a number into two numbers that add up to it. Each of the two has at most 27 significant binary digits, so that the
-  !> product of two such numbers is exact.
+  !> Splits a number into two parts whose sum is the number. Each part has at most 27 significant binary digits, so that the product
+  !> of two such parts is exact.
   pure function halves(x)
     real(real64), intent(in) :: x
     real(real64) :: halves(2)
-    integer, parameter :: half = 26             ! significant digits of the first part
+    integer, parameter :: half = 26             ! number of significant binary digits of the first part
 
     halves(1) = scale(aint(scale(fraction(x), half)), exponent(x) - half)
     halves(2) = x - halves(1)
   end function halves
 
-  !> Number of images in reach (see `reach`), including the box itself.
+  !> Number of images in which a search must look for collision partners (see `reach`), including the box itself.
   pure function count_around(self) result(n)
     class(images_t), intent(in) :: self
     integer :: n
@@ -77,8 +78,8 @@ contains
     n = product(2*self%reach() + 1)
   end function count_around
 
-  !> Largest index of images in reach, along each axis. Until the time `valid_until`, two disks in the box can touch only in these
-  !> images, unless one of the two disks passes a side before.
+  !> Largest index, along each axis, of the images in which a search must look for collision partners. Until the time `valid_until`,
+  !> a disk in the box can touch only disks in images with indices up to `reach`, unless a disk passes a side of the box before.
   pure function reach(self)
     class(images_t), intent(in) :: self
     integer :: reach(2)
@@ -87,10 +88,10 @@ contains
     if (abs(self%velocity) > 0) reach(1) = 2
   end function reach
 
-  !> Index of the k-th image in reach, in the order of rows.
+  !> Indices of the k-th image in which a search must look for collision partners; the images are numbered row by row.
   pure function around(self, k, now) result(number)
     class(images_t), intent(in) :: self
-    integer, intent(in) :: k                    !! number of the image, which starts at 1
+    integer, intent(in) :: k                    !! number of the image, starting at 1
     real(real64), intent(in), optional :: now   !! time since the epoch; needed in a sheared box [time]
     real(real64) :: number(2)
     integer :: reach(2)
@@ -113,9 +114,9 @@ contains
     displacement = rows*(self%offset + self%velocity*now)
   end function displacement
 
-  !> Time at which the image above the box will have moved by `distance` from its present position; `never` if this image does not
-  !> move. Until this time a search can use the images that are in reach now, if the search covers displacements of up to
-  !> `distance`.
+  !> Time at which the image above the box will have moved by `distance` from its present position; `never` if the images do not
+  !> move. Until this time a search can use the present result of `around`, if the search allows for displacements of the images of
+  !> up to `distance`.
   pure function valid_until(self, now, distance) result(t)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: now             !! [time]
@@ -128,7 +129,7 @@ contains
     if (abs(self%velocity) > farthest/never) t = now + farthest/abs(self%velocity)
   end function valid_until
 
-  !> Index of the image through which an object at the separation dx is nearest. The result is almost always (0, 0).
+  !> Indices of the image in which an object at the separation dx is nearest. The result is almost always (0, 0).
   pure function nearest_image(self, dx, now) result(number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: dx(2)           !! [length]
@@ -142,7 +143,7 @@ contains
       number(1) = -anint((dx(1) + self%displacement(number(2), now))/self%period(1))
   end function nearest_image
 
-  !> Displacement, at the epoch, of the image with the given index.
+  !> Displacement, at the epoch, of the image with the given indices.
   pure function shift(self, number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: number(2)
@@ -152,7 +153,7 @@ contains
     shift(1) = shift(1) + number(2)*self%offset
   end function shift
 
-  !> The image with the given index.
+  !> Displacement and velocity of the image with the given indices.
   pure function image(self, number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: number(2)
@@ -161,14 +162,15 @@ contains
     image = image_t(self%shift(number), number(2)*self%velocity)
   end function image
 
-  !> Transforms the state of a disk into the frame of the image that is `rows` periods above the box. The disk itself does not move.
+  !> Transforms the state of a disk into the reference frame of the image that is `rows` periods above the box. Only the coordinates
+  !> and velocity components of the disk change; its physical state does not change.
   pure subroutine enter_image_frame(self, rows, clock, x, v, periods)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: rows
-    real(real64), intent(in) :: clock           !! time at which x is the position of the disk [time]
+    real(real64), intent(in) :: clock           !! time at which the disk is at the position x [time]
     real(real64), intent(inout) :: x(2)         !! [length]
     real(real64), intent(inout) :: v(2)         !! [length/time]
-    real(real64), intent(inout) :: periods(2)   !! number of periods by which the disk has moved
+    real(real64), intent(inout) :: periods(2)  !! number of periods that the disk has moved along each axis
 
     x = x - [self%displacement(rows, clock), rows*self%period(2)]
     v(1) = v(1) - rows*self%velocity

@@ -1,9 +1,9 @@
 !> Straight walls between two points, impenetrable from both sides. Disks also collide with the ends of a wall.
 !>
-!> A disk touches a wall when its centre reaches the stadium around the wall. The stadium consists of two straight sides, whose
-!> distance from the wall is the radius of the disk, and two half circles around the ends. The stadium is convex. The centre of a
-!> disk can therefore reach a straight side only from outside. If rounding causes a contact with a straight side to be missed, the
-!> disk touches a half circle at the same time.
+!> A disk touches a wall when the centre of the disk reaches the stadium around the wall. The stadium consists of two straight
+!> sides, parallel to the wall at a distance equal to the radius of the disk, and of two half circles around the ends of the wall.
+!> The stadium is convex, and the centre of a disk can therefore reach a straight side only from outside. Rounding errors can hide a
+!> contact only where a straight side meets a half circle; the contact with the half circle is then found.
 module segments
   use free_flight, only: flight, time_to_circle, time_to_line
   use images, only: images_t
@@ -14,9 +14,9 @@ module segments
   public :: segment_t, new_segment
 
   type, extends(shape_t) :: segment_t
-    real(real64) :: half(2) = 0.0_real64        !! vector from the middle to an end [length]
-    real(real64) :: along(2) = [1.0_real64, 0.0_real64]   !! unit vector
-    real(real64) :: length = 0.0_real64         !! half the length [length]
+    real(real64) :: half(2) = 0.0_real64        !! vector from the middle of the wall to its second end [length]
+    real(real64) :: along(2) = [1.0_real64, 0.0_real64]   !! unit vector along the wall
+    real(real64) :: length = 0.0_real64         !! half the length of the wall [length]
   contains
     procedure :: from_nearest
     procedure :: direction
@@ -31,7 +31,7 @@ module segments
 
 contains
 
-  !> The straight wall between two points.
+  !> Creates the straight wall between two points.
   pure function new_segment(from, to) result(segment)
     real(real64), intent(in) :: from(2), to(2)  !! [length]
     type(segment_t) :: segment
@@ -44,8 +44,8 @@ contains
   end function new_segment
 
   !> Tangential velocity of the surface at a point of contact, if the surface moves along the wall with unit speed. The result is
-  !> the unit vector from the first to the second end, projected on the tangent. The surface around an end of the wall therefore
-  !> moves more slowly.
+  !> the component of the unit vector along the wall that is perpendicular to the normal of the surface. At the rounded ends of the
+  !> wall the surface therefore moves more slowly than along the wall.
   pure function direction(self, normal) result(along)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: normal(2)
@@ -54,8 +54,8 @@ contains
     along = self%along - dot_product(self%along, normal)*normal
   end function direction
 
-  !> Vector to x from the middle of the nearest periodic image of the wall. For a long wall this is not always the image whose
-  !> middle is nearest.
+  !> Vector to the point x from the middle of the nearest periodic image of the wall. If the wall is long, another image may have a
+  !> middle that is closer to x.
   pure function from_nearest(self, x, images, heading) result(d)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: x(2)
@@ -98,19 +98,20 @@ contains
 
   contains
 
-    !> Time until a disk touches one straight side, where `across` points away from the wall; `never` if the disk passes beyond an
-    !> end. A straight side is reached at most once, because the distance is a quadratic function of time.
+    !> Time until the centre of a disk reaches the straight side of the stadium in the direction `across`; `never` if the centre
+    !> passes beyond an end of the wall. The centre reaches a straight side from outside at most once, because the distance is a
+    !> quadratic function of time.
     pure function time_to_side() result(t)
       real(real64) :: t, away, speed, fall, disc
 
       away = dot_product(d, across) - radius
-      speed = -dot_product(v, across)             ! positive towards the wall, like `fall`
+      speed = -dot_product(v, across)             ! both `speed` and `fall` are positive towards the wall
       fall = -dot_product(g, across)
       if (away > -radius .and. abs(dot_product(d, self%along)) <= self%length) away = max(away, 0.0_real64)
       t = never
       if (away >= 0) then
         t = time_to_line(away, speed, fall)
-      else if (fall > 0 .and. speed < 0) then     ! the disk rises beyond an end and may fall onto the wall
+      else if (fall > 0 .and. speed < 0) then     ! the disk passes the wall beyond an end and may fall back onto the wall
         disc = speed**2 + 2*fall*away
         if (disc >= 0) t = (sqrt(disc) - speed)/fall
       end if
@@ -129,7 +130,7 @@ contains
     offset = d - min(max(place, -self%length), self%length)*self%along
   end function from_outline
 
-  !> Distance between the wall and the boundary of a disk.
+  !> Shortest distance between the wall and the boundary of a disk.
   pure function gap(self, d, radius) result(length)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), radius
@@ -139,8 +140,8 @@ contains
     length = sqrt(dot_product(offset, offset)) - radius
   end function gap
 
-  !> Unit vector from the wall to a disk that touches it. Along the straight part it is the normal of the wall, which is exact
-  !> for disks of any size.
+  !> Unit vector from the point of contact on the wall to the centre of a disk that touches the wall. Between the ends of the wall
+  !> the result is exactly the normal of the wall, without rounding errors even for very small disks.
   pure function normal(self, d) result(direction)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -155,8 +156,8 @@ contains
     end if
   end function normal
 
-  !> Whether a disk whose centre is in a rectangle can touch the wall. The test uses separating axes and treats the rounded corners
-  !> as square corners.
+  !> Whether a disk whose centre is in a rectangle can touch the wall. The test looks for a separating axis, and replaces the disk
+  !> by a square of the same width.
   pure function reaches(self, d, half, radius) result(yes)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -169,7 +170,8 @@ contains
       abs(dot_product(d, across)) <= dot_product(room, abs(across)) + spare*sqrt(dot_product(d, d))
   end function reaches
 
-  !> Whether the wall excludes disks from a whole rectangle. The stadium is convex, so that it is sufficient to test the corners.
+  !> Whether the wall excludes the centres of disks from a whole rectangle. The stadium around the wall is convex; it is therefore
+  !> sufficient to test the corners of the rectangle.
   pure function covers(self, d, half, radius) result(yes)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius

@@ -7,16 +7,16 @@ module shapes
   private
   public :: shape_t, magnitude, spare
 
-  !> Relative margin that exceeds all rounding errors. Tests with this margin return the safe result if rounding errors make the
-  !> exact result uncertain.
+  !> Relative safety margin, larger than all rounding errors. If rounding errors make the result of a test uncertain, a test with
+  !> this margin returns the safe result.
   real(real64), parameter :: spare = 1.0e-6_real64
 
-  !> The outline of an obstacle. Points are given relative to its middle.
+  !> The outline of an obstacle. All points are relative to the middle of the obstacle.
   type, abstract :: shape_t
     real(real64) :: middle(2) = 0.0_real64      !! [length]
-    logical :: encloses = .false.               !! the disks are inside the obstacle, not outside
-    real(real64) :: extent(2) = 0.0_real64      !! half the edges of the bounding rectangle [length]
-    real(real64) :: area = 0.0_real64           !! area of the obstacle or, if it encloses the disks, area inside [length**2]
+    logical :: encloses = .false.               !! .true. if the disks are inside the obstacle, .false. if they are outside
+    real(real64) :: extent(2) = 0.0_real64      !! half width and half height of the bounding rectangle [length]
+    real(real64) :: area = 0.0_real64  !! area that the outline encloses [length**2]
   contains
     procedure :: from_nearest
     procedure :: direction
@@ -30,19 +30,19 @@ module shapes
 
   abstract interface
     !> Time until the boundary of a disk touches the outline. The result is 0 if the disk already touches the outline (or overlaps
-    !> it because of rounding) and moves towards it. The result is `never` if there is no contact.
+    !> the outline because of rounding) and moves towards the outline. The result is `never` if there is no contact.
     pure function contact_time(self, d, v, g, radius, within) result(s)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
-      real(real64), intent(in) :: d(2)          !! vector from the middle to the centre of the disk [length]
+      real(real64), intent(in) :: d(2)          !! vector from the middle of the obstacle to the centre of the disk [length]
       real(real64), intent(in) :: v(2)          !! [length/time]
       real(real64), intent(in) :: g(2)          !! [length/time**2]
       real(real64), intent(in) :: radius        !! radius of the disk [length]
-      real(real64), intent(in), optional :: within   !! if the contact is later than this time, the result may be `never` [time]
+      real(real64), intent(in), optional :: within  !! latest time of interest: for a later contact the result may be `never` [time]
       real(real64) :: s
     end function contact_time
 
-    !> Distance between the outline and the boundary of a disk; negative if the disk overlaps the outline.
+    !> Shortest distance between the outline and the boundary of a disk; negative if the disk overlaps the outline.
     pure function gap(self, d, radius) result(length)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -50,7 +50,7 @@ module shapes
       real(real64) :: length
     end function gap
 
-    !> Unit vector from the outline to a disk that touches it.
+    !> Unit vector from the point of contact on the outline to the centre of a disk that touches the outline.
     pure function normal(self, d) result(direction)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -58,7 +58,8 @@ module shapes
       real(real64) :: direction(2)
     end function normal
 
-    !> Whether a disk whose centre is in the rectangle d +- half can touch the outline; .true. if this is uncertain.
+    !> Whether a disk whose centre is in the rectangle d +- half can touch the outline. If rounding errors make the answer
+    !> uncertain, the result is .true.
     pure function reaches(self, d, half, radius) result(yes)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -66,8 +67,8 @@ module shapes
       logical :: yes
     end function reaches
 
-    !> Whether the obstacle excludes disk centres from the whole rectangle d +- half. The result is .false. if this is uncertain;
-    !> for a point (half = 0) the result is exact.
+    !> Whether the obstacle excludes the centres of disks from the whole rectangle d +- half. If rounding errors make the answer
+    !> uncertain, the result is .false.; for a single point (half = 0) the result is exact.
     pure function covers(self, d, half, radius) result(yes)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -87,8 +88,8 @@ module shapes
 
 contains
 
-  !> Length of a vector. If the vector is multiplied by a power of two, the result is multiplied by exactly this power of two. The
-  !> function `norm2` of gfortran does not have this property, because its scaling introduces rounding errors.
+  !> Length of a vector. If the vector is multiplied by a power of two, the result is multiplied by exactly the same power of two.
+  !> The function `norm2` of gfortran is not used, because `norm2` scales the vector and thereby introduces rounding errors.
   pure function magnitude(v)
     real(real64), intent(in) :: v(2)
     real(real64) :: magnitude
@@ -96,8 +97,9 @@ contains
     magnitude = sqrt(v(1)*v(1) + v(2)*v(2))
   end function magnitude
 
-  !> Vector to x from the middle of the nearest periodic image of the obstacle. Obstacles that enclose disks have no images. If x is
-  !> at equal distances from two images, a disk at x may touch both; `heading` then selects the image from which it points away.
+  !> Vector to the point x from the middle of the nearest periodic image of the obstacle. Obstacles that enclose disks have no
+  !> images. If x is at equal distances from two images, a disk at x may touch both images. The vector `heading` then selects an
+  !> image: the component of the result along the axis has the sign of `heading`.
   pure function from_nearest(self, x, images, heading) result(d)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
@@ -116,7 +118,7 @@ contains
     end do
   end function from_nearest
 
-  !> Tangential unit vector at the point where the outline has the given normal. The vector points counter-clockwise around the
+  !> Unit tangent vector at the point where the outline has the given normal. The tangent vector points counter-clockwise around the
   !> middle of the obstacle.
   pure function direction(self, normal) result(along)
     class(shape_t), intent(in) :: self

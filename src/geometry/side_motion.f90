@@ -1,9 +1,9 @@
-!> Motion of a side of the box, and the time when the side touches a disk in free flight. All quantities are components along the
-!> inner normal of the side.
+!> Motion of a side of the box, and the time at which the side touches a disk in free flight. All positions, velocities and
+!> accelerations are components along the inner normal of the side.
 !>
-!> While the acceleration of a disk relative to the side has a constant sign, the gap between them is a convex or concave function
-!> of time, whose first zero can be bracketed. A period of the motion consists of a few such intervals. No contact can therefore be
-!> missed, even if the side and the disk stay close together for a long time.
+!> In a time interval in which the acceleration of a disk relative to the side does not change its sign, the gap between disk and
+!> side is a convex or concave function of time. The first zero of such a function can be bracketed. A period of the motion consists
+!> of a few such intervals. No contact can therefore be missed, even if side and disk stay close together for a long time.
 module side_motion
   use free_flight, only: flight, flight_velocity, time_to_line
   use kinds, only: never, pi, real64
@@ -11,37 +11,38 @@ module side_motion
   private
   public :: motions, side_motion_t, side_state_t
 
-  !> Names of the motions in the input. A motion is represented by its position in this list.
+  !> Kinds of motion, with the names that the input uses. The number of a kind is its position in this list.
   character(len=*), parameter :: motions = "still sine parabolic sawtooth constant_velocity piston"
   integer, parameter, public :: still = 1, sine = 2, parabolic = 3, sawtooth = 4, constant_velocity = 5, piston = 6
-  !> Angle below which a series is used, because differences would suffer from cancellation [radian]
+  !> Angle below which differences of sines are calculated by a power series, to avoid cancellation [radian]
   real(real64), parameter :: small_angle = 0.5_real64
-  !> A time interval, as a fraction of a period. The effect on the gap of an acceleration that acts for a shorter time is smaller
-  !> than the rounding error of the gap.
+  !> Length of a negligible time interval, as a fraction of the period. If an acceleration acts for a shorter time, its effect on
+  !> the gap is smaller than the rounding error of the gap.
   real(real64), parameter :: negligible = 1.0e-10_real64
-  !> Number of successive intervals that together exceed a period, even if some of them are negligible.
+  !> Number of successive intervals (see `curvature_interval`) whose total length exceeds a period, even if some of the intervals
+  !> are negligible.
   integer, parameter :: intervals_in_reach = 6
 
-  !> The state of a piston, which changes in its collisions.
+  !> The state, if the side is a piston. Collisions with disks change this state.
   type :: side_state_t
-    real(real64) :: position = 0.0_real64            !! displacement inwards from its mean position, at `clock` [length]
-    real(real64) :: velocity = 0.0_real64            !! velocity inwards, at `clock` [length/time]
-    real(real64) :: clock = 0.0_real64               !! time at which position and velocity were set, since the epoch [time]
+    real(real64) :: position = 0.0_real64            !! displacement inwards from the mean position, at the time `clock` [length]
+    real(real64) :: velocity = 0.0_real64            !! velocity inwards, at the time `clock` [length/time]
+    real(real64) :: clock = 0.0_real64               !! time, since the epoch, to which position and velocity refer [time]
   end type side_state_t
 
   type :: side_motion_t
     integer :: kind = still                          !! position in `motions`
     real(real64) :: offset = 0.0_real64              !! displacement inwards at which the motion starts [length]
-    !> Amplitude; for a motion at constant velocity, the offset plus the length of the path; for a piston, the width of the box
-    !> [length]
+    !> Amplitude of an oscillation. For a motion at constant velocity: sum of `offset` and the length of the path. For a piston:
+    !> width of the box. [length]
     real(real64) :: amplitude = 0.0_real64
     real(real64) :: period = 1.0_real64              !! [time]
     real(real64) :: phase = 0.0_real64               !! phase at t = 0, in units of the period
-    !> Velocity inwards of a sawtooth or of a motion at constant velocity [length/time]
+    !> Velocity inwards, for a sawtooth motion or a motion at constant velocity [length/time]
     real(real64) :: prescribed_velocity = 0.0_real64
     real(real64) :: start_time = 0.0_real64          !! start of a motion at constant velocity [time]
     real(real64) :: end_time = 0.0_real64            !! end of a motion at constant velocity [time]
-    ! For a piston, which is moved by disks and by a force:
+    ! The components `mass` and `pull` apply to a piston, which is moved by a force and by collisions with disks.
     real(real64) :: mass = 1.0_real64                !! [mass]
     real(real64) :: pull = 0.0_real64                !! acceleration inwards due to the force [length/time**2]
   contains
@@ -58,7 +59,7 @@ module side_motion
 
 contains
 
-  !> Whether the position of the side changes.
+  !> Whether the position of the side changes at any time.
   elemental function moves(self) result(yes)
     class(side_motion_t), intent(in) :: self
     logical :: yes
@@ -95,13 +96,13 @@ contains
     if (self%kind == piston) speed = sqrt(2*abs(self%pull)*self%amplitude)
   end function highest_speed
 
-  !> Local time of the motion at the time epoch + t of the run. The local time is measured from the start of the present period or,
-  !> for other motions, from the start of the motion at constant velocity or of the present free flight of a piston. The remainders
-  !> are exact, so that the precision does not decrease at late times.
+  !> Local time of the motion at the time epoch + t of the run. For an oscillation the local time is measured from the start of the
+  !> present period. For a motion at constant velocity it is measured from the start of the motion, and for a piston from the last
+  !> change of its state. Remainders modulo the period are exact, so that the precision does not decrease at late times.
   elemental function local_time(self, epoch, t, state) result(tau)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! [time]
-    type(side_state_t), intent(in), optional :: state     !! state of a piston
+    type(side_state_t), intent(in), optional :: state     !! state, if the side is a piston
     real(real64) :: tau                              !! [time]
 
     if (self%kind == piston) then
@@ -117,7 +118,7 @@ contains
   elemental function position(self, tau, state) result(x)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! time as returned by `local_time` [time]
-    type(side_state_t), intent(in), optional :: state     !! state of a piston
+    type(side_state_t), intent(in), optional :: state     !! state, if the side is a piston
     real(real64) :: x                                !! [length]
     real(real64) :: s
 
@@ -138,7 +139,7 @@ contains
   elemental function velocity(self, tau, state) result(v)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! time as returned by `local_time` [time]
-    type(side_state_t), intent(in), optional :: state     !! state of a piston
+    type(side_state_t), intent(in), optional :: state     !! state, if the side is a piston
     real(real64) :: v                                !! [length/time]
     real(real64) :: s
 
@@ -184,7 +185,7 @@ contains
     end if
   end function displacement
 
-  !> Whether s is so short that `excess_displacement` is valid.
+  !> Whether the duration s is so short that the formula of `excess_displacement` is valid.
   elemental function is_short(self, tau, s) result(yes)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -192,13 +193,13 @@ contains
 
     if (self%kind == sine) then
       yes = s < small_angle*self%period/(2*pi)
-    else                                             ! the side is still on the same parabola
+    else                                             ! the motion is on the same parabola until tau + s
       yes = s <= 0.5_real64*self%period - modulo(tau, 0.5_real64*self%period)
     end if
   end function is_short
 
-  !> Difference between the displacement of the side and that of an imaginary side with constant velocity, between the times tau and
-  !> tau + s. The two sides have the same velocity at the time tau. The difference is computed without cancellation.
+  !> Displacement of the side between the times tau and tau + s, minus the displacement that the side would have if it kept its
+  !> velocity at the time tau. The difference is computed without cancellation.
   elemental function excess_displacement(self, tau, s) result(distance)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -232,8 +233,8 @@ contains
     end if
   end function velocity_change
 
-  !> Duration of the interval, starting at the time tau, in which the gap to a disk with the acceleration g is convex or concave.
-  !> The interval ends when the acceleration of the side equals g, and its length is at most half a period.
+  !> Duration of the longest interval, starting at the time tau, in which the gap to a disk with the acceleration g is a convex or
+  !> concave function of time. The interval ends when the acceleration of the side equals g or, at the latest, after half a period.
   elemental function curvature_interval(self, tau, g) result(s)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! time as returned by `local_time` [time]
@@ -251,16 +252,16 @@ contains
     s = minval(bend)
   end function curvature_interval
 
-  !> Time until the side touches the boundary of a disk on a parabola; `never` if it does not. The side touches every disk that
-  !> stays in the range of the side for a whole period, except a disk at the very end of the range that hardly moves. For such a
-  !> disk the search skips an increasing number of periods.
+  !> Time until the side touches the boundary of a disk on a parabolic path; `never` if there is no contact. The side touches every
+  !> disk that stays within its range of motion for a whole period, except a slow disk at the very end of the range. If no contact
+  !> is found in a period, the disk is such an exception, and the search skips an increasing number of periods.
   pure function contact_time(self, tau, gap, v, g, state) result(s)
     class(side_motion_t), intent(in) :: self         !! a moving side
     real(real64), intent(in) :: tau                  !! local time to which the result is relative [time]
     real(real64), intent(in) :: gap                  !! gap between the side and the boundary of the disk, not negative [length]
     real(real64), intent(in) :: v                    !! velocity of the disk [length/time]
     real(real64), intent(in) :: g                    !! acceleration of the disk [length/time**2]
-    type(side_state_t), intent(in), optional :: state     !! state of a piston
+    type(side_state_t), intent(in), optional :: state     !! state, if the side is a piston
     real(real64) :: s, from, to, above, entry
     integer :: intervals
 
@@ -271,8 +272,8 @@ contains
       s = time_to_line(gap, self%velocity(tau, state) - v, self%pull - g)
       return
     end if
-    above = gap + self%position(tau) - self%amplitude  ! distance of the disk from the range of the side
-    entry = time_to_line(above, -v, -g)              ! time of the last entry into the range
+    above = gap + self%position(tau) - self%amplitude  ! distance of the disk from the range of motion of the side
+    entry = time_to_line(above, -v, -g)              ! time of the last entry of the disk into this range
     s = never
     from = 0
     intervals = 0
@@ -295,7 +296,7 @@ contains
     end do
   end function contact_time
 
-  !> Time until contact with a side that is at rest, moves at constant velocity, and is at rest again.
+  !> Time until contact with a side that is at rest, then moves at constant velocity, and then is at rest again.
   pure function contact_time_of_stroke(motion, tau, gap, v, g) result(s)
     class(side_motion_t), intent(in) :: motion
     real(real64), intent(in) :: tau, gap, v, g       !! as in `contact_time`
@@ -332,7 +333,7 @@ contains
     if (.not. gap_at(from) > 0 .and. gap_rate(from) < 0) return
     s = never
     high = to
-    if (curvature > 0) then                          ! the gap has its minimum where its rate of change is 0
+    if (curvature > 0) then                          ! the gap is smallest when its rate of change is 0
       if (.not. gap_rate(from) < 0) return
       low = from
       if (gap_rate(to) > 0) call bisect(.true., low, high)
@@ -344,7 +345,7 @@ contains
 
   contains
 
-    !> The gap after the time t.
+    !> Gap between side and disk after the time t.
     pure function gap_at(t) result(distance)
       real(real64), intent(in) :: t
       real(real64) :: distance
@@ -356,7 +357,7 @@ contains
       end if
     end function gap_at
 
-    !> Rate of change of the gap after the time t.
+    !> Rate of change of the gap between side and disk after the time t.
     pure function gap_rate(t) result(speed)
       real(real64), intent(in) :: t
       real(real64) :: speed
@@ -364,8 +365,8 @@ contains
       speed = relative + (g*t - motion%velocity_change(tau, t))
     end function gap_rate
 
-    !> Bisects an interval until `left` and `right` are adjacent numbers. At the time `right` the gap increases (if `to_smallest` is
-    !> true) or is negative (if it is false).
+    !> Bisects an interval until `left` and `right` are adjacent floating-point numbers. If `to_smallest` is .true., the gap
+    !> increases at the time `right`; otherwise the gap is negative at the time `right`.
     pure subroutine bisect(to_smallest, left, right)
       logical, intent(in) :: to_smallest
       real(real64), intent(inout) :: left, right
