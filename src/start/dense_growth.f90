@@ -1,7 +1,8 @@
-!> Dense random packings by compression: disks start small, move as an elastic gas, and grow to their full size (after Lubachevsky
-!> and Stillinger, J. Stat. Phys. 60, 561 (1990)). In the original algorithm the disks grow continuously. Here the disks grow in
-!> steps between short runs at constant size, so that the ordinary event-driven dynamics can be used. In each step every disk grows
-!> into the gap around it. The disks can also start at given positions, with the largest size for which they do not overlap.
+!> Dense random packings by Lubachevsky-Stillinger compression (Lubachevsky and Stillinger, 1990, doi:10.1007/BF01025983): the disks
+!> start small, move as an elastic gas, and grow to their full size. In the original algorithm the disks grow continuously. In this
+!> module the disks grow in steps between short runs at constant size, so that the ordinary event-driven dynamics can be used. In
+!> each step every disk grows into the gap between the disk and its neighbours. If initial positions are given, the disks start at
+!> these positions with the largest size for which they do not overlap.
 module dense_growth
   use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t, obstacle_gap
@@ -21,16 +22,19 @@ module dense_growth
   private
   public :: grow_disks, smallest_scale
 
-  real(real64), parameter :: loose = 0.4_real64         !! packing fraction at which the disks are inserted
-  !> Largest ratio of relative sizes of two disks during growth; the relative size is the size divided by the full size.
+  real(real64), parameter :: loose = 0.4_real64         !! packing fraction of the small disks that are inserted at random positions
+  !> Largest ratio of the relative sizes of two disks during growth. The relative size of a disk is its radius divided by its full
+  !> radius.
   real(real64), parameter :: lead = 1.02_real64
-  real(real64), parameter :: caution = 0.9_real64       !! fraction of the gap by which a disk grows in a step
+  real(real64), parameter :: caution = 0.9_real64       !! fraction of the available gap that a disk fills in one growth step
   real(real64), parameter :: smallest_scale = 1.0e-3_real64       !! smallest initial size, relative to the full size
-  !> Number of growth steps at given positions; each step reduces the gap to a tenth.
+  !> Number of growth steps with which disks at given positions reach the largest possible size; each step closes nine tenths of the
+  !> remaining gaps.
   integer, parameter :: approaches = 6
   integer, parameter :: run_length = 2                  !! number of collisions per disk between two growth steps
   integer, parameter :: mixing_length = 10              !! number of collisions per disk after the growth
-  !> Number of growth steps in which the difference to the full size must decrease by a tenth.
+  !> Number of growth steps in which the difference between the sizes and the full sizes must decrease by at least a tenth;
+  !> otherwise the growth has failed.
   integer, parameter :: jumps_per_check = 50
 
 contains
@@ -42,8 +46,8 @@ contains
     real(real64), intent(in) :: full(:)                 !! (n) radii to be reached, in the order of species [length]
     type(random_stream_t), intent(inout) :: stream
     class(status_line_t), intent(inout) :: line         !! status line that shows the progress
-    !> (2,n) positions in the order of species; in: initial positions, or shape (2,0) for random initial positions; out: final
-    !> positions [length]
+    !> (2,n) positions of the disks, species by species. In: initial positions, or an array of shape (2,0) for random initial
+    !> positions. Out: final positions. [length]
     real(real64), allocatable, intent(inout) :: x(:, :)
     type(error_t), allocatable, intent(out) :: error
     type(simulation_t) :: sim                           ! elastic disks
@@ -89,7 +93,7 @@ contains
 
   contains
 
-    !> Reports the packing fraction that was reached.
+    !> Reports that the growth has failed, with the packing fraction that was reached.
     subroutine fail_to_grow()
       real(real64) :: reached, wanted
       character(len=:), allocatable :: advice
@@ -102,7 +106,8 @@ contains
         //written(wanted)//"; "//advice)
     end subroutine fail_to_grow
 
-    !> Starts at given positions with random velocities. All disks have the largest common relative size that fits.
+    !> Starts the growth with disks at the given positions, with random velocities. All disks have the same relative size, the
+    !> largest at which no disks overlap.
     subroutine start_at_positions()
       real(real64) :: scale
       integer :: k
@@ -120,7 +125,7 @@ contains
       if (scale <= smallest_scale) call fail_to_grow()
     end subroutine start_at_positions
 
-    !> Starts with small disks at random positions, with random velocities.
+    !> Starts the growth with small disks at random positions, with random velocities.
     subroutine insert_small_disks()
       type(packing_t) :: packing
       real(real64) :: scale, wanted
@@ -130,7 +135,7 @@ contains
       wanted = 0
       do k = 1, size(species)
         associate (own => full(disks_before(species, k) + 1:disks_before(species, k + 1)))
-          ! Written such that the result is exactly the number of disks if all radii are equal.
+          ! With equal radii this sum is free of rounding errors.
           wanted = wanted + own(1)**2*sum((own/own(1))**2)
         end associate
       end do
@@ -152,7 +157,7 @@ contains
       end do
     end subroutine insert_small_disks
 
-    !> Inserts all disks at random positions, the largest first.
+    !> Inserts all disks at random positions, starting with the largest disks.
     subroutine fill(packing, radius, complete)
       type(packing_t), intent(out) :: packing
       real(real64), intent(in) :: radius(:)             !! (n) radius of each disk [length]
@@ -177,7 +182,7 @@ contains
       end do
     end subroutine fill
 
-    !> Advances all disks by some collisions per disk and brings their positions to the present time.
+    !> Advances the simulation by a given number of collisions per disk and brings the positions of all disks to the present time.
     subroutine move(length)
       integer, intent(in) :: length                     !! collisions per disk
       type(limits_t) :: limits
@@ -186,18 +191,19 @@ contains
       call evolution%start(sim)
       to_come = int(length, int64)*sim%n_disks()
       limits%collisions = sim%tally%collisions + (to_come + 1)/2
-      limits%events = sim%tally%events + 4*to_come            ! limit for the case that a disk is trapped in a gap between obstacles
-      limits%time = sim%time() + maxval(sim%box%edges())      ! limit for the case that the disks never collide
+      limits%events = sim%tally%events + 4*to_come            ! ends the run if a disk is trapped between obstacles
+      limits%time = sim%time() + maxval(sim%box%edges())      ! ends the run if the disks never collide
       call advance(evolution, sim, limits, error)
       do i = 1, sim%n_disks()
         sim%disk(i)%x = sim%position(i)
         sim%disk(i)%clock = sim%now
-        sim%tag(i)%last_partner = 0                     ! the growth may have closed the gap to the last partner
+        sim%tag(i)%last_partner = 0  ! allows a new collision with the last partner, because growth may close the gap to it
       end do
     end subroutine move
 
-    !> Grows each disk into the gap around it, up to the relative size `cap`. Two neighbours divide the gap between them in
-    !> proportion to their full sizes, unless one of the two is already larger than its share.
+    !> Grows each disk into the gap between the disk and its neighbours, up to the relative size `cap`. Two neighbours share the
+    !> distance between their centres in proportion to their full radii, unless one of the two disks is already larger than its
+    !> share.
     subroutine grow(cap)
       real(real64), intent(in) :: cap                   !! largest allowed size, relative to the full size
       type(packing_t) :: packing
@@ -240,8 +246,8 @@ contains
     end subroutine grow
   end subroutine grow_disks
 
-  !> Distance from a point to the nearest side or obstacle. The function may ignore obstacles that are farther away than the largest
-  !> radius.
+  !> Distance from a point to the nearest side or obstacle. Obstacles that are farther away than the largest radius of a disk may be
+  !> ignored.
   pure function wall_distance(packing, x) result(distance)
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: x(2)                    !! [length]

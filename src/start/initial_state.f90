@@ -1,4 +1,4 @@
-!> The initial state: creates the simulation of an input with all disks at their initial positions and velocities.
+!> Creates the simulation that an input describes, with all disks at their initial positions and with their initial velocities.
 module initial_state
   use kinds, only: int32, real64
   use drive, only: active
@@ -16,13 +16,13 @@ module initial_state
   private
   public :: check_speeds, create_simulation, describe_system
 
-  !> Largest number that may be squared later; the largest real is about 1e308.
+  !> Largest magnitude of a number that the program may square; double precision can represent numbers up to about 1e308.
   real(real64), parameter :: most = 1.0e130_real64
-  real(real64), parameter :: widest = 1.0e30_real64*(1 + 1.0e-12_real64)   !! largest ratio of masses
+  real(real64), parameter :: widest = 1.0e30_real64*(1 + 1.0e-12_real64)   !! largest ratio of two masses
 
 contains
 
-  !> Builds the simulation that the input describes. The procedure deallocates the tables of disks that were read from files.
+  !> Creates the simulation that the input describes. The procedure deallocates the tables of disks that were read from files.
   subroutine create_simulation(input, line, sim, error)
     type(run_input_t), intent(inout) :: input
     class(status_line_t), intent(inout) :: line             !! status line that shows the progress of the placement
@@ -45,7 +45,7 @@ contains
   end subroutine create_simulation
 
   !> Reports an error if a product of lengths, speeds and masses in the prediction or execution of collisions could overflow or
-  !> underflow. The simulation would then miss collisions.
+  !> underflow, because the simulation would then miss collisions.
   subroutine check_speeds(sim, problems)
     type(simulation_t), intent(in) :: sim
     type(problem_list_t), intent(inout) :: problems
@@ -74,7 +74,7 @@ contains
     end if
   end subroutine check_speeds
 
-  !> Sets everything except the disks.
+  !> Sets the box, the contact law, the species and all other components of a simulation except the disks.
   subroutine describe_system(settings, sim)
     type(settings_t), intent(in) :: settings
     type(simulation_t), intent(inout) :: sim

@@ -1,5 +1,5 @@
-!> Checks whether the system of an input fits together: obstacles and regions inside the box, and disks inside their regions.
-!> Problems are reported with the line of the input.
+!> Checks the geometry of the system that an input describes: obstacles and regions must lie inside the box, and the disks must fit
+!> into their regions. Each problem is reported with the number of a line of the input file.
 module input_fit
   use kinds, only: int32, int64, pi, real64
   use box_geometry, only: box_t
@@ -24,18 +24,19 @@ module input_fit
   public :: check_fit, report_file_problem, complete_settings
 
   real(real64), parameter, public :: rounding = 1.0e-12_real64        !! relative tolerance for disks that touch
-  real(real64), parameter :: random_limit = 0.547_real64      !! saturation of random sequential addition
-  real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! triangular lattice
+  real(real64), parameter :: random_limit = 0.547_real64      !! packing fraction at which random sequential insertion saturates
+  real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! packing fraction of the triangular lattice
 
 contains
 
-  !> Completes the settings with values from starting files and with drawn radii, and selects the features of the run.
+  !> Completes the settings with values from starting files and with the drawn radii, and determines the features of the run.
   subroutine complete_settings(settings, groups, problems, complete)
     type(settings_t), intent(inout) :: settings
     type(group_t), intent(inout) :: groups(:)
-    !> Problems of the input; problems of unreadable files and a lack of memory are added.
+    !> Problems of the input. The procedure adds a problem for each starting file that cannot be read, and a problem if the memory
+    !> is too small.
     type(problem_list_t), intent(inout) :: problems
-    logical, intent(out) :: complete                          !! .false. if there are too many disks, or if the box is invalid
+    logical, intent(out) :: complete                          !! .false. if the number of disks is too large or the box is invalid
     integer :: s(2), k, before
 
     complete = .false.
@@ -55,8 +56,8 @@ contains
     complete = .true.
   end subroutine complete_settings
 
-  !> Checks completed settings: obstacles in the box, and all species whose number and size are known. Problems of other
-  !> species have been reported before.
+  !> Checks completed settings: whether the obstacles fit into the box, and whether the disks of each species fit into their region.
+  !> Species without a valid number and size of disks are skipped, because these problems have already been reported.
   subroutine check_fit(settings, groups, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
@@ -68,8 +69,8 @@ contains
     o = range_of(groups, obstacle_groups)
     s = range_of(groups, ["species"])
     associate (box => settings%box, species => settings%species)
-      beyond = box%side_excursion()                           ! distance beyond the box that moving sides reach
-      do k = 1, box%n_obstacles()                             ! each shape checks its own position
+      beyond = box%side_excursion()                           ! distance by which moving sides extend beyond the box
+      do k = 1, box%n_obstacles()                             ! the module of each shape checks the positions
         misfit = box%obstacle(k)%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
         if (misfit /= "") call report_obstacle_problem(box, k, groups(o(1) + box%obstacle(k)%surface - n_sides - 1), misfit, &
           problems)
@@ -82,7 +83,8 @@ contains
     end associate
   end subroutine check_fit
 
-  !> Reports an invalid position of an obstacle, with the line of its file or the point of its polyline.
+  !> Reports an invalid position of an obstacle, with the line of the obstacle in its file or the number of the point in its
+  !> polyline.
   subroutine report_obstacle_problem(box, m, group, misfit, problems)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: m                           !! index of the obstacle
@@ -92,7 +94,7 @@ contains
     integer :: colon, number
 
     colon = index(misfit, ": ")
-    number = count(box%obstacle(:m)%surface == box%obstacle(m)%surface)          ! index in its group
+    number = count(box%obstacle(:m)%surface == box%obstacle(m)%surface)          ! index of the obstacle in its group
     if (has_many(group) .and. .not. any(group%values%name == "points" .and. group%values%given)) then
       call group%complain("file", origin_of_row(group%text_of("file"), number)//": "//misfit, problems)
     else if (has_many(group)) then
@@ -103,8 +105,8 @@ contains
     end if
   end subroutine report_obstacle_problem
 
-  !> Reports sides that would crush the disks: the area of the disks would exceed the area of the box at the end of the motion. A
-  !> box with a piston is not checked, because the disks may push the piston outwards.
+  !> Reports sides that would crush the disks, because the box would be smaller at the end of the motion than the total area of the
+  !> disks. A box with a piston is not checked, because the disks can push the piston outwards.
   subroutine check_strokes(box, disks, groups, problems)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: disks                         !! total area of the disks [length**2]
@@ -133,9 +135,9 @@ contains
     end do
   end subroutine check_strokes
 
-  !> Reads from a starting file the number of disks of a species, their sizes, and whether the disks rotate, unless the input
-  !> contains these values. If neither the number nor the sizes are needed from the file, an unreadable file is reported only when
-  !> the disks are placed, because a resumed run does not need the file.
+  !> Reads from a starting file the number and the radii of the disks of a species, unless the input contains these values, and
+  !> determines whether the disks rotate. If neither the number nor the radii are needed, an unreadable file is not reported here
+  !> but when the disks are placed, because a resumed run does not need the file.
   subroutine read_missing_values(species, k, box, group, problems)
     type(species_settings_t), intent(inout) :: species(:)
     integer, intent(in) :: k                                  !! index of the species
@@ -169,7 +171,7 @@ contains
     end associate
   end subroutine read_missing_values
 
-  !> Determines the largest of the radii that will be drawn, and the packing fraction.
+  !> Determines the largest of the radii that the run will draw, and the packing fraction of these radii.
   subroutine measure_radii(s, k, seed, group)
     type(species_settings_t), intent(inout) :: s
     integer, intent(in) :: k                                  !! index of the species
@@ -184,7 +186,7 @@ contains
       call group%put_reals("packing_fraction", [pi*sum(radius**2)/product(s%region([2, 4]) - s%region([1, 3]))])
   end subroutine measure_radii
 
-  !> Reports why the disks of a file cannot be used.
+  !> Reports why the disks in a starting file cannot be used.
   subroutine report_file_problem(s, group, problems)
     type(species_settings_t), intent(in) :: s
     type(group_t), intent(in) :: group
@@ -194,7 +196,8 @@ contains
     if (s%in_file%error%code == exit_files) problems%unreadable = problems%unreadable + 1
   end subroutine report_file_problem
 
-  !> Checks that a disk of a species fits into its region, into a period, and into every enclosing obstacle.
+  !> Checks that a disk of a species fits into its region, into each period of the box, and into every obstacle that encloses the
+  !> disks.
   subroutine check_species(group, s, box, alone, problems)
     type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
@@ -220,7 +223,7 @@ contains
   contains
 
     !> Checks one axis. The region must lie in the box and be wide enough for a disk. A period must exceed two diameters, so that no
-    !> disk touches two images of another one at the same time.
+    !> disk can touch two images of another disk at the same time.
     subroutine check_axis()
       logical :: endless(2)
       real(real64) :: lower, upper, room, farthest, least, low(2), high(2)
@@ -230,7 +233,7 @@ contains
       endless = spans(s%region, box)
       lower = s%region(2*axis - 1)
       upper = s%region(2*axis)
-      room = min(upper, high(axis)) - max(lower, low(axis))   ! excludes the part of the region that displaced sides cover
+      room = min(upper, high(axis)) - max(lower, low(axis))   ! without the part of the region beyond displaced sides
       farthest = max(abs(box%lower(axis)), abs(box%upper(axis)))
       least = merge(2*s%radius, 4*s%radius + rounding*farthest, alone)
       if (lower >= upper) then
@@ -249,14 +252,14 @@ contains
       end if
     end subroutine check_axis
 
-    !> Reports the problem together with the name of the axis.
+    !> Reports a problem together with the name of the axis.
     subroutine complain(variable, what)
       character(len=*), intent(in) :: variable, what
 
       call group%complain(variable, what//", along "//merge("x", "y", axis == 1), problems)
     end subroutine complain
 
-    !> Checks that the packing fraction does not exceed that of the densest possible packing.
+    !> Checks that the packing fraction does not exceed the packing fraction of the densest possible packing.
     subroutine check_fraction()
       real(real64) :: packing
       character(len=:), allocatable :: variable, filled

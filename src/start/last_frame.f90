@@ -1,4 +1,4 @@
-!> Reads disks from the last complete frame of a run, finished or not.
+!> Reads disks from the last complete frame in the output of a finished or unfinished run.
 submodule(starting_disks) last_frame
   use h5md_layout, only: box_group, disk_species, frame_counter, species_names
   use hdf5_objects, only: hdf5_file_t
@@ -62,8 +62,8 @@ contains
 
   contains
 
-    !> Reads a range of rows of the table for all disks. Quantities that frames do not contain are read from datasets of constant
-    !> values.
+    !> Reads a range of rows of the table for all disks. Constant quantities, such as radii and masses, are read from datasets
+    !> outside the frames.
     subroutine read_rows(first, last)
       integer, intent(in) :: first, last
       type(series_t) :: series

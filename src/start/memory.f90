@@ -1,6 +1,6 @@
 !> Checks whether a run fits into the memory that is available on the machine or granted by a batch system. A run that needs more
-!> memory is refused before it starts. If only the domains need more memory, the run uses the serial engine. The check works on
-!> Linux. On other systems the available memory is not known, and no run is refused.
+!> memory is refused before it starts. If the memory is sufficient for a run without domains but not for a run with domains, the run
+!> uses the serial engine. The available memory is known only on Linux. On other systems no run is refused.
 module memory
   use kinds, only: int64, never, pi, real64
   use input_problems, only: problem_list_t
@@ -13,27 +13,28 @@ module memory
   private
   public :: check_memory, free_memory, memory_needed, peak, room_for_domains
 
-  !> Memory in bytes per disk, per obstacle and per process: contributions to the peak of the resident memory, as measured by
-  !> `runs/memory.sh`, accurate to 5 %. For time-stepped dynamics the values are upper bounds, because the length of the Verlet
-  !> lists depends on the time step.
+  !> Memory in bytes per disk, per obstacle and per process. The values are contributions to the peak of the resident memory;
+  !> `runs/memory.sh` measures them with an accuracy of 5 %. For time-stepped dynamics the values are upper bounds, because the
+  !> length of the Verlet lists depends on the time step.
   integer(int64), parameter :: per_process = 10000000, per_obstacle = 580
-  real(real64), parameter :: record = 110, cell = 32         !! state and event of a disk; a cell of the search
-  real(real64), parameter :: extra = 40, own_size = 8        !! image indices, contact time and rotation of a disk; individual mass
-  real(real64), parameter :: sampled = 8.8_real64            !! one number in a frame
+  real(real64), parameter :: record = 110, cell = 32         !! `record`: state and event of a disk; `cell`: one cell of the search
+  real(real64), parameter :: extra = 40, own_size = 8  !! image indices, contact time and rotation; individual mass
+  real(real64), parameter :: sampled = 8.8_real64            !! one value of a disk in a frame
   real(real64), parameter :: listed = 264                    !! neighbour list
-  !> Random numbers for the driving; Verlet lists of time-stepped dynamics.
+  !> The first constant is for the random numbers of the driving, the second constant for the Verlet lists of time-stepped dynamics.
   real(real64), parameter :: kicked = 16, stepped = 100
-  !> Additional memory with domains. The first value is for a box with walls, the second value for a periodic box.
+  !> Additional memory per disk if the box is divided into domains. The first value is for a box with walls, the second value for a
+  !> periodic box.
   real(real64), parameter :: divided(2) = [143, 205]
-  real(real64), parameter :: listed_twice = 80               !! additional memory with domains and neighbour lists
-  ! Total memory during the placement of disks: at given positions, at random positions, at positions from a file, and by
-  ! compression.
+  real(real64), parameter :: listed_twice = 80               !! additional memory with both domains and neighbour lists
+  ! Total memory per disk during the placement of disks, for four methods in this order: given positions, random positions,
+  ! positions from a file, compression.
   real(real64), parameter :: placed = 150, inserted = 166, read_in = 226, grown = 310
-  real(real64), parameter :: cells_per_disk = 1.67_real64    !! upper bound: see `cell_layout`
+  real(real64), parameter :: cells_per_disk = 1.67_real64    !! upper bound, from `cell_layout`
 
 contains
 
-  !> Refuses more disks than fit into the memory.
+  !> Reports a problem if the run needs more memory than is free.
   subroutine check_memory(settings, problems)
     type(settings_t), intent(in) :: settings
     type(problem_list_t), intent(inout) :: problems
@@ -48,8 +49,8 @@ contains
       //size_text(needed)//" of memory, and "//size_text(free)//" are free; use fewer disks")
   end subroutine check_memory
 
-  !> Whether the memory is sufficient to divide the box into domains. The test includes a reserve, because the operating system
-  !> kills a run that exceeds the memory without a warning.
+  !> Whether the memory is sufficient to divide the box into domains. The test includes a safety margin, because the operating
+  !> system kills a run without a warning when the memory is exhausted.
   function room_for_domains(settings) result(yes)
     type(settings_t), intent(in) :: settings
     logical :: yes
@@ -71,7 +72,7 @@ contains
   !> Peak memory of a run, with or without domains. [bytes]
   pure function peak(settings, domains) result(bytes)
     type(settings_t), intent(in) :: settings
-    logical, intent(in) :: domains                        !! the box is divided
+    logical, intent(in) :: domains                        !! .true. if the box is divided into domains
     integer(int64) :: bytes
     real(real64) :: running, starting, more               ! bytes per disk
     logical :: lists
@@ -91,7 +92,7 @@ contains
     bytes = int(settings%n_disks()*max(running, starting), int64) + per_process + settings%box%n_obstacles()*per_obstacle
   end function peak
 
-  !> Memory in bytes per disk during the placement, without optional data of disks.
+  !> Memory in bytes per disk during the placement of disks. The result does not include optional data such as individual masses.
   pure function starting_bytes(settings) result(bytes)
     type(settings_t), intent(in) :: settings
     real(real64) :: bytes
@@ -106,7 +107,7 @@ contains
         bytes = max(bytes, read_in)
       case ("dense", "grown")
         bytes = max(bytes, grown + merge(extra, 0.0_real64, any(settings%box%periodic)))
-      case default                                    ! positions that follow a rule need no additional memory
+      case default                                    ! grids and lattices need no additional memory
       end select
     end do
   end function starting_bytes
@@ -153,8 +154,8 @@ contains
     yes = candidates > candidates_that_pay - 27*packing
   end function are_listed
 
-  !> The packing fraction that would result if all disks had the radius that determines the width of the cells. This radius is the
-  !> largest radius, except that a few big disks may be excluded.
+  !> Packing fraction that the system would have if all disks had the radius that determines the width of the cells. This radius is
+  !> the largest radius of all species that contain at least a twentieth of the disks.
   pure function crowding(settings) result(fraction)
     type(settings_t), intent(in) :: settings
     real(real64) :: fraction, radius
@@ -168,10 +169,11 @@ contains
     fraction = settings%n_disks()*pi*radius**2/product(settings%box%edges())
   end function crowding
 
-  !> The available memory: the smaller of the free memory of the machine and the limit of the control group. A batch job that
-  !> exceeds the limit of its control group is killed without a message. The result is huge if neither is known. [bytes]
+  !> The available memory: the smaller of the free memory of the computer and the memory limit of the control group of the process.
+  !> The operating system kills a batch job that exceeds the limit of its control group without a message. The result is huge if
+  !> neither the free memory nor the limit is known. [bytes]
   function free_memory(root) result(bytes)
-    character(len=*), intent(in) :: root                  !! root of the file system; empty except in tests
+    character(len=*), intent(in) :: root                  !! root folder of the file system; empty except in tests
     integer(int64) :: bytes
     character(len=:), allocatable :: groups, line         ! a line `number:controllers:group`; version 2 omits the controllers
     character(len=:), allocatable :: folder, unread
@@ -190,14 +192,14 @@ contains
       top = len(folder)
       if (index(line(:colon), "memory") + index(line, "::") == 0) cycle
       folder = folder//line(colon + 1:)
-      do while (len(folder) >= top)                       ! the control group, and then the groups that contain it
+      do while (len(folder) >= top)                       ! the control group, and all control groups that contain it
         bytes = min(bytes, number_after("", folder//"/memory.max"), number_after("", folder//"/memory.limit_in_bytes"))
         folder = folder(:index(folder, "/", back=.true.) - 1)
       end do
     end do
   end function free_memory
 
-  !> The number that follows a label at the beginning of a line of a file; huge if no line begins with the label.
+  !> The number that follows a label at the beginning of a line of a file. The result is huge if no line begins with the label.
   function number_after(label, path) result(number)
     character(len=*), intent(in) :: label, path
     integer(int64) :: number

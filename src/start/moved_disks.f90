@@ -1,4 +1,5 @@
-!> Checks the positions of disks that were moved in a running simulation, as those of a start are checked.
+!> Checks the positions of disks that a user has moved in a running simulation. The rules are the same as for the initial positions
+!> of a run.
 module moved_disks
   use box_sides, only: bounds
   use errors, only: error_t, exit_usage, fail
@@ -55,7 +56,7 @@ contains
     end do
   contains
 
-    !> Reports a problem of the disk with this id.
+    !> Reports a problem of the disk with the id k.
     subroutine complain(k, what)
       integer(int32), intent(in) :: k
       character(len=*), intent(in) :: what

@@ -1,5 +1,5 @@
-!> A set of placed disks, with a test whether another disk fits. Each species has its own grid of cells. The disks of a species have
-!> similar radii. The cost of a search therefore does not depend on the radii of other species.
+!> A packing: a set of placed disks, with a test whether another disk fits between them. Each species has its own grid of cells. The
+!> disks of one species have similar radii. The cost of a search therefore does not depend on the radii of other species.
 module packing
   use images, only: images_t
   use kinds, only: int32, real64
@@ -14,7 +14,7 @@ module packing
   !> The grid of cells of one species.
   type :: layer_t
     real(real64) :: radius = 0.0_real64             !! largest radius of the disks of the species [length]
-    integer(int32) :: count = 0                     !! number of disks to be placed
+    integer(int32) :: count = 0                     !! number of disks of the species to be placed
     real(real64) :: lower(2) = 0.0_real64           !! corners of a rectangle that contains all centres [length]
     real(real64) :: upper(2) = 0.0_real64
     real(real64) :: density(2) = 0.0_real64         !! number of cells per length along each axis [1/length]
@@ -23,8 +23,8 @@ module packing
     integer(int32), allocatable :: head(:, :)       !! first disk in each cell; 0 if the cell is empty
   end type layer_t
 
-  !> A placed disk. All its data are in one record, because disks that are close in space are far apart in memory, and the access to
-  !> one disk should read only one cache line.
+  !> A placed disk. All data of a disk are stored in one record, so that the access to a disk reads only one cache line. Disks that
+  !> are close in space are usually far apart in memory.
   type :: placed_t
     real(real64) :: x(2) = 0.0_real64               !! centre [length]
     real(real64) :: radius = 0.0_real64             !! [length]
@@ -37,7 +37,8 @@ module packing
     type(images_t), private :: images               !! images of the box
     type(placed_t), allocatable :: disk(:)          !! (n)
     type(layer_t), allocatable :: layer(:)          !! (number of species)
-    !> Lists of obstacles for each cell, valid up to the largest radius of the species for which `open_species` was called.
+    !> Lists of nearby obstacles for each cell. The lists are valid for disks up to the largest radius that was passed to
+    !> `open_species`.
     type(obstacle_cells_t) :: near
   contains
     procedure :: open_species
@@ -56,7 +57,7 @@ module packing
 
 contains
 
-  !> A packing without disks, with space for `n_disks`.
+  !> Creates a packing without disks, with space for `n_disks` disks.
   function empty_packing(box, n_disks, n_species) result(packing)
     type(box_t), intent(in) :: box
     integer, intent(in) :: n_disks, n_species
@@ -67,12 +68,13 @@ contains
     allocate (packing%disk(n_disks), packing%layer(n_species))
   end function empty_packing
 
-  !> Sets up the cells of a species. The side of a cell is the diameter, or larger where there are few disks.
+  !> Sets up the cells of a species. The edge of a cell is the largest diameter of the species, or longer if the species has few
+  !> disks.
   subroutine open_species(self, s, radius, count, lower, upper)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: s
     real(real64), intent(in) :: radius              !! largest radius of the disks of the species [length]
-    integer, intent(in) :: count                    !! number of disks to be placed
+    integer, intent(in) :: count                    !! number of disks of the species to be placed
     !> Corners of a rectangle that contains the centres of all disks of the species [length]
     real(real64), intent(in) :: lower(2), upper(2)
     real(real64) :: side, extent(2), few
@@ -113,13 +115,13 @@ contains
     self%layer(s)%head(c(1), c(2)) = k
   end subroutine add
 
-  !> Finds a disk or an obstacle that excludes disks of this radius from the whole rectangle `centre` +- `half`. `blocker` is the
-  !> index of the disk or the code of the obstacle (see `partners`), or 0 if there is none. With half = 0 the procedure tests
-  !> whether a disk fits at the point `centre`.
+  !> Finds a disk or an obstacle that excludes the centres of disks of the given radius from the whole rectangle `centre` +- `half`.
+  !> `blocker` is the index of the disk found or the code of the obstacle found (see `partners`); 0 if no such disk or obstacle
+  !> exists. With half = 0 the procedure tests whether a disk fits at the point `centre`.
   pure subroutine find_blocker(self, centre, half, radius, blocker)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: centre(2), half(2)  !! [length]
-    !> Radius, at most the largest radius of the species for which `open_species` was called [length]
+    !> Radius, at most the largest radius that was passed to `open_species` [length]
     real(real64), intent(in) :: radius
     integer(int32), intent(out) :: blocker
     real(real64) :: rho
@@ -146,7 +148,7 @@ contains
     end do
   end subroutine find_blocker
 
-  !> Prefetches the cells of a species around a point.
+  !> Prefetches the cells around a point in the grid of a species.
   subroutine load_cells(self, s, p)
     class(packing_t), intent(in) :: self
     integer(int32), intent(in) :: s
@@ -161,7 +163,7 @@ contains
     end associate
   end subroutine load_cells
 
-  !> Prefetches the disk that was last added to each cell around a point.
+  !> Prefetches, for each cell around a point, the disk that was added last to the cell.
   subroutine load_disks(self, s, p)
     class(packing_t), intent(in) :: self
     integer(int32), intent(in) :: s
@@ -178,8 +180,9 @@ contains
     end associate
   end subroutine load_disks
 
-  !> Finds a disk of species s that excludes disks of the given radius from every point of the rectangle p +- half. The result is 0
-  !> if there is no such disk. The cell in the middle is searched first, because such a disk is most likely in this cell.
+  !> Finds a disk of species s that excludes the centres of disks of the given radius from the whole rectangle p +- half. The result
+  !> is 0 if no such disk exists. The cell that contains the point p is searched first, because a disk in this cell is most likely
+  !> to exclude the rectangle.
   pure subroutine search_layer(packing, s, p, half, radius, blocker)
     type(packing_t), intent(in) :: packing
     integer, intent(in) :: s
@@ -195,7 +198,7 @@ contains
       middle = cell(layer, p)
       blocker = blocker_in(packing, layer%head(middle(1), middle(2)), p, half, radius)
       if (blocker > 0) return
-      if (rho <= layer%width) then                  ! usually the case; only the neighbouring cells can then contain such disks
+      if (rho <= layer%width) then                  ! usually true: the neighbouring cells are then sufficient
         low = max(middle - 1, 1)
         high = min(middle + 1, layer%n)
       else
@@ -211,7 +214,7 @@ contains
     end associate
   end subroutine search_layer
 
-  !> Like `search_layer`, for the disks in one cell.
+  !> Like `search_layer`, but searches only the disks in one cell.
   pure function blocker_in(packing, head, p, half, radius) result(blocker)
     type(packing_t), intent(in) :: packing
     integer(int32), intent(in) :: head
@@ -227,8 +230,8 @@ contains
     end do
   end function blocker_in
 
-  !> Lists all disks whose boundary is within the distance `reach` of a point. The list may contain further disks from the same
-  !> cells.
+  !> Lists all disks whose boundary is within the distance `reach` of a point. The list may also contain more distant disks in the
+  !> cells that were searched.
   subroutine list_neighbours(self, p, reach, list, n)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: p(2), reach         !! [length]
@@ -249,7 +252,7 @@ contains
 
   contains
 
-    !> Appends the disks of species s in the cells that are within the distance rho of a point.
+    !> Appends to the list all disks of species s in cells within the distance rho of a point.
     subroutine append_cells(p, rho)
       real(real64), intent(in) :: p(2), rho
       integer :: low(2), high(2), i, j
@@ -274,10 +277,11 @@ contains
     end subroutine append_cells
   end subroutine list_neighbours
 
-  !> Whether a single disk or obstacle excludes disks of this radius from the whole rectangle `centre` +- `half`.
+  !> Whether the given disk or obstacle excludes the centres of disks of the given radius from the whole rectangle `centre` +-
+  !> `half`.
   pure function covers(self, by, centre, half, radius) result(yes)
     class(packing_t), intent(in) :: self
-    integer(int32), intent(in) :: by                !! index of a disk (> 0), or code of an obstacle
+    integer(int32), intent(in) :: by                !! index of the disk (> 0), or code of the obstacle
     real(real64), intent(in) :: centre(2), half(2)  !! [length]
     real(real64), intent(in) :: radius              !! [length]
     real(real64) :: corner(2)
@@ -293,7 +297,7 @@ contains
     end if
   end function covers
 
-  !> The vector from a to the nearest periodic image of b.
+  !> Vector from the point a to the nearest periodic image of the point b.
   pure function separation(self, a, b) result(d)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: a(2), b(2)          !! [length]
@@ -314,7 +318,7 @@ contains
     c = 1 + int(min(column_row, layer%n - 1.0_real64))
   end function cell
 
-  !> Range of the indices of periodic images of a point for which disks of the box can be within the distance rho of the image.
+  !> Index range of those periodic images of a point that can be within the distance rho of a disk in the box.
   pure subroutine range_images(box, p, rho, first, last)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: p(2), rho

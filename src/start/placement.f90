@@ -1,8 +1,9 @@
-!> Placement of all disks.
+!> Determines the initial positions of all disks.
 !>
-!> Species with fixed positions ('explicit', 'file', 'grid', 'lattice') are placed first, in the order of the input. 'random'
-!> species are placed next, the largest disks first, and 'dense' and 'grown' species last. 'dense' and 'grown' species with the same
-!> region grow together, and the disks that have been placed before are obstacles for them.
+!> Species whose positions are fixed (placement 'explicit', 'file', 'grid' or 'lattice') are placed first, in the order of the
+!> input. Species with placement 'random' are placed next, the species with the largest disks first. Species with placement 'dense'
+!> or 'grown' are placed last. All 'dense' and 'grown' species with the same region are compressed together, and disks that were
+!> placed earlier are fixed obstacles during the compression.
 module placement
   use images, only: images_t
   use kinds, only: int32, int64, pi, real64
@@ -31,25 +32,25 @@ module placement
   private
   public :: place_disks
 
-  integer, parameter :: stream_number = 1                   !! identifies the random streams of this module
-  !> Limit of the number of attempts to place a 'random' species, times the number of its disks.
+  integer, parameter :: stream_number = 1                   !! number that identifies the random streams of this module
+  !> Upper limit of the number of attempts to place a 'random' species multiplied by the number of disks of the species.
   integer(int32), parameter :: many_trials = 500000
-  !> Additional number of disks that another attempt is assumed to place at most, beyond the factor `nearly`.
+  !> Number of disks that a new attempt can place in addition to `nearly` times the number in the previous attempt (an estimate).
   integer(int32), parameter :: few = 5
-  real(real64), parameter :: nearly = 1.25_real64  !! largest factor by which another attempt is assumed to place more disks
-  real(real64), parameter :: denser = 1.5_real64  !! smallest factor by which 'dense' packings are denser than 'random' packings
-  integer, parameter :: most_reports = 5                    !! largest number of reports of one kind for one species
+  real(real64), parameter :: nearly = 1.25_real64  !! estimated upper limit of the ratio of placed disks in two attempts
+  real(real64), parameter :: denser = 1.5_real64  !! ratio of packing fractions that 'dense' always reaches relative to 'random'
+  integer, parameter :: most_reports = 5                    !! largest number of problems of one kind reported for one species
 
 contains
 
-  !> Sets the positions and radii of all disks. Also sets the velocities of the disks if a file contains velocities.
+  !> Sets the positions and radii of all disks, and the velocities of disks that are read from a file with velocities.
   subroutine place_disks(species, groups, seed, line, sim, problems)
-    !> The species. The procedure deallocates the tables of disks that were read from files.
+    !> Settings of the species. The procedure deallocates their tables of disks that were read from files.
     type(species_settings_t), intent(inout) :: species(:)
     type(group_t), intent(in) :: groups(:)                  !! groups of the species
     integer(int64), intent(in) :: seed
-    class(status_line_t), intent(inout) :: line             !! shows the progress
-    !> in: simulation with its box, and with the disks in the order of the input.
+    class(status_line_t), intent(inout) :: line             !! status line that shows the progress of the placement
+    !> In: simulation with its box, and with the disks in the order of the input.
     type(simulation_t), intent(inout) :: sim
     type(problem_list_t), intent(inout) :: problems
     type(packing_t) :: packing
@@ -96,8 +97,9 @@ contains
 
   contains
 
-    !> Determines the positions of a species whose positions are given directly, by a rule, or by a file. Masses, orientations and,
-    !> if requested, velocities are copied from the file to the simulation.
+    !> Determines the positions of a species that is placed at explicit positions, on a grid or lattice, or at positions from a
+    !> file. For positions from a file, masses, orientations and, if requested, velocities are copied from the file to the
+    !> simulation.
     subroutine find_positions(s)
       integer, intent(in) :: s
       integer :: first, last, k
@@ -133,8 +135,8 @@ contains
       end associate
     end subroutine find_positions
 
-    !> Adds a species with known positions. Reports disks that overlap other disks, and disks that are not completely inside their
-    !> region.
+    !> Adds a species with known positions to the packing. The procedure reports disks that overlap other disks, and disks that are
+    !> not completely inside their region.
     subroutine add_species(packing, s, x, radius)
       type(packing_t), intent(inout) :: packing
       integer, intent(in) :: s
@@ -142,7 +144,7 @@ contains
       real(real64), intent(in) :: radius(:)                 !! (count) [length]
       real(real64) :: lower(2), upper(2), slack
       integer(int32) :: k, blocker
-      integer :: outside, overlapping                       ! numbers of disks with one of these problems
+      integer :: outside, overlapping                       ! numbers of disks outside the region, and of overlapping disks
       character(len=:), allocatable :: taken
 
       outside = 0
@@ -181,7 +183,7 @@ contains
     subroutine report(s, k, p, count, what)
       integer, intent(in) :: s, k
       real(real64), intent(in) :: p(2)                      !! [length]
-      integer, intent(inout) :: count                       !! number of such reports so far
+      integer, intent(inout) :: count                       !! number of problems of this kind reported so far
       character(len=*), intent(in) :: what
       character(len=:), allocatable :: variable, from
 
@@ -195,11 +197,11 @@ contains
       call groups(s)%complain(variable, from//"disk "//written(k)//" at "//written(p(1))//", "//written(p(2))//" "//what, problems)
     end subroutine report
 
-    !> Places a species by random sequential insertion.
+    !> Places the disks of a species by random sequential insertion.
     subroutine place_at_random(s)
       integer, intent(in) :: s
       real(real64) :: lower(2), upper(2)
-      real(real64), allocatable :: part(:)  ! fraction of the region that each disk covers, in the order of placement
+      real(real64), allocatable :: part(:)  ! area of each disk divided by the area of the region, in the order of placement
       character(len=:), allocatable :: advice
       integer(int32) :: placed, trial
 
@@ -207,12 +209,13 @@ contains
       associate (me => species(s))
         call stream%seed(seed, [s, stream_number])
         call centre_range(me%region, packing%box, me%radius, lower, upper)
-        ! The number of disks that fit differs between attempts, and the relative differences are larger if there are few disks.
+        ! The number of disks that fit varies between attempts. The relative variation is larger if the species has few disks, and
+        ! more attempts are therefore made.
         do trial = 1, merge(1, max(1, many_trials/me%count), me%polydispersity > 0)
           call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
           call insert_at_random(packing, int(s, int32), 1 + disks_before(species, s), radius, stream, line, placed)
           if (placed == me%count) return
-          if (placed == 0 .or. me%count > nearly*placed + few) exit  ! further attempts are useless if not a single disk fits
+          if (placed == 0 .or. me%count > nearly*placed + few) exit  ! a new attempt is unlikely to place all disks
         end do
         part = pi*radius(largest_first(radius))**2/product(me%region([2, 4]) - me%region([1, 3]))
         advice = "use fewer or smaller disks"
@@ -223,11 +226,11 @@ contains
       end associate
     end subroutine place_at_random
 
-    !> Places species that share a region by compression, in a box with the shape of the region. 'grown' species start at the
-    !> positions from a file.
+    !> Places all 'dense' and 'grown' species of one region by compression, in a box with the shape of the region. The compression
+    !> of 'grown' species starts at positions that are read from a file.
     subroutine place_densely(members)
       integer, intent(in) :: members(:)                     !! indices of the species
-      ! Copy of the packing to which the small disks at the start of the growth are added.
+      ! A copy of the packing, to which the small disks at the start of the compression are added.
       type(packing_t) :: small
       real(real64), allocatable :: places(:, :), full(:)    ! positions and full radii of the disks of all given species [length]
       type(error_t), allocatable :: error
@@ -264,8 +267,8 @@ contains
     end subroutine place_densely
   end subroutine place_disks
 
-  !> Creates a box that represents the region without the parts covered by displaced sides. Placed disks (and periodic images of
-  !> disks) that reach into this box become obstacles in this box.
+  !> Creates the box for a compression, which is the region without the parts beyond displaced sides. Disks that were placed
+  !> earlier, and their periodic images, become obstacles in this box if they extend into the box.
   function growth_box(packing, region) result(box)
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: region(4)
@@ -280,7 +283,7 @@ contains
     box%upper = min(region([2, 4]), box%upper)
     box%periodic = spans(region, packing%box)
     images = packing%box%images()
-    do pass = 1, 2                                          ! count in the first pass, fill in the second
+    do pass = 1, 2                                          ! the first pass counts the obstacles, the second pass creates them
       n = packing%box%n_obstacles()
       do k = 1, size(packing%disk)
         if (packing%disk(k)%species == 0) cycle
@@ -294,7 +297,7 @@ contains
         end do
       end do
       if (pass == 1) call box%add_obstacles(["obstacles", "disks    "], &
-        [packing%box%n_obstacles(), n - packing%box%n_obstacles()])                  ! the obstacles are elastic
+        [packing%box%n_obstacles(), n - packing%box%n_obstacles()])                  ! collisions with these obstacles are elastic
     end do
     do k = 1, packing%box%n_obstacles()
       allocate (box%obstacle(k)%shape, source=packing%box%obstacle(k)%shape)

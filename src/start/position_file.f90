@@ -12,8 +12,8 @@ module position_file
   private
   public :: angle_row, column_names, mass_row, radius_row, read_positions, spin_row
 
-  !> Names of the columns, in the order of the rows of a table. Radius and mass are the last rows, because the two are checked
-  !> together.
+  !> Names of the columns of a file; the rows of a table of disks have the same order. Radius and mass are the last two names, so
+  !> that a single loop can check both.
   character(len=*), parameter :: column_names(*) = [character(len=7) :: "x", "y", "vx", "vy", "omega", "angle", "radius", "mass"]
   integer, parameter :: spin_row = 5, angle_row = 6, radius_row = 7, mass_row = 8
   character(len=*), parameter :: known_names(*) = [character(len=7) :: column_names, "species"]
@@ -32,9 +32,9 @@ contains
     character(len=:), allocatable :: text, problem
     real(real64), allocatable :: table(:, :)                ! (column_names,n) values of the disks
     integer, allocatable :: lines(:)                        ! (n) line number of each disk
-    ! Index in `known_names` of each column of the file; empty before the first line has been read.
+    ! For each column of the file, index of its name in `known_names`; empty before the first line has been read.
     integer, allocatable :: column(:)
-    integer :: first(longest_line), last(longest_line)      ! position of each word in the line
+    integer :: first(longest_line), last(longest_line)      ! positions of the first and last character of each word in the line
     integer(int64) :: begin, past                           ! beginning and end of a line in the text
     integer :: number, n, n_words
 
@@ -50,7 +50,7 @@ contains
     do while (past <= len(text, int64))
       begin = past
       past = begin + index(text(begin:), eol, kind=int64)
-      if (past == begin) past = len(text, int64) + 2        ! the last line may have no line end
+      if (past == begin) past = len(text, int64) + 2        ! the last line may lack a line feed
       line = text(begin:past - 2)
       number = number + 1
       if (number == 1 .and. index(line, byte_order_mark) == 1) line = line(len(byte_order_mark) + 1:)
@@ -69,8 +69,9 @@ contains
 
   contains
 
-    !> Reads a line. The first line contains either the names of the columns or numbers; in the latter case the columns have their
-    !> default meaning. Any other line describes a disk, which is added to the table if it belongs to the species.
+    !> Reads a line of the file. The first line may contain the names of the columns; if the first line contains numbers, the
+    !> columns have the names x y or x y vx vy. Every line of numbers describes a disk, which is added to the table if it belongs to
+    !> the requested species.
     subroutine read_line()
       real(real64) :: value(size(column_names))
       integer :: k, its_species
@@ -114,7 +115,7 @@ contains
       table(:, n) = value
     end subroutine read_line
 
-    !> Whether the line holds names of columns: at least one word is a known name, or no word is a number.
+    !> Whether the line contains names of columns, which is assumed if at least one word is a known name or if no word is a number.
     function are_names() result(yes)
       logical :: yes, some_number
       character(len=:), allocatable :: what
@@ -160,7 +161,7 @@ contains
       end if
     end subroutine read_names
 
-    !> The species that a word denotes by its name or number; 0 if there is none.
+    !> Index of the species whose name or number is the given word; 0 if no species has this name or number.
     function species_named(word) result(s)
       character(len=*), intent(in) :: word
       integer :: s

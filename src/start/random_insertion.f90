@@ -1,10 +1,10 @@
 !> Random sequential insertion: each disk is inserted at a point that is uniformly distributed among all points where the disk fits
 !> between the previous disks. The region is divided into voxels (small rectangles). A voxel is eliminated if a single disk excludes
-!> the centre of a new disk from the whole voxel. Points are drawn only from the remaining voxels. Voxels are halved along both axes
-!> when attempts fail too often. An attempt in an eliminated voxel would always fail. The distribution is therefore that of simple
-!> insertion, up to saturation (Zhang and Torquato, Phys. Rev. E 88, 053312 (2013)). If radii differ, the largest disks are inserted
-!> first. In this case no voxels are eliminated, because a voxel without space for one disk may have space for a smaller disk. The
-!> insertion ends when many attempts to insert a disk have failed.
+!> the centre of a new disk from the whole voxel, and points are drawn only from the remaining voxels. All voxels are halved along
+!> both axes when attempts fail too often. Attempts in eliminated voxels would always fail; the method therefore generates the same
+!> distribution as simple insertion, but can reach saturation (Zhang and Torquato, 2013, doi:10.1103/PhysRevE.88.053312). If the
+!> disks have different radii, the largest disks are inserted first. No voxels are then eliminated, because a voxel without space
+!> for one disk may have space for a smaller disk, and the insertion ends when many attempts to insert a disk have failed.
 module random_insertion
   use kinds, only: int32, real64
   use memory_hints, only: prefetch
@@ -16,28 +16,29 @@ module random_insertion
   private
   public :: insert_at_random, largest_first
 
-  integer(int32), parameter :: disks_per_look = 1024    !! number of disks between two updates of the progress line
+  integer(int32), parameter :: disks_per_look = 1024    !! number of disks between two updates of the status line
   integer(int32), parameter :: drawn_ahead = 8          !! number of attempts whose random numbers are drawn in advance
-  integer(int32), parameter :: most_attempts = 300000   !! largest number of attempts for one disk, if radii differ
+  integer(int32), parameter :: most_attempts = 300000   !! largest number of attempts for one disk, if the radii differ
 
-  !> The voxels that may still contain possible positions of a centre.
+  !> The remaining voxels, in which the centre of another disk may fit.
   type :: voxels_t
     real(real64) :: origin(2) = 0.0_real64          !! [length]
     real(real64) :: side(2) = 0.0_real64            !! [length]
     integer(int32) :: n = 0                         !! number of remaining voxels
-    integer(int32), allocatable :: column_row(:, :) !! (2,n) column and row of each voxel, counted from 0
+    integer(int32), allocatable :: column_row(:, :) !! (2,n) column and row of each voxel, starting at 0
   end type voxels_t
 
-  !> The random numbers of an attempt, and the state of the random stream after these numbers.
+  !> The random numbers of an attempt, and the state of the random stream after these numbers have been drawn.
   type :: attempt_t
-    real(real64) :: voxel = 0.0_real64              !! selects the voxel: its index as a fraction of the number of voxels
+    real(real64) :: voxel = 0.0_real64              !! random number in [0, 1) that selects the voxel
     real(real64) :: place(2) = 0.0_real64           !! position in the voxel, as fractions of its edges
     type(random_stream_t) :: after
   end type attempt_t
 
 contains
 
-  !> Inserts the disks of a species, from index `first` on, until all are placed or no space is left.
+  !> Inserts the disks of a species until all disks are placed or no space is left. `first` is the index of the first disk of the
+  !> species.
   subroutine insert_at_random(packing, s, first, size_of, stream, line, placed)
     type(packing_t), intent(inout) :: packing
     integer(int32), intent(in) :: s                 !! index of a species for which `open_species` was called
@@ -49,7 +50,7 @@ contains
     type(voxels_t) :: voxels
     integer(int32) :: i, j, k, n(2), blocker, failures, count, order(size(size_of))
     integer(int32) :: attempts                      ! number of attempts made, modulo `drawn_ahead`
-    type(attempt_t) :: coming(0:drawn_ahead - 1)    ! the next attempts, drawn in advance so that their data can be prefetched
+    type(attempt_t) :: coming(0:drawn_ahead - 1)    ! the next attempts, drawn early so that their data can be prefetched
     type(random_stream_t) :: last                   ! state of the random stream after the last attempt that was made
     real(real64) :: p(2), radius, lower(2), upper(2)
     logical :: equal
@@ -99,11 +100,11 @@ contains
       if (failures == most_attempts .and. .not. equal) exit
       if (.not. equal) cycle
       if (packing%covers(blocker, middle(voxels, k), 0.5_real64*voxels%side, radius)) then
-        voxels%column_row(:, k) = voxels%column_row(:, voxels%n)       ! the last voxel replaces the removed voxel
+        voxels%column_row(:, k) = voxels%column_row(:, voxels%n)       ! the last voxel replaces the eliminated voxel
         voxels%n = voxels%n - 1
       end if
-      ! Dividing a voxel costs four searches. The division saves time when the number of failed attempts is twice the number of
-      ! voxels.
+      ! The division of a voxel requires four searches. The division therefore saves time only after the number of failed attempts
+      ! has exceeded about twice the number of voxels.
       if (failures > 2*voxels%n) then
         call halve(voxels, packing, radius)
         call line%show_share("placing disks", real(placed, real64)/count)
@@ -114,7 +115,7 @@ contains
 
   contains
 
-    !> The point at which an attempt places the centre.
+    !> The point at which an attempt places the centre of the new disk.
     pure function place(attempt) result(p)
       type(attempt_t), intent(in) :: attempt
       real(real64) :: p(2)
@@ -122,9 +123,9 @@ contains
       p = min(max(voxels%origin + (voxels%column_row(:, chosen(voxels, attempt)) + attempt%place)*voxels%side, lower), upper)
     end function place
 
-    !> Prefetches data for the next attempts: the voxel for the attempt that was drawn last, and cells and disks near the points of
-    !> the attempts that were drawn earlier. Prefetching saves time if the data of the disks do not fit into the cache, because
-    !> consecutive attempts read different parts of memory.
+    !> Prefetches data for future attempts: the voxel of the attempt that was drawn last, and the cells and disks near the points of
+    !> two attempts that were drawn earlier. Consecutive attempts read different parts of the memory, and prefetching saves time if
+    !> the data of the disks do not fit into the cache.
     subroutine load_ahead()
       associate (far => coming(modulo(attempts - 1, drawn_ahead)), near => coming(modulo(attempts + 3, drawn_ahead)), &
           next => coming(modulo(attempts + 1, drawn_ahead)))
@@ -146,7 +147,7 @@ contains
     attempt%after = stream
   end subroutine draw_attempt
 
-  !> The number of the voxel that an attempt chooses, by the same rule as in `draw_index`.
+  !> Index of the voxel that an attempt selects. The index is calculated from the random number as in `draw_index`.
   pure function chosen(voxels, attempt) result(k)
     type(voxels_t), intent(in) :: voxels
     type(attempt_t), intent(in) :: attempt
@@ -155,8 +156,8 @@ contains
     k = 1 + int(voxels%n*attempt%voxel, int32)
   end function chosen
 
-  !> Order of disks by decreasing radius, with a resolution of a thousandth of the range of radii. Disks that are equal within this
-  !> resolution keep their order.
+  !> Sorts disks by decreasing radius, with a resolution of a thousandth of the range of radii. Disks whose radii are equal within
+  !> this resolution keep their relative order.
   pure function largest_first(radius) result(order)
     real(real64), intent(in) :: radius(:)           !! [length]
     integer(int32), parameter :: classes = 1000
@@ -177,7 +178,7 @@ contains
     p = voxels%origin + (voxels%column_row(:, k) + 0.5_real64)*voxels%side
   end function middle
 
-  !> Divides each voxel into four and keeps the quarters that are not covered.
+  !> Divides each voxel into four voxels and keeps those that no single disk or obstacle excludes.
   pure subroutine halve(voxels, packing, radius)
     type(voxels_t), intent(inout) :: voxels
     type(packing_t), intent(in) :: packing
@@ -187,7 +188,7 @@ contains
 
     n = voxels%n
     if (maxval(voxels%column_row(:, :n)) >= ishft(huge(n), -1)) then
-      voxels%n = 0                                  ! integers can no longer distinguish such small voxels
+      voxels%n = 0                                  ! 32-bit integers cannot number more columns and rows
       return
     end if
     call move_alloc(voxels%column_row, parent)

@@ -14,7 +14,7 @@ module regular_positions
 
 contains
 
-  !> Whether the region spans the whole period along each axis. Disks may then extend beyond the region.
+  !> Whether the region extends over the whole period of the box, for each axis. Disks may then extend beyond the region.
   pure function spans(region, box) result(yes)
     real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box
@@ -23,8 +23,9 @@ contains
     yes = box%periodic .and. region([1, 3]) <= box%lower .and. region([2, 4]) >= box%upper
   end function spans
 
-  !> Corners of the rectangle of possible centres. A disk with its centre in this rectangle is completely inside the region and does
-  !> not overlap a side, even if the initial position of the side differs from its mean position.
+  !> Corners of the rectangle that the centre of a disk may occupy at the start. A disk whose centre is in this rectangle is
+  !> completely inside the region and does not overlap a side, even if the initial position of the side differs from its mean
+  !> position.
   pure subroutine centre_range(region, box, radius, lower, upper)
     real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box
@@ -35,10 +36,10 @@ contains
     call bounds(box, 0.0_real64, low, high)
     inset = merge(0.0_real64, radius, spans(region, box))
     lower = max(region([1, 3]), low) + inset
-    upper = max(min(region([2, 4]), high) - inset, lower)    ! tolerates rounding errors if a disk fills its region
+    upper = max(min(region([2, 4]), high) - inset, lower)    ! `max` allows for rounding errors if a disk fills its region
   end subroutine centre_range
 
-  !> Positions at the centres of nx x ny equal cells of the region, row by row from the bottom.
+  !> Positions on a rectangular grid: the centres of nx*ny equal cells of the region, row by row from the bottom.
   subroutine grid_positions(species, group, x, problems)
     type(species_settings_t), intent(in) :: species
     type(group_t), intent(in) :: group
@@ -58,9 +59,9 @@ contains
     end associate
   end subroutine grid_positions
 
-  !> Positions on a triangular lattice that fills the region and is stretched to its shape, row by row from the bottom. The number
-  !> of rows is chosen such that the distance between neighbours is largest. If there are more positions than disks, the last
-  !> positions are not used.
+  !> Positions on a triangular lattice, row by row from the bottom. The lattice is stretched along one axis so that it fills the
+  !> region. The number of rows is chosen such that the distance between neighbours is as large as possible. If the lattice has more
+  !> positions than the species has disks, the last positions remain empty.
   subroutine lattice_positions(species, group, box, x, problems)
     type(species_settings_t), intent(in) :: species
     type(group_t), intent(in) :: group
@@ -95,7 +96,7 @@ contains
 
   contains
 
-    !> Finds the lattice for n disks with the largest distance between neighbours.
+    !> Finds the lattice with at least n positions that has the largest distance between neighbours.
     subroutine choose_lattice(n)
       integer, intent(in) :: n
       real(real64) :: its_step(2), its_distance
@@ -106,7 +107,7 @@ contains
         ! Alternate rows are shifted; a periodic lattice must therefore have an even number of rows.
         if (periodic(2) .and. modulo(rows, 2) == 1 .and. rows > 1) cycle
         call measure_lattice(1 + (n - 1)/rows, rows, its_step, its_distance)
-        if (rows > 2 .and. 2*its_step(2) <= distance) exit                 ! more rows can only decrease the distance
+        if (rows > 2 .and. 2*its_step(2) <= distance) exit                 ! additional rows can only decrease the distance
         if (its_distance <= distance) cycle
         distance = its_distance
         columns = 1 + (n - 1)/rows
@@ -121,7 +122,7 @@ contains
       real(real64) :: gaps(2)
 
       gaps = [columns - 1, rows - 1]
-      if (rows > 1) gaps(1) = gaps(1) + 0.5_real64          ! every other row is shifted by half a spacing
+      if (rows > 1) gaps(1) = gaps(1) + 0.5_real64          ! alternate rows are shifted by half a spacing
       gaps = merge(real([columns, rows], real64), gaps, periodic)
       distance = huge(distance)
       step = upper - lower

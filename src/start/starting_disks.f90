@@ -1,5 +1,5 @@
-!> Reads the disks of a species from its starting file, for all formats of the file. Each number is checked, and the table is
-!> completed with values from the input.
+!> Reads the disks of a species from a starting file, in any of the possible formats. The procedures check each number, and complete
+!> the table of disks with values from the input.
 module starting_disks
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds, only: int64, real64
@@ -15,27 +15,28 @@ module starting_disks
   private
   public :: origin, read_disks, resolution
 
-  real(real64), parameter :: resolution = 1.0e-10_real64      !! smallest radius relative to the coordinates, in double precision
-  !> Datasets in the output file of a run that correspond to `position_file: column_names`. The datasets that precede the radius in
-  !> this list are in frames.
+  real(real64), parameter :: resolution = 1.0e-10_real64      !! smallest ratio of a radius to the largest coordinate
+  !> Datasets in the output file of a run, in the order of the quantities in `position_file: column_names`. The datasets before the
+  !> radius belong to the frames; radius and mass are constant.
   character(len=48), parameter :: datasets(*) = [character(len=48) :: position//value_of, position//value_of, &
     velocity//value_of, velocity//value_of, angular_velocity//value_of, orientation//value_of, disk_radius, disk_mass]
 
   interface
     !> Reads the disks of one species from the last frame of a run. The submodule `last_frame` implements this procedure. The
-    !> submodule `last_frame_without_hdf5` only reports that such files cannot be read. The linker selects one of the two.
+    !> submodule `last_frame_without_hdf5` only reports that such files cannot be read. The linker selects one of the two
+    !> submodules.
     module subroutine read_last_frame(path, name, disks, box)
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: name                    !! name of the species
       type(disks_in_file_t), intent(inout) :: disks
-      !> Box to which the positions are scaled; without this argument they are not scaled.
+      !> Box to which the positions are scaled; if this argument is absent, the positions are not scaled.
       type(box_t), intent(in), optional :: box
     end subroutine read_last_frame
   end interface
 
 contains
 
-  !> Whether a path is that of the output of a run, finished or not.
+  !> Whether a path has the name of a finished or unfinished output of a run.
   pure function is_run(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
@@ -43,7 +44,7 @@ contains
     yes = index(path//"|", ".h5|") > 0 .or. index(path//"|", ".h5.part|") > 0
   end function is_run
 
-  !> Reads the disks of species s. Radii and masses from the input take precedence.
+  !> Reads the disks of species s. Radii and masses in the input take precedence over radii and masses in the file.
   subroutine read_disks(species, s, box)
     type(species_settings_t), intent(inout) :: species(:)
     integer, intent(in) :: s
@@ -73,7 +74,7 @@ contains
     end associate
   end subroutine read_disks
 
-  !> Records why the disks cannot be used. Only the first reason is kept.
+  !> Records why the disks in a starting file cannot be used. Only the first reason is kept.
   subroutine refuse(me, why)
     type(species_settings_t), intent(inout) :: me
     character(len=*), intent(in) :: why
@@ -81,9 +82,9 @@ contains
     if (.not. allocated(me%in_file%error)) call fail(me%in_file%error, exit_usage, why)
   end subroutine refuse
 
-  !> Completes the table with values from the input. Reports each quantity that neither the file nor the input contains. Also
-  !> reports each quantity that both a text file and the input contain; values from the output file of a run may be overridden by
-  !> the input.
+  !> Completes the table of disks with values from the input. The procedure reports each quantity that is missing in both the file
+  !> and the input. It also reports each quantity that both a text file and the input contain. For the output file of a run this is
+  !> no error: the input overrides the file.
   subroutine join(me)
     type(species_settings_t), intent(inout) :: me
     logical :: wanted(radius_row:mass_row)
@@ -108,7 +109,7 @@ contains
 
   contains
 
-    !> Refuses a column of a text file if the input contains the same quantity.
+    !> Reports an error if both a column of a text file and the input contain the same quantity.
     subroutine refuse_both(row, variable)
       integer, intent(in) :: row
       character(len=*), intent(in) :: variable
@@ -118,7 +119,7 @@ contains
     end subroutine refuse_both
   end subroutine join
 
-  !> Reports numbers that would also be invalid in the input.
+  !> Reports numbers in the file that would be invalid in the input, too.
   subroutine check_numbers(me, farthest)
     type(species_settings_t), intent(inout) :: me
     real(real64), intent(in) :: farthest                      !! largest coordinate in the box [length]
@@ -144,7 +145,7 @@ contains
 
   contains
 
-    !> Reports that the number is invalid.
+    !> Reports that a number in the file is invalid.
     subroutine object(what)
       character(len=*), intent(in) :: what
 
@@ -152,7 +153,7 @@ contains
     end subroutine object
   end subroutine check_numbers
 
-  !> The place of a disk in its file, for messages: a line of a text file, or a row of a dataset.
+  !> Location of a disk in its file, for messages: a line of a text file, or a row of a dataset.
   pure function origin(me, k, column) result(text)
     type(species_settings_t), intent(in) :: me
     integer, intent(in) :: k                                  !! index of the disk in its species
