@@ -14,7 +14,7 @@ module boundary_collisions
   private
   public :: collide_wall
 
-  !> A disk at rest on a surface has its next contact with this surface after at least this many contact durations.
+  !> Shortest time between successive contacts of a resting disk with the same surface, in units of the contact duration.
   real(real64), parameter :: shortest_separation = 0.4_real64
 
 contains
@@ -24,7 +24,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
     real(real64), intent(in) :: t
-    logical, value :: counts                     !! the collision is included in the tally
+    logical, value :: counts                     !! whether the collision is included in the tally
     real(real64) :: normal(2), normal_velocity(2), u(2), v(2), omega
     type(wall_law_t) :: law
     logical :: elastic
@@ -45,11 +45,11 @@ contains
     else
       sim%disk(i)%v = wall_rebound(law, v - normal_velocity, normal, elastic)
       if (any(abs(normal_velocity) > 0)) then
-        ! Rounding is monotonic, so that the rounded velocity of the disk is not less than that of the side.
+        ! The rounded velocity of the disk is not less than the velocity of the side, because rounding is monotonic.
         sim%disk(i)%v = sim%disk(i)%v + normal_velocity
         if (law%restitution < 1 .and. .not. elastic) call end_bouncing(sim%disk(i)%v, v, normal_velocity, normal)
       end if
-      ! Time-stepped dynamics does not need this separation.
+      ! Only event-driven dynamics separates a resting disk from the surface.
       if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call separate_from_surface(sim, i, code, normal)
       if (law%tangential%is_rough()) call apply_tangential_impulse_at_wall(sim, i, law%tangential, normal, u, v)
     end if
@@ -59,11 +59,11 @@ contains
     if (counts) call add_wall_sums(sim, i, k, law%temperature > 0, u, v, omega)
   end subroutine collide_wall
 
-  !> Ends a series of bounces on a moving side when a collision dissipates less than the rounding error. The series would
-  !> otherwise be infinite. The disk then moves with the side.
+  !> Ends a series of bounces on a moving side when a collision dissipates less than the rounding error. The normal velocity of the
+  !> disk is then set to the velocity of the side. Otherwise the series of bounces would be infinite.
   pure subroutine end_bouncing(v, before, normal_velocity, normal)
     real(real64), intent(inout) :: v(2)          !! velocity of the disk after the collision [length/time]
-    !> Velocity of the disk before the collision, velocity of the side [length/time]
+    !> Velocity of the disk before the collision, and normal velocity of the side [length/time]
     real(real64), intent(in) :: before(2), normal_velocity(2)
     real(real64), intent(in) :: normal(2)        !! unit vector inwards
     real(real64) :: left
@@ -72,16 +72,17 @@ contains
     if (left >= -dot_product(before - normal_velocity, normal)) v = v - left*normal
   end subroutine end_bouncing
 
-  !> Applies the momentum transfer between a disk and a piston. On entry the disk has rebounded as from a piston of infinite mass.
-  !> The disk and the piston receive the fraction of this impulse that follows from their masses. On return u contains the mean of
-  !> the velocities of the piston before and after the collision, from which the work of the piston is calculated.
+  !> Applies the momentum transfer between a disk and a piston. On entry the disk has the velocity after a rebound from a piston of
+  !> infinite mass. The procedure reduces the impulse of the rebound to its value for the finite mass of the piston. On return u
+  !> contains the mean of the velocities of the piston before and after the collision, from which the work of the piston is
+  !> calculated.
   pure subroutine move_piston(sim, i, code, normal, before, u, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
     real(real64), intent(in) :: normal(2)        !! unit vector inwards
     real(real64), intent(in) :: before(2)        !! velocity of the disk before the collision [length/time]
     real(real64), intent(inout) :: u(2)          !! velocity of the surface [length/time]
-    real(real64), intent(in) :: t                !! time since the epoch [time]
+    real(real64), intent(in) :: t                !! time relative to the time origin `box%epoch` [time]
     real(real64) :: mass, v, given
     integer :: axis
 
@@ -91,17 +92,18 @@ contains
       v = sim%box%side_velocity(1 - code, t)
       given = dot_product(disk%v - before, normal)*mass/(mass + motion%mass)
       disk%v = disk%v - given*normal
-      ! The piston is placed at the disk, as computed in `side_time`; otherwise rounding would separate it from a disk at rest.
+      ! The piston is moved into contact with the disk, by the same formula as in `side_time`. Otherwise rounding errors would
+      ! separate the piston from a disk at rest.
       side%position = merge(disk%x(axis) - (sim%box%lower(axis) + disk%radius), &
         (sim%box%upper(axis) - disk%radius) - disk%x(axis), sense_of(code) < 0)
-      side%velocity = min(v - given, dot_product(disk%v, normal))       ! rounding must not make the piston faster than the disk
+      side%velocity = min(v - given, dot_product(disk%v, normal))  ! rounding errors must not make the piston faster than the disk
       side%clock = t
       u = u + (0.5_real64*(side%velocity - v))*normal
     end associate
   end subroutine move_piston
 
   !> Draws the velocity of disk i after a collision with a thermal wall, as if the disk came from a gas with the temperature of the
-  !> wall: the normal component has the density (m v/kT) exp(-m v**2/2kT); the tangential component and the angular velocity are
+  !> wall. The normal component has the density (m v/kT) exp(-m v**2/2kT). The tangential component and the angular velocity are
   !> Gaussian.
   pure subroutine draw_thermal_velocity(sim, i, temperature, normal, u)
     type(simulation_t), intent(inout) :: sim
@@ -120,10 +122,10 @@ contains
     if (sim%features%rotation) sim%extra(i)%spin = sqrt(temperature/sim%inertia_of(i))*normals(2)
   end subroutine draw_thermal_velocity
 
-  !> Separates disk i from a surface on which it rests. With restitution 0 the normal velocity of the disk vanishes in the first
-  !> collision, so that the elastic collisions of the TC model would not separate the disk from the surface, and infinitely many
-  !> collisions would follow at the same time. The normal velocity of the disk is therefore set such that its next contact is 0.4 to
-  !> 0.8 contact durations later.
+  !> Separates disk i from a surface on which the disk rests. With restitution 0 the normal velocity of the disk vanishes in the
+  !> first collision. The elastic collisions of the TC model would not separate such a disk from the surface, and infinitely many
+  !> collisions would occur at the same time. The normal velocity of the disk is therefore set such that the next contact with the
+  !> surface is 0.4 to 0.8 contact durations later.
   pure subroutine separate_from_surface(sim, i, code, normal)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -164,8 +166,8 @@ contains
   end subroutine apply_tangential_impulse_at_wall
 
   !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk is the sum of the work of the
-  !> moving surface and a remainder. The remainder is heat if the wall is thermal; at any other wall it is the negative of the
-  !> dissipated energy.
+  !> moving surface and a remainder. At a thermal wall the remainder of the energy change is heat. At any other wall the remainder
+  !> is the negative of the dissipated energy.
   pure subroutine add_wall_sums(sim, i, k, heats, u, v, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

@@ -1,5 +1,6 @@
-!> The container: four sides, which are walls or periodic along each axis, fixed obstacles, and gravity. Contact times are pure
-!> functions of the state of a disk. The contact times are relative to the epoch, like the clock of the disk.
+!> The box that contains the disks: four sides (walls or periodic boundaries), fixed obstacles, and gravity. The contact time of a
+!> disk with the box is a pure function of the state of the disk. Contact times, like the clocks of disks, are relative to the time
+!> origin `box%epoch`.
 module box_geometry
   use collisions, only: wall_law_t
   use disks, only: disk_t
@@ -14,17 +15,16 @@ module box_geometry
   public :: find_image_contact, free_area, next_obstacle, normal_surface_velocity, obstacle_gap, tangential_surface_velocity
   public :: wall_normal
 
-  !> A side of the box, or a group of obstacles. All obstacles of a group have the same contact law, and their collisions are added
-  !> to the same sums.
+  !> A side of the box, or a group of obstacles. All obstacles of a group share one contact law and one set of sums over collisions.
   type :: surface_t
     character(len=:), allocatable :: name
     type(wall_law_t) :: law
-    type(side_motion_t) :: motion               !! motion of a side, which is prescribed or that of a piston
+    type(side_motion_t) :: motion               !! prescribed motion of a side, or motion of a piston
   end type surface_t
 
   type :: obstacle_t
     class(shape_t), allocatable :: shape
-    integer(int32) :: surface = 0               !! index of the surface that represents its group
+    integer(int32) :: surface = 0               !! index of the surface that represents the group of the obstacle
   end type obstacle_t
 
   type :: box_t
@@ -33,12 +33,12 @@ module box_geometry
     logical :: periodic(2) = .false.            !! periodic boundary along each axis
     real(real64) :: gravity(2) = 0.0_real64     !! [length/time**2]
     real(real64) :: shear_rate = 0.0_real64     !! shear rate of a box with Lees-Edwards boundary conditions [1/time]
-    !> The sides in the order left, right, bottom, top, then the groups of obstacles. Only the elements of sides that are walls are
+    !> The sides in the order left, right, bottom, top, followed by the groups of obstacles. The elements of periodic sides are not
     !> used.
     type(surface_t), allocatable :: surface(:)
-    type(obstacle_t), allocatable :: obstacle(:)   !! obstacles of a group are adjacent; see `partners` for their codes
-    ! Variable state of the box. The input determines the initial state of the sides.
-    real(real64) :: epoch = 0.0_real64          !! origin of all clocks, since the start of the run [time]
+    type(obstacle_t), allocatable :: obstacle(:)   !! obstacles of a group have consecutive indices
+    ! State of the box that changes during a run. The input determines the initial state of the sides.
+    real(real64) :: epoch = 0.0_real64          !! time origin of all clocks, measured from the start of the run [time]
     type(side_state_t) :: side(n_sides)
   contains
     procedure :: edges
@@ -108,7 +108,7 @@ contains
     call move_alloc(obstacle, self%obstacle)
   end subroutine add_obstacles
 
-  !> Lengths of the edges.
+  !> Lengths of the edges of the box.
   pure function edges(self) result(lengths)
     class(box_t), intent(in) :: self
     real(real64) :: lengths(2)
@@ -116,7 +116,7 @@ contains
     lengths = self%upper - self%lower
   end function edges
 
-  !> Lengths of the periods; `never` along axes with walls.
+  !> Period of the box along each axis; `never` along an axis with walls.
   pure function periods(self) result(lengths)
     class(box_t), intent(in) :: self
     real(real64) :: lengths(2)
@@ -124,7 +124,8 @@ contains
     lengths = merge(self%upper - self%lower, never, self%periodic)
   end function periods
 
-  !> The periodic images of the box, for clocks relative to `epoch`. Without `epoch` the images are those at the start of the run.
+  !> The periodic images of the box, for times relative to the time origin `epoch`. Without the argument `epoch` the result contains
+  !> the images at the start of the run.
   pure function images_of(self, epoch) result(images)
     class(box_t), intent(in) :: self
     real(real64), intent(in), optional :: epoch    !! [time]
@@ -135,7 +136,7 @@ contains
       images = moving_images(self%periods(), self%shear_velocity(), epoch)
   end function images_of
 
-  !> Whether there is gravity, so that disks move on parabolas.
+  !> Whether gravity acts on the disks, which then move on parabolas.
   pure function has_gravity(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -143,7 +144,8 @@ contains
     yes = any(abs(self%gravity) > 0)
   end function has_gravity
 
-  !> Whether the box is sheared (Lees and Edwards, J. Phys. C 5, 1921 (1972)): the periodic image above the box moves along x.
+  !> Whether the box is sheared, with the boundary conditions of Lees and Edwards (Journal of Physics C 5, 1921 (1972)). The
+  !> periodic image above a sheared box moves along x.
   pure function is_sheared(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -159,7 +161,8 @@ contains
     v = self%shear_rate*(self%upper(2) - self%lower(2))
   end function shear_velocity
 
-  !> Velocity at the point x of the profile that the shear imposes. Properties relative to this profile are uniform in space.
+  !> Velocity of the linear shear profile at the point x. Averages of quantities relative to this profile are the same everywhere
+  !> in the box.
   pure function shear_profile(self, x) result(v)
     class(box_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
@@ -185,7 +188,7 @@ contains
     if (allocated(self%obstacle)) n = size(self%obstacle, kind=int32)
   end function n_obstacles
 
-  !> Index of the surface of a side or obstacle, from its code.
+  !> Index of the surface that corresponds to the code of a side or obstacle.
   elemental function surface_of(self, code) result(k)
     class(box_t), intent(in) :: self
     integer(int32), intent(in) :: code
@@ -257,7 +260,8 @@ contains
     yes = self%highest_temperature() > 0 .or. self%does_work()
   end function gives_energy
 
-  !> Largest outward displacement of each moving side from its mean position. Disks can follow a side into this range.
+  !> Largest outward displacement of each moving side from its mean position. Disks can follow a moving side up to this distance
+  !> beyond its mean position.
   pure function side_excursion(self) result(length)
     class(box_t), intent(in) :: self
     real(real64) :: length(2, 2)                !! (axis, lower or upper) [length]
@@ -265,11 +269,11 @@ contains
     length = transpose(reshape(self%surface(:n_sides)%motion%amplitude, [2, 2]))
   end function side_excursion
 
-  !> Displacement of side k from its mean position at a given time, positive inwards.
+  !> Inward displacement of side k from its mean position at a given time.
   pure function side_position(self, k, t) result(x)
     class(box_t), intent(in) :: self
     integer, intent(in) :: k
-    real(real64), intent(in) :: t               !! time since the epoch [time]
+    real(real64), intent(in) :: t               !! time relative to the time origin `box%epoch` [time]
     real(real64) :: x                           !! [length]
 
     associate (motion => self%surface(k)%motion, state => self%side(k))
@@ -277,11 +281,11 @@ contains
     end associate
   end function side_position
 
-  !> Velocity of side k at a given time, positive inwards.
+  !> Inward velocity of side k at a given time.
   pure function side_velocity(self, k, t) result(v)
     class(box_t), intent(in) :: self
     integer, intent(in) :: k
-    real(real64), intent(in) :: t               !! time since the epoch [time]
+    real(real64), intent(in) :: t               !! time relative to the time origin `box%epoch` [time]
     real(real64) :: v                           !! [length/time]
 
     associate (motion => self%surface(k)%motion, state => self%side(k))
@@ -289,13 +293,13 @@ contains
     end associate
   end function side_velocity
 
-  !> Finds the first contact of a disk with some obstacles, if this contact is earlier than a known event. A disk stays in the box
-  !> until it passes a periodic side. Images of an obstacle that are shifted by at most one period are therefore sufficient. An
-  !> obstacle that encloses the disks has no images.
+  !> Finds the first contact of a disk with any of the given obstacles, if this contact is earlier than an event that is already
+  !> known. A disk that passes a periodic side is shifted back into the box, and its contacts are predicted again. Only images of an
+  !> obstacle that are shifted by at most one period are therefore tested. An obstacle that encloses the disks has no images.
   pure subroutine next_obstacle(box, disk, last, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    !> Code of the obstacle with which the disk collided last, if the disk has had no later event.
+    !> The value of `last_partner` of the disk. After a collision with an obstacle, this value is the code of the obstacle.
     integer(int32), intent(in) :: last
     integer(int32), intent(in) :: list(:)       !! codes of the obstacles to be tested, in descending order
     real(real64), intent(inout) :: t
@@ -311,13 +315,14 @@ contains
     end do
   end subroutine next_obstacle
 
-  !> Finds the contact of a disk with one image of an obstacle, if this contact is earlier than a known event. Obstacles that disks
-  !> touch from outside are convex. A disk that leaves such an obstacle on a straight line cannot return. Contacts predicted because
-  !> of rounding errors are therefore skipped.
+  !> Finds the contact of a disk with one image of an obstacle, if this contact is earlier than an event that is already known.
+  !> Obstacles that disks touch from outside are convex. A disk that leaves a convex obstacle on a straight path cannot touch this
+  !> obstacle again. Without gravity, a contact with the obstacle of the last collision could only result from rounding errors and
+  !> is not predicted.
   pure subroutine find_image_contact(box, disk, last, obstacle, shift, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    !> Code of the obstacle with which the disk collided last, if the disk has had no later event.
+    !> The value of `last_partner` of the disk. After a collision with an obstacle, this value is the code of the obstacle.
     integer(int32), intent(in) :: last
     integer(int32), intent(in) :: obstacle      !! code of the obstacle
     real(real64), intent(in) :: shift(2)        !! shift from the obstacle to its image [length]
@@ -339,9 +344,9 @@ contains
     code = obstacle
   end subroutine find_image_contact
 
-  !> .true. if a falling point certainly stays outside of a rectangle around the origin during a given time; .false. if this is
-  !> uncertain. The test uses the bounding rectangle of the path, which is a coarse bound but costs much less than the roots of a
-  !> quartic.
+  !> Whether a falling point certainly stays outside of a rectangle around the origin during a given time. The result .false. means
+  !> that the point may enter the rectangle. The test uses the bounding rectangle of the path, which costs much less than the
+  !> solution of a quartic equation.
   pure function stays_outside(d, v, g, s, half) result(yes)
     real(real64), intent(in) :: d(2)            !! initial position [length]
     real(real64), intent(in) :: v(2)            !! [length/time]
@@ -353,7 +358,7 @@ contains
     integer :: axis
 
     yes = .false.
-    if (s > sqrt(never)) return                 ! the length of the path may overflow
+    if (s > sqrt(never)) return                 ! the path may be longer than the largest real number
     do axis = 1, 2
       low = s*min(v(axis), v(axis) + g(axis)*s, 0.0_real64)
       high = s*max(v(axis), v(axis) + g(axis)*s, 0.0_real64)
@@ -362,7 +367,7 @@ contains
     end do
   end function stays_outside
 
-  !> Distance between the m-th obstacle and the boundary of a disk at x; negative if the disk overlaps the obstacle.
+  !> Distance between the m-th obstacle and the boundary of a disk with its centre at x; negative if the disk overlaps the obstacle.
   pure function obstacle_gap(box, m, x, radius) result(length)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: m
@@ -396,7 +401,7 @@ contains
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
     real(real64), intent(in) :: normal(2)       !! unit vector from the surface to a disk
-    real(real64), intent(in) :: t               !! time since the epoch [time]
+    real(real64), intent(in) :: t               !! time relative to the time origin `box%epoch` [time]
     real(real64) :: u(2)                        !! [length/time]
 
     u = 0
@@ -404,7 +409,7 @@ contains
     if (box%surface(1 - code)%motion%kind /= still) u = box%side_velocity(1 - code, t)*normal
   end function normal_surface_velocity
 
-  !> Unit vector from a surface to a disk that touches it at x with the velocity v.
+  !> Unit normal vector of a surface, towards a disk at the position x that touches the surface with the velocity v.
   pure function wall_normal(box, code, x, v) result(normal)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
@@ -423,8 +428,8 @@ contains
     end if
   end function wall_normal
 
-  !> Accessible area: the area of the box (or the area inside the smallest obstacle that encloses disks, if this area is smaller),
-  !> minus the areas of all other obstacles.
+  !> Accessible area: the area of the box minus the areas of all obstacles that disks touch from outside. If an obstacle encloses
+  !> the disks and is smaller than the box, the area inside this obstacle replaces the area of the box.
   pure function free_area(box) result(area)
     type(box_t), intent(in) :: box
     real(real64) :: area                        !! [length**2]

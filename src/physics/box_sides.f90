@@ -1,5 +1,5 @@
-!> The sides of the box: their positions, and the times at which disks reach them. These times are pure functions of the state of a
-!> disk. The times are relative to the epoch, like the clock of the disk.
+!> Positions of the sides of the box, and the times at which disks reach the sides. The time at which a disk reaches a side is a
+!> pure function of the state of the disk. All times, like the clocks of disks, are relative to the time origin `box%epoch`.
 module box_sides
   use box_geometry, only: box_t
   use disks, only: disk_t
@@ -11,7 +11,7 @@ module box_sides
   private
   public :: bounds, separate_from_sides, next_side, side_time
 
-  !> Rounding error of the gap to a moving side, relative to the coordinates.
+  !> Rounding error of the gap between a disk and a moving side, relative to the magnitude of the coordinates.
   real(real64), parameter :: rounding = 16*epsilon(1.0_real64)
 
 contains
@@ -19,8 +19,8 @@ contains
   !> Positions of the sides at a given time.
   pure subroutine bounds(box, t, lower, upper)
     type(box_t), intent(in) :: box
-    real(real64), intent(in) :: t               !! time since the epoch [time]
-    real(real64), intent(out) :: lower(2), upper(2)     !! positions of left and bottom sides, and of right and top sides [length]
+    real(real64), intent(in) :: t               !! time relative to the time origin `box%epoch` [time]
+    real(real64), intent(out) :: lower(2), upper(2)     !! (left, bottom) and (right, top) sides [length]
     real(real64) :: inwards(n_sides)
     integer :: k
 
@@ -32,10 +32,10 @@ contains
     upper = box%upper - inwards([2, 4])
   end subroutine bounds
 
-  !> Time when the boundary of a disk touches a wall, or its centre reaches a periodic side. A gap that is negative by rounding
-  !> counts as zero: if a disk at a wall still moves outwards, it is reflected immediately and cannot leave the box. At a moving
-  !> side, a gap smaller than the rounding error also counts as zero, because the series of ever faster bounces would otherwise be
-  !> infinite.
+  !> Time when the boundary of a disk touches a wall, or its centre reaches a periodic side. A gap that is negative because of
+  !> rounding is set to zero: a disk at a wall that still moves outwards is then reflected immediately and cannot leave the box. At
+  !> a moving side, a gap smaller than the rounding error is also set to zero. Otherwise a series of ever shorter bounces between
+  !> the disk and the side would be infinite.
   pure function side_time(box, disk, side) result(t)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -55,7 +55,7 @@ contains
       if (motion%moves()) then
         since = disk%clock
         v = -sense*disk%v(axis)
-        if (motion%kind == piston) then             ! the contact is not before the clock of the disk or of the piston
+        if (motion%kind == piston) then             ! the contact cannot precede the clock of the disk or of the piston
           since = max(since, state%clock)
           after = since - disk%clock
           gap = gap + flight(0.0_real64, v, -sense*box%gravity(axis), after)
@@ -71,7 +71,8 @@ contains
     end associate
   end function side_time
 
-  !> The first side that a disk reaches. If a disk reaches two sides at the same time, the first in the order of sides is chosen.
+  !> The first side that a disk reaches. If a disk reaches two sides at the same time, the first of these sides in the order left,
+  !> right, bottom, top is chosen.
   pure subroutine next_side(box, disk, t, side)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -91,13 +92,13 @@ contains
     end do
   end subroutine next_side
 
-  !> Moves a disk away from the sides that it would touch before `now`, after a change of the origin of its clock. The change also
-  !> rounds the position and velocity of a moving side, so that a disk almost in contact could collide in the past. The displacement
-  !> of the disk is of the order of the rounding error.
+  !> Moves a disk away from the moving sides that the disk would touch before the time `now`. A change of the time origin rounds the
+  !> position and velocity of a moving side. If a disk nearly touches the side, this rounding can shift the predicted contact to a
+  !> time before `now`. The displacement of the disk is of the order of the rounding error.
   pure subroutine separate_from_sides(box, disk, now)
     type(box_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk
-    real(real64), intent(in) :: now             !! time since the epoch [time]
+    real(real64), intent(in) :: now             !! time relative to the time origin `box%epoch` [time]
     real(real64) :: step
     integer(int32) :: side
 

@@ -1,4 +1,4 @@
-!> Contact laws: restitution by pair of species, laws of walls, and the TC model.
+!> Contact laws: the restitution of each pair of species, the contact laws of walls, and the TC model.
 module collisions
   use kinds, only: real64
   implicit none
@@ -6,18 +6,20 @@ module collisions
   public :: contact_law_t, normal_rule, pair_impulse, restitution_laws, series_terms, speed_law_t
   public :: tangential_impulse, tangential_law_t, wall_law_t, wall_rebound, wall_rules
 
-  !> Names of the wall rules in the input. A rule is represented by its position in this list.
+  !> Names of the wall rules in the input. The restitution of a wall multiplies the whole velocity ('velocity') or only the normal
+  !> component ('normal'). The program represents a rule by its position in this list.
   character(len=*), parameter :: wall_rules = "velocity normal"
-  integer, parameter :: normal_rule = 2              !! position of the rule 'normal', which applies to smooth walls
+  integer, parameter :: normal_rule = 2              !! position of the rule 'normal' in `wall_rules`
 
-  !> Names of the laws by which the restitution depends on the impact velocity, as in the input. For each law `series_terms`
-  !> contains the coefficient c of `speed_law_t`, which is 3/5 for viscoelastic spheres.
+  !> Names in the input for the laws by which the restitution depends on the impact velocity. For each law, `series_terms` contains
+  !> the coefficient c of `speed_law_t`, which is 3/5 for viscoelastic spheres.
   character(len=*), parameter :: restitution_laws = "constant power viscoelastic"
   real(real64), parameter :: series_terms(3) = [0.0_real64, 0.0_real64, 0.6_real64]
 
-  !> Restitution that increases towards 1 for small impact velocities (Ramirez, Poschel, Brilliantov and Schwager, Phys. Rev. E
-  !> 60, 4465 (1999)): for normal velocities g < g0 it is 1 - y + c y**2 with y = y0 (g/g0)**(1/5). The constant y0 is chosen such
-  !> that at g0 the restitution equals that of the input, which is used for all g >= g0.
+  !> Restitution that increases towards 1 for small impact velocities (Ramirez, Poschel, Brilliantov and Schwager, Physical Review E
+  !> 60, 4465 (1999)). For normal velocities g < g0 the restitution is 1 - y + c y**2 with y = y0 (g/g0)**(1/5). The constant y0 is
+  !> chosen such that the restitution at g0 equals the restitution given by the input. For g >= g0 the restitution given by the
+  !> input is used.
   type :: speed_law_t
     real(real64) :: speed = 0.0_real64               !! reference impact velocity g0; 0: constant restitution [length/time]
     real(real64) :: c = 0.0_real64                   !! coefficient c, see `series_terms`
@@ -26,8 +28,8 @@ module collisions
     procedure :: least
   end type speed_law_t
 
-  !> Tangential interaction of two rough surfaces (Walton 1993; Luding, Huthmann, McNamara and Zippelius,
-  !> Phys. Rev. E 57, 3416 (1998)).
+  !> Tangential interaction of two rough surfaces (Walton 1993; Luding, Huthmann, McNamara and Zippelius, Physical Review E 57, 3416
+  !> (1998)).
   type :: tangential_law_t
     real(real64) :: restitution = -1.0_real64        !! tangential restitution, from -1 (smooth) to 1
     real(real64) :: friction = huge(1.0_real64)      !! Coulomb friction coefficient; huge: no limit
@@ -49,11 +51,11 @@ module collisions
   type :: contact_law_t
     real(real64), allocatable :: restitution(:, :)   !! (species,species) coefficient of restitution, symmetric
     type(speed_law_t) :: by_speed = speed_law_t()    !! dependence on the impact velocity
-    !> Contact duration t_c of the TC model (Luding and McNamara, Granular Matter 1, 113 (1998)): a collision is elastic if one
-    !> of the partners had its previous collision less than this time ago. [time]
+    !> Contact duration t_c of the TC model (Luding and McNamara, Granular Matter 1, 113 (1998)): a collision is elastic if either
+    !> partner had its previous collision less than t_c earlier [time]
     real(real64) :: contact_time = 0.0_real64
     type(tangential_law_t) :: tangential = tangential_law_t()  !! tangential interaction of two disks
-    real(real64) :: inertia = 0.5_real64             !! moment of inertia over mass times radius squared
+    real(real64) :: inertia = 0.5_real64             !! moment of inertia divided by mass times radius squared
   contains
     procedure :: loses_energy
   end type contact_law_t
@@ -81,7 +83,8 @@ contains
     xi = 1 - y + self%c*y**2
   end function restitution_at
 
-  !> Smallest coefficient of restitution at g0 for which the law is monotonic. With this value the series has its minimum at g0.
+  !> Smallest coefficient of restitution at g0 for which the restitution is a monotonic function of the impact velocity. For this
+  !> smallest value the series 1 - y + c y**2 has its minimum at g0.
   elemental function least(self) result(xi)
     class(speed_law_t), intent(in) :: self
     real(real64) :: xi
@@ -90,8 +93,9 @@ contains
     if (self%c > 0) xi = 1 - 1/(4*self%c)
   end function least
 
-  !> Impulse on disk i divided by the separation vector dx = x_j - x_i: v_i changes by q dx/m_i, v_j by
-  !> -q dx/m_j. The actual distance is used instead of the sum of the radii, so that energy is conserved up to rounding.
+  !> Impulse on disk i, as a multiple q of the separation vector dx = x_j - x_i. In the collision v_i changes by q dx/m_i, and v_j
+  !> changes by -q dx/m_j. The actual distance of the disks is used instead of the sum of their radii, so that energy is conserved
+  !> up to rounding errors.
   pure function pair_impulse(b, distance2, mass_i, mass_j, restitution) result(q)
     real(real64), intent(in) :: b                    !! dx . dv [length**2/time]
     real(real64), intent(in) :: distance2            !! dx . dx [length**2]
@@ -114,7 +118,7 @@ contains
   !> the tangential restitution, unless Coulomb's law limits the impulse.
   pure function tangential_impulse(law, inertia, mass, slip, normal_impulse) result(impulse)
     type(tangential_law_t), intent(in) :: law
-    real(real64), intent(in) :: inertia              !! moment of inertia over mass times radius squared, equal for both bodies
+    real(real64), intent(in) :: inertia  !! moment of inertia divided by mass times radius squared, equal for both bodies
     real(real64), intent(in) :: mass                 !! reduced mass [mass]
     real(real64), intent(in) :: slip                 !! tangential velocity of the surface at the contact [length/time]
     real(real64), intent(in) :: normal_impulse       !! normal impulse of the same collision, not negative [mass length/time]
@@ -125,8 +129,8 @@ contains
     if (abs(impulse) > law%friction*normal_impulse) impulse = sign(law%friction*normal_impulse, impulse)
   end function tangential_impulse
 
-  !> Velocity after a collision with a wall at rest. The normal velocity after the collision points away from the wall for both
-  !> signs of the normal velocity before it. A second collision that is caused by rounding therefore cannot move a disk through the
+  !> Velocity after a collision with a wall at rest. After the collision the normal velocity points away from the wall, even if it
+  !> already did so before the collision. A second collision caused by rounding errors therefore cannot move a disk through the
   !> wall.
   pure function wall_rebound(law, v, normal, elastic) result(after)
     type(wall_law_t), intent(in) :: law

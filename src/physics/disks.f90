@@ -1,6 +1,7 @@
 !> Data of the disks, grouped by the frequency of access. The record of a disk occupies one cache line and is read in every
-!> prediction. The tag of a disk occupies half a cache line and is needed only in events of the disk itself. Other arrays exist only
-!> in some simulations. Derived data are not stored in checkpoints, because they are recomputed at every start.
+!> prediction. The tag of a disk occupies half a cache line and is needed only in events of the disk itself. Optional data of disks
+!> are in arrays that exist only in some simulations. Derived data are not stored in checkpoints, because they are recomputed at
+!> every start.
 module disks
   use free_flight, only: flight, flight_velocity
   use kinds, only: int16, int32, int64, real64
@@ -10,25 +11,25 @@ module disks
   public :: disks_before, advance_disk, longest_name, names_of, species_by_id
 
   !> Position, velocity and clock of a disk change only in the collisions of this disk, and when the disk passes a periodic side.
-  !> Positions at other times are extrapolated.
+  !> The position of a disk at another time follows from its stored position and velocity.
   type :: disk_t
     real(real64) :: x(2) = 0.0_real64           !! position at `clock` [length]
     real(real64) :: v(2) = 0.0_real64           !! velocity at `clock` [length/time]
-    real(real64) :: clock = 0.0_real64          !! time at which x and v were set, since the epoch [time]
+    real(real64) :: clock = 0.0_real64          !! time of `x` and `v`, relative to the time origin `box%epoch` [time]
     real(real64) :: radius = 0.0_real64         !! [length]
     ! Derived data: the collision counter, and the next event as predicted by the search. The collision counter is the number of
-    ! changes of x and v in this epoch; it serves to recognise stale events.
+    ! changes of x and v in this epoch. A changed collision counter shows that an event is stale.
     integer(int32) :: collision_counter = 0
-    integer(int32) :: partner = 0               !! index of a disk (> 0), or another code of `partners`
-    real(real64) :: event_time = 0.0_real64     !! time since the epoch [time]
+    integer(int32) :: partner = 0               !! partner in the next event: index of a disk (> 0), or another code of `partners`
+    real(real64) :: event_time = 0.0_real64     !! time of the next event, relative to the time origin `box%epoch` [time]
   end type disk_t
 
   type :: tag_t
     integer(int32) :: species = 1               !! index of the species
-    integer(int32) :: id = 0                    !! number in the order of the input
+    integer(int32) :: id = 0                    !! number of the disk in the order of the input
     integer(int64) :: collisions = 0            !! number of events of the disk since the start of the run
-    integer(int32) :: last_partner = 0          !! id of a disk, code of an obstacle, or 0; see `partners: repeated`
-    ! Derived data of search and event queue.
+    integer(int32) :: last_partner = 0  !! last collision partner: id of a disk, code of an obstacle, or 0; see `partners: repeated`
+    ! Derived data, which the search and the event queue use.
     integer(int16) :: cell(2) = 0_int16         !! column and row in the cell grid
     integer(int32) :: window = 0                !! time window to which the event queue has assigned the event
     integer(int32) :: partner_counter = 0       !! collision counter of the partner at the time of the prediction
@@ -40,19 +41,19 @@ module disks
   type :: species_t
     character(len=:), allocatable :: name
     integer :: count = 0
-    real(real64) :: mass = 1.0_real64           !! mass of each disk, or largest mass [mass]
+    real(real64) :: mass = 1.0_real64           !! mass of each disk; largest mass if the masses differ [mass]
   end type species_t
 
-  !> Data of a disk that exist only in some simulations: see `simulation_state: has_extra`.
+  !> Optional data of a disk, which exist only if `simulation_state: has_extra` is .true.
   type :: extra_t
-    !> Number of periods by which the disk has moved along each axis, an integer; the unwrapped position is x + image*edges.
+    !> Integer number of periods by which the disk has moved along each axis; the unwrapped position is x + image*edges.
     real(real64) :: image(2) = 0.0_real64
-    real(real64) :: last_contact = 0.0_real64   !! time of the last contact, since the epoch, for the TC model [time]
+    real(real64) :: last_contact = 0.0_real64   !! time of the last contact (TC model), relative to `box%epoch` [time]
     real(real64) :: spin = 0.0_real64           !! angular velocity [1/time]
     real(real64) :: angle = 0.0_real64          !! orientation at `clock`, unwrapped [radian]
   end type extra_t
 
-  !> All data of one disk, for copying.
+  !> All data of one disk, combined in one type so that they can be copied together.
   type :: whole_disk_t
     type(disk_t) :: disk
     type(tag_t) :: tag
@@ -86,7 +87,7 @@ contains
     end do
   end function names_of
 
-  !> Number of disks of the species that precede species s. These disks have lower ids.
+  !> Number of disks in all species before species s. These disks have lower ids than the disks of species s.
   pure function disks_before(species, s) result(n)
     class(species_t), intent(in) :: species(:)
     integer, intent(in) :: s
@@ -95,7 +96,7 @@ contains
     n = sum(species(:s - 1)%count)
   end function disks_before
 
-  !> Species of each disk, in the order of ids.
+  !> Index of the species of each disk, in the order of the ids of the disks.
   pure function species_by_id(species) result(number)
     class(species_t), intent(in) :: species(:)
     integer(int32), allocatable :: number(:)

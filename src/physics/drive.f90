@@ -6,7 +6,7 @@ module drive
   private
   public :: drive_kinds, drive_t
 
-  !> Names of the kinds of driving in the input. A kind is represented by its position in this list.
+  !> Names of the kinds of driving in the input. The program represents a kind of driving by its position in this list.
   character(len=*), parameter :: drive_kinds = "none noise andersen brownian active"
   integer, parameter, public :: no_kicks = 1, noise = 2, andersen = 3, brownian = 4, active = 5
 
@@ -15,8 +15,8 @@ module drive
     real(real64) :: interval = never                 !! time between kicks [time]
     !> Noise strength: growth rate of the variance of each velocity component [velocity**2/time]
     real(real64) :: strength = 0.0_real64
-    logical :: keep_momentum = .false.               !! the noise conserves the total momentum; .false. for other kinds
-    real(real64) :: fraction = 1.0_real64            !! fraction of the disks that a kick of 'andersen' affects, on average
+    logical :: keep_momentum = .false.               !! whether noise conserves the total momentum; .false. for other kinds
+    real(real64) :: fraction = 1.0_real64            !! mean fraction of the disks that a kick of 'andersen' affects
     real(real64) :: temperature = 0.0_real64         !! kT of the velocities drawn by 'andersen', 'brownian' and 'active' [energy]
     real(real64) :: speed = 0.0_real64               !! self-propulsion speed of active disks [length/time]
     real(real64) :: rotational_diffusion = 0.0_real64   !! rotational diffusion coefficient of active disks [1/time]
@@ -31,7 +31,7 @@ module drive
 
 contains
 
-  !> Whether there is driving.
+  !> Whether the disks are driven by kicks.
   pure function is_on(self) result(yes)
     class(drive_t), intent(in) :: self
     logical :: yes
@@ -56,7 +56,7 @@ contains
     yes = self%is_on() .and. self%species == 0 .and. .not. (self%kind == andersen .and. self%fraction < 1)
   end function acts_on_all
 
-  !> Time of kick k. The time is computed as a product, because a sum would accumulate rounding errors.
+  !> Time of the k-th kick. The time is k times the interval, because a sum of intervals would accumulate rounding errors.
   pure function time_of(self, k) result(t)
     class(drive_t), intent(in) :: self
     integer(int64), intent(in) :: k

@@ -17,29 +17,29 @@ module encounters
   private
   public :: collide, collide_pair, encounter_text, is_periodic_side, pass_side
 
-  !> Limits for the detection of an inelastic collapse. The first limit is the number of simultaneous collisions of a pair up to
-  !> which a series is not considered a collapse. The second limit is the approach velocity, relative to the velocities and to the
-  !> loss per collision, below which further collisions only result from rounding errors. The third limit is an absolute approach
-  !> velocity, for systems in which walls slow all disks down; it is far below all velocities that an input may contain
-  !> [length/time].
+  !> Limits for the detection of an inelastic collapse. A series of at most `most_visible` simultaneous collisions of a pair is not
+  !> considered a collapse. The limit `rounded` is an approach velocity, divided by the speed of the faster disk and by 1 -
+  !> restitution. Below this approach velocity, further collisions only result from rounding errors. The limit `slowest` is an
+  !> absolute approach velocity, which is far below all velocities in an input [length/time]. The absolute limit is needed if walls
+  !> slow down all disks.
   integer(int32), parameter :: most_visible = most_repeats - 3
   real(real64), parameter :: rounded = 1.0e-12_real64, slowest = 1.0e-120_real64
 
-  !> Ratio of masses above which the velocity change of the heavy disk loses digits.
+  !> Ratio of masses above which the velocity change of the heavy disk loses significant digits.
   real(real64), parameter :: far_heavier = 2.0_real64**20
 
 contains
 
-  !> Executes the collision of disk i at the time t with the partner `code`: another disk, a side or an obstacle. This procedure is
-  !> the general version, which handles rotation, friction, velocity-dependent restitution, the virial tensor and the event log;
-  !> `collide_pair` is the fast version. The log entry does not depend on which of the two disks predicted the event. Two disks that
-  !> are still in contact are skipped.
+  !> Executes the collision of disk i at the time t with the partner `code`: another disk, a side or an obstacle. `collide` is the
+  !> general procedure for rotation, friction, velocity-dependent restitution, the virial tensor and the event log. `collide_pair`
+  !> is the fast procedure for collisions of two disks without these features. The log entry does not depend on which of the two
+  !> disks predicted the event. If the two disks are still in contact after their last collision, no new collision is executed.
   subroutine collide(sim, i, code, t, counts, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: code           !! index of a disk (> 0), or code of a side or obstacle: see `partners`
     real(real64), intent(in) :: t
-    logical, value :: counts                     !! the collision is included in the tally and the log
+    logical, value :: counts                     !! whether the collision is included in the tally and the log
     type(event_log_t), intent(inout), optional :: log
     real(real64) :: v(2), w(2), change(2), restitution
     integer(int32) :: first, second, ids(2), n_repeats
@@ -89,7 +89,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
-    logical, value :: counts                     !! the collision is included in the tally
+    logical, value :: counts                     !! whether the collision is included in the tally
     real(real64), value :: restitution           !! coefficient of restitution, unless the TC model makes the collision elastic
     real(real64) :: dx(2), dv(2), b, distance2, q, mass_i, mass_j
     integer(int32) :: si, sj
@@ -108,22 +108,23 @@ contains
     dx = sim%disk(j)%x - sim%disk(i)%x
     dv = sim%disk(j)%v - sim%disk(i)%v
     if (any(sim%box%periodic)) then
-      if (any(abs(dx) >= 0.5_real64*sim%box%edges())) call use_nearest_image(sim, t, dx, dv)  ! needed only for a few pairs
+      if (any(abs(dx) >= 0.5_real64*sim%box%edges())) call use_nearest_image(sim, t, dx, dv)  ! needed for few pairs
     end if
     b = dx(1)*dv(1) + dx(2)*dv(2)
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
     mass_i = sim%species(si)%mass
     mass_j = sim%species(sj)%mass
-    if (allocated(sim%own_mass)) then                ! as in `mass_of`, with a single test for the two disks
+    if (allocated(sim%own_mass)) then                ! one test of the allocation for both disks
       mass_i = sim%own_mass(i)
       mass_j = sim%own_mass(j)
     end if
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
-    ! Divides by the mass, because the rounding error of a stored reciprocal mass would be the same in all collisions.
+    ! The impulse is divided by the mass. A multiplication by a stored reciprocal mass would repeat the same rounding error in all
+    ! collisions.
     sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     dv = sim%disk(j)%v - sim%disk(i)%v
-    ! Because of rounding the two disks still approach each other.
+    ! Rounding errors can leave a residual approach velocity of the two disks.
     if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call remove_residual_approach(sim, i, j)
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(j)%collisions = sim%tag(j)%collisions + 1
@@ -154,16 +155,16 @@ contains
     g = abs(dot_product(dx, dv))/magnitude(dx)
   end function impact_velocity
 
-  !> Counts an inelastic collision of two disks both of which have already collided at exactly this time. Such a series of
-  !> simultaneous collisions is common when more than two disks are in contact, and is usually finite. An inelastic collapse is an
-  !> infinite series: the same disks collide again and again until their approach velocity is no more than the rounding error of
+  !> Counts an inelastic collision of two disks, both of which have already collided at exactly the time t. A series of simultaneous
+  !> collisions is common when more than two disks are in contact, and this series is usually finite. An inelastic collapse is an
+  !> infinite series: the same disks collide again and again until their approach velocity is as small as the rounding error of
   !> their velocities. Elastic disks and disks with a contact duration (TC model) cannot collapse.
   pure subroutine count_simultaneous_collision(sim, i, j, t, counts, n)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
-    logical, intent(in) :: counts                !! the collision is included in the tally
-    integer(int32), intent(out) :: n             !! length of the series so far, see `partners: most_repeats`
+    logical, intent(in) :: counts                !! whether the collision is included in the tally
+    integer(int32), intent(out) :: n             !! number of collisions in the series so far, at most `partners: most_repeats`
     real(real64) :: restitution, fastest
     integer(int32) :: last_partner(2)
 
@@ -171,7 +172,8 @@ contains
     restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(j)%species)
     if (sim%law%contact_time > 0 .or. .not. restitution < 1) return
     last_partner = sim%tag([i, j])%last_partner
-    ! If one of the disks has collided with a wall since the last collision of the pair, the count of the other disk is used.
+    ! Each disk stores a count of its series. A collision with a wall erases the count of a disk, and the count of the other disk is
+    ! then used.
     n = minval(merge(repeats(last_partner), most_repeats, last_partner > 0)) + 1
     fastest = max(magnitude(sim%disk(i)%v), magnitude(sim%disk(j)%v))
     if (impact_velocity(sim, i, j, t) > max(rounded*(1 - restitution)*fastest, slowest)) n = min(n, most_visible)
@@ -186,7 +188,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: normal_impulse   !! [mass length/time]
-    logical, value :: counts                     !! the collision is included in the tally
+    logical, value :: counts                     !! whether the collision is included in the tally
     real(real64) :: along(2), dv(2), slip, impulse, mass_i, mass_j, reduced
 
     associate (p => sim%disk(i), q => sim%disk(j), law => sim%law)
@@ -211,13 +213,13 @@ contains
   end subroutine apply_tangential_impulse
 
   !> Change of the momentum of disk i in a collision with a surface or with disk j. If disk i is far heavier than its partner,
-  !> rounding errors dominate the velocity change of disk i. In this case the momentum change is computed as the momentum that the
-  !> partner loses.
+  !> rounding errors dominate the velocity change of disk i. The momentum change of disk i is then computed from the velocity change
+  !> of the partner.
   pure function momentum_change(sim, i, j, v, w) result(change)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: j              !! index of the partner disk; not positive if the partner is a surface
-    real(real64), intent(in) :: v(2), w(2)       !! velocities before the collision [length/time]
+    real(real64), intent(in) :: v(2), w(2)       !! velocities of disks i and j before the collision [length/time]
     real(real64) :: change(2)                    !! [mass length/time]
 
     if (is_far_heavier(sim, i, j)) then
@@ -227,12 +229,12 @@ contains
     end if
   end function momentum_change
 
-  !> Magnitude of the momentum change of disk i.
+  !> Magnitude of the momentum change of disk i in a collision.
   pure function impulse_between(sim, i, j, v, w) result(impulse)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: j              !! index of the partner disk; not positive if the partner is a surface
-    real(real64), intent(in) :: v(2), w(2)       !! velocities before the collision [length/time]
+    real(real64), intent(in) :: v(2), w(2)       !! velocities of disks i and j before the collision [length/time]
     real(real64) :: impulse                      !! [mass length/time]
 
     if (is_far_heavier(sim, i, j)) then
@@ -256,7 +258,7 @@ contains
   pure function transferred_energy(sim, i, j, v, w) result(energy)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
-    real(real64), intent(in) :: v(2), w(2)       !! velocities before the collision [length/time]
+    real(real64), intent(in) :: v(2), w(2)       !! velocities of disks i and j before the collision [length/time]
     real(real64) :: energy
 
     if (is_far_heavier(sim, i, j) .or. is_far_heavier(sim, j, i)) then
@@ -266,18 +268,18 @@ contains
     end if
   end function transferred_energy
 
-  !> Change of the translational kinetic energy of disk i.
+  !> Change of the translational kinetic energy of disk i in a collision.
   pure function energy_gain(sim, i, before)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
-    real(real64), intent(in) :: before(2)        !! velocity before the collision [length/time]
+    real(real64), intent(in) :: before(2)        !! velocity of disk i before the collision [length/time]
     real(real64) :: energy_gain                  !! [energy]
 
     energy_gain = 0.5_real64*sim%mass_of(i)*dot_product(sim%disk(i)%v - before, sim%disk(i)%v + before)
   end function energy_gain
 
-  !> Adds a collision of disks i and j to the virial tensor, to the collisional heat flux, and to the work of the shear. The work of
-  !> the shear is zero unless the disks collide across the lower or upper boundary.
+  !> Adds a collision of disks i and j to the virial tensor, to the collisional heat flux, and to the work of the shear. The shear
+  !> does work only if the disks collide across the lower or upper boundary of a sheared box.
   subroutine add_pair_sums(sim, i, j, change, transferred_energy)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
@@ -300,8 +302,8 @@ contains
     call remove_residual_approach(sim, i, j)
   end subroutine add_pair_sums
 
-  !> Replaces the separation and relative velocity of two disks at the time t by the separation from, and the velocity relative to,
-  !> the nearest image of the second disk.
+  !> Replaces the separation and relative velocity of two disks at the time t by those of the first disk and the nearest periodic
+  !> image of the second disk.
   pure subroutine use_nearest_image(sim, t, dx, dv)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: t
@@ -310,16 +312,16 @@ contains
     type(images_t) :: images
     type(image_t) :: image
 
-    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! true for nearly all pairs
+    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! this condition holds for nearly all pairs
     images = sim%images()
     image = images%image(images%nearest_image(dx, t))
     dx = dx + [image%shift(1) + image%velocity*t, image%shift(2)]
     dv(1) = dv(1) + image%velocity
   end subroutine use_nearest_image
 
-  !> Whether disks i and j, which touch at the time t, are still in contact after a collision with each other in the same periodic
-  !> image. There are no forces between the disks. An approach of two such disks is therefore a rounding error, which results from
-  !> the shift of one disk by a period.
+  !> Whether disks i and j, which touch at the time t, are still in contact after their last collision, in the same periodic image.
+  !> If two disks in contact approach each other, the approach is a rounding error from the shift of one disk by a period, because
+  !> no force acts between disks.
   pure function are_in_contact(sim, i, j, t) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
@@ -339,8 +341,9 @@ contains
     end associate
   end function are_in_contact
 
-  !> Removes the approach velocity that rounding can leave after a collision. The test uses the same expression as the prediction
-  !> of contacts, so that the pair is not predicted to collide again. No event is counted, and the clocks do not change.
+  !> Removes the approach velocity that rounding errors can leave after a collision of two disks. The test for an approach uses the
+  !> same expression as the prediction of contacts, so that no further collision of the two disks is predicted. The procedure does
+  !> not count an event and does not change the clocks of the disks.
   pure subroutine remove_residual_approach(sim, i, j)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
@@ -396,12 +399,13 @@ contains
     end associate
   end subroutine pass_side
 
-  !> Moves disk i across the lower or upper boundary of a sheared box (Lees-Edwards): its position is shifted by the
-  !> displacement of the image, and its velocity by the velocity of the image. No force acts on the disk.
+  !> Moves disk i across the lower or upper boundary of a sheared box (Lees-Edwards). The position of the disk is shifted by the
+  !> displacement of the periodic image, and the velocity of the disk by the velocity of the image. This shift is a change of the
+  !> reference frame: no force acts on the disk.
   subroutine pass_sheared_boundary(sim, i, rows, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    integer, intent(in) :: rows                  !! 1 across the upper boundary, -1 across the lower one
+    integer, intent(in) :: rows                  !! 1 for the upper boundary, -1 for the lower boundary
     real(real64), intent(in) :: t
     type(images_t) :: images
     real(real64) :: v, columns
@@ -418,7 +422,7 @@ contains
     end associate
   end subroutine pass_sheared_boundary
 
-  !> A text for messages that states disk i, its partner and the time.
+  !> Part of a message: a text that identifies disk i, its partner and the present time.
   pure function encounter_text(sim, i, code) result(text)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code           !! index of the disk and code of its partner: see `partners`
@@ -436,7 +440,7 @@ contains
 
   contains
 
-    !> The number and species of a disk.
+    !> Text that contains the number and the species of a disk.
     pure function disk_text(k) result(words)
       integer(int32), intent(in) :: k
       character(len=:), allocatable :: words

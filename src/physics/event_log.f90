@@ -1,4 +1,5 @@
-!> Event log: collisions that have not been written yet. The dynamics appends them, and the caller empties the list.
+!> Event log: a list of the collisions that have not been written to the output file yet. The dynamics appends collisions to the
+!> list, and the caller writes the collisions and empties the list.
 module event_log
   use kinds, only: real64
   implicit none
@@ -8,11 +9,12 @@ module event_log
   integer, parameter :: record_length = 6, first_room = 1024
 
   type :: event_log_t
-    !> Largest number of entries; the dynamics returns to the caller when the log reaches it.
+    !> Largest number of entries; the dynamics returns to the caller when the log contains this number of entries.
     integer :: most = huge(0)
     integer :: n = 0                              !! number of entries
-    !> (6, at least n) Time since the start of the run, ids i and j in the order of the input, and the magnitude and the two
-    !> components of the momentum change of disk i [mass length/time]. For a wall, j is the code of the surface: see `partners`.
+    !> (6, at least n) One column per collision. A column contains the time since the start of the run [time], the ids of disks i
+    !> and j, and the magnitude and the two components of the momentum change of disk i [mass length/time]. In a collision with a
+    !> wall, the code of the surface replaces the id of disk j: see `partners`.
     real(real64), allocatable :: record(:, :)
   contains
     procedure :: append
@@ -21,7 +23,7 @@ module event_log
 
 contains
 
-  !> Whether there is a log that has to be emptied.
+  !> Whether the log is full and has to be emptied; .false. without a log.
   pure function is_full(log) result(yes)
     type(event_log_t), intent(in), optional :: log
     logical :: yes
@@ -44,7 +46,7 @@ contains
   !> Deletes the oldest entries of a log that has become twice as long as necessary.
   pure subroutine keep(self, least)
     class(event_log_t), intent(inout) :: self
-    integer, intent(in) :: least                    !! number of latest entries that are needed
+    integer, intent(in) :: least                    !! number of latest entries to be kept
 
     if (self%n < 2*least) return
     self%record(:, :least) = self%record(:, self%n - least + 1:self%n)

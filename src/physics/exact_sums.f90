@@ -6,20 +6,20 @@ module exact_sums
   private
   public :: exact_sum_t
 
-  integer, parameter :: digits_of_bound = 62             !! binary digits of a term at the bound
-  integer, parameter :: digits_of_rare = 90              !! binary digits of the unit of very large terms
+  integer, parameter :: digits_of_bound = 62             !! number of binary digits of a term as large as the bound
+  integer, parameter :: digits_of_rare = 90              !! binary logarithm of `rare_unit`
   real(real64), parameter :: most_units = 2.0_real64**digits_of_bound
   real(real64), parameter :: rare_unit = 2.0_real64**digits_of_rare
   integer, parameter :: digits_of_most = 125
-  !> Limit of the two integers of a sum; beyond this limit the sum is NaN.
+  !> Limit of the two integers that represent a sum. A sum beyond this limit is NaN.
   integer(int128), parameter :: most = 2_int128**digits_of_most
 
-  !> A fixed-point sum. A term may exceed the bound that was passed to `choose_unit`; the addition of this term then takes slightly
-  !> longer. A sum of 2**35 terms below 2**90 units cannot overflow. Multiples of 2**90 units in larger terms are counted
-  !> separately.
+  !> A fixed-point sum. A term may exceed the bound that was passed to `choose_unit`. The addition of such a term is exact but takes
+  !> slightly longer. A sum of 2**35 terms below 2**90 units cannot overflow. For a larger term, the integer `rare` counts the
+  !> number of multiples of 2**90 units.
   type :: exact_sum_t
     integer(int128) :: units = 0
-    integer(int128) :: rare = 0                          !! multiples of 2**90 units
+    integer(int128) :: rare = 0                          !! number of multiples of 2**90 units
     !> Reciprocal of the unit, a power of two; 0 if the unit has not been chosen yet.
     real(real64) :: per_one = 0.0_real64
   contains
@@ -50,10 +50,10 @@ contains
     if (finer < 0) call self%make_coarser(min(-finer, digits_of_most))
   end subroutine choose_unit
 
-  !> Divides the unit by a power of two.
+  !> Divides the unit of the sum by 2 to the power `digits`.
   elemental subroutine make_finer(self, digits)
     class(exact_sum_t), intent(inout) :: self
-    integer, intent(in) :: digits                        !! number of binary digits
+    integer, intent(in) :: digits                        !! binary logarithm of the factor
     integer(int128) :: moved
 
     if (self%units == 0 .and. self%rare == 0) return
@@ -68,10 +68,10 @@ contains
     end if
   end subroutine make_finer
 
-  !> Multiplies the unit by a power of two.
+  !> Multiplies the unit of the sum by 2 to the power `digits`.
   elemental subroutine make_coarser(self, digits)
     class(exact_sum_t), intent(inout) :: self
-    integer, intent(in) :: digits                        !! number of binary digits
+    integer, intent(in) :: digits                        !! binary logarithm of the factor
     integer(int128) :: left
 
     left = self%rare/2_int128**digits
@@ -97,7 +97,7 @@ contains
   end subroutine add
 
   !> Adds a very large term in two parts. Both parts are exact, because a number in double precision has fewer digits than each of
-  !> the two integers of the sum.
+  !> the two integers that represent the sum.
   elemental subroutine add_rare(self, units)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: units
@@ -122,7 +122,7 @@ contains
     if (max(abs(self%rare), abs(other%rare)) >= most) self%rare = most
   end subroutine include
 
-  !> Removes all terms.
+  !> Sets the sum to zero.
   elemental subroutine clear(self)
     class(exact_sum_t), intent(inout) :: self
 

@@ -15,7 +15,7 @@ module observables
 
   !> One observable, a scalar or a vector.
   type :: observable_t
-    character(len=64) :: name = ""                !! path below /observables
+    character(len=64) :: name = ""                !! path below the HDF5 group /observables
     integer :: width = 0                          !! number of components
     logical :: is_count = .false.                 !! the value is an integer
     real(real64) :: value(most_components) = 0.0_real64    !! present value; counts are exact up to 2**53
@@ -23,7 +23,7 @@ module observables
 
   type :: observable_list_t
     integer :: n = 0
-    type(observable_t), allocatable :: row(:)     !! the observables; only the first n are used
+    type(observable_t), allocatable :: row(:)     !! (at least n) the observables; only the first n elements are used
   contains
     procedure :: add
     procedure :: values
@@ -36,7 +36,8 @@ module observables
   integer, parameter :: own_kinetic = 9, own_momentum = 10
   integer, parameter :: flux = 12  !! kinetic flux relative to the velocity profile, five components: see `tally: kinetic_flux`
   integer, parameter :: tensor(*) = flux + [0, 1, 1, 2]                    !! components xx, xy, yx, yy of the momentum flux
-  !> Total energy and the rounding error of its sum, precise enough for an energy balance. Zero unless `is_driven`.
+  !> Total energy, and the rounding error of the sum that yields the total energy. Both sums are computed only in driven
+  !> simulations.
   integer, parameter :: energy = 17, lost = 18
 
 contains
@@ -45,7 +46,7 @@ contains
   pure function observed(sim) result(list)
     type(simulation_t), intent(in) :: sim
     type(observable_list_t) :: list
-    real(real64) :: sums(lost, 0:size(sim%species))   ! sums for each species, and with index 0 for all disks
+    real(real64) :: sums(lost, 0:size(sim%species))   ! sums over the disks of each species; index 0: sums over all disks
     character(len=:), allocatable :: path
     real(real64) :: flux_integral(5)                          ! time integrals of the fluxes [energy time], [energy length]
     real(real64) :: at(2, 2)                          ! positions of the lower and upper sides [length]
@@ -103,11 +104,11 @@ contains
     now = total(sim, sums(:, 0))
   end function total_energy
 
-  !> Adds the observables that are averages over the disks of a species. The temperature is kT in two dimensions. The temperature is
-  !> computed from the kinetic energy relative to the mean velocity and, in a sheared box, relative to the velocity profile.
+  !> Adds the observables that are averages over the disks of a species. The temperature kT is the mean kinetic energy of a disk
+  !> relative to the mean velocity and, in a sheared box, relative to the velocity profile.
   pure subroutine add_means(list, group, sums, rotation)
     type(observable_list_t), intent(inout) :: list
-    character(len=*), intent(in) :: group         !! name of the species
+    character(len=*), intent(in) :: group         !! name of the species, or 'all'
     real(real64), intent(in) :: sums(:)
     logical, intent(in) :: rotation               !! disks can rotate
     real(real64) :: n, drift
@@ -143,7 +144,7 @@ contains
     end associate
   end subroutine add
 
-  !> All components of all observables as a flat array.
+  !> The components of all observables as a flat array.
   pure function values(self)
     class(observable_list_t), intent(in) :: self
     real(real64) :: values(sum(self%row(:self%n)%width))
@@ -158,7 +159,7 @@ contains
     end do
   end function values
 
-  !> Names below /observables that a species must not have.
+  !> Names in the HDF5 group /observables that are reserved; a species must not have one of these names.
   function own_names() result(names)
     character(len=64), allocatable :: names(:)
     type(simulation_t) :: empty
@@ -170,13 +171,13 @@ contains
     empty%drive%kind = noise
     call empty%tally%make_room(n_sides)
     empty%box = box_t()
-    empty%box%surface%law%temperature = 1         ! a thermal law for all surfaces enables all observables
+    empty%box%surface%law%temperature = 1         ! thermal walls and moving surfaces enable all observables
     empty%box%surface%law%speed = 1
     empty%features%stress = .true.
     empty%features%helfand = .true.
     list = observed(empty)
     allocate (names(list%n + 1))
-    names(list%n + 1) = "obstacles"                 ! added here, because the empty box has no obstacles
+    names(list%n + 1) = "obstacles"                 ! the empty box has no obstacles that would add this name
     do k = 1, list%n
       associate (name => list%row(k)%name)
         names(k) = name(:index(name//"/", "/") - 1)
@@ -184,7 +185,7 @@ contains
     end do
   end function own_names
 
-  !> Energies of all disks.
+  !> Kinetic energies and total energy of all disks.
   pure function energies(sim)
     type(simulation_t), intent(in) :: sim
     real(real64) :: energies(3)                   !! translational, rotational, total [energy]
@@ -194,7 +195,7 @@ contains
     energies = [sums(kinetic, 0), sums(rotational, 0), total(sim, sums(:, 0))]
   end function energies
 
-  !> The total energy from the sums.
+  !> Total energy of the disks, from the sums over the disks.
   pure function total(sim, sums)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: sums(:)
@@ -204,8 +205,8 @@ contains
     if (sim%is_driven()) total = sums(energy) + sums(lost)
   end function total
 
-  !> Adds a term to the energy with compensated summation (Neumaier, Z. Angew. Math. Mech. 54, 39 (1974)), because the energy
-  !> gained from driving is small compared with the sum over many disks.
+  !> Adds a term to the energy with compensated summation (Neumaier, ZAMM 54, 39 (1974)). The energy gained from driving is small
+  !> compared with the energy of many disks, and simple summation would lose its digits.
   pure subroutine add_energy(sums, term)
     real(real64), intent(inout) :: sums(:)
     real(real64), intent(in) :: term
@@ -220,7 +221,7 @@ contains
     sums(energy) = new
   end subroutine add_energy
 
-  !> Computes the sums in one pass over the disks. The potential energy is zero at the origin.
+  !> Computes all sums in one pass over the disks. The potential energy is zero at the origin of the coordinates.
   pure subroutine add_up(sim, sums)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(out) :: sums(:, 0:)
@@ -262,11 +263,12 @@ contains
     end do
   end subroutine add_up
 
-  !> Pressure in two dimensions by the virial theorem, P A = K + W/(2t), with the present values of K and A and the sum W of
-  !> impulse times distance over all collisions of disks since the start.
+  !> Pressure in two dimensions by the virial theorem, P A = K + W/(2t). K is the present kinetic energy, A is the present
+  !> accessible area, and t is the time since the start of the run. W is the sum of impulse times distance over all collisions of
+  !> disks during this time.
   pure function pressure(sim, kinetic)
     type(simulation_t), intent(in) :: sim
-    real(real64), intent(in) :: kinetic           !! kinetic energy of all disks, relative to the profile of a sheared box [energy]
+    real(real64), intent(in) :: kinetic           !! kinetic energy relative to the velocity profile of a sheared box [energy]
     real(real64) :: pressure
     type(box_t) :: box
 

@@ -1,7 +1,7 @@
 !> Defines integer codes for the partners of a disk in an event. The partner is another disk (> 0), a surface of the box (0, -1, -2,
 !> -3 for the left, right, bottom and top side; -4, -5, ... for an obstacle), or the boundary of the cell of the disk (large
-!> negative codes). The event log contains the same codes for disks and surfaces. Side k of the box has the code 1 - k. The codes of
-!> obstacles continue this sequence.
+!> negative codes). The event log contains the same codes for disks and surfaces. Side k of the box has the code 1 - k, and the m-th
+!> obstacle has the code -3 - m.
 module partners
   use kinds, only: int32
   implicit none
@@ -13,17 +13,17 @@ module partners
   integer(int32), parameter :: n_sides = 4
   integer(int32), parameter :: first_crossing = -2000000000
   !> Code of an event that requires a new search: the disk leaves the region in which contacts were searched, but stays in its cell.
-  !> The code is reduced by 1 if the disk leaves this region through the right or upper edge of the region.
+  !> The code is `looks_again` - 1 if the disk leaves this region through its right or upper edge.
   integer(int32), parameter :: looks_again = first_crossing - n_sides
   integer(int32), parameter :: nothing = -huge(1_int32)
-  !> Largest length of a series of simultaneous collisions that can be stored.
+  !> Largest number of collisions in a series of simultaneous collisions that `last_partner` can store.
   integer(int32), parameter :: most_repeats = 11
-  integer(int32), parameter :: per_repeat = 2_int32**27    !! larger than any id of a disk
+  integer(int32), parameter :: per_repeat = 2_int32**27    !! larger than the id of any disk
   character(len=6), parameter :: side_name(n_sides) = ["left  ", "right ", "bottom", "top   "]
 
 contains
 
-  !> Whether a code represents a side of the box. The code must not be that of a disk.
+  !> Whether a code represents a side of the box. The code must not be the index of a disk.
   elemental function is_side(code) result(yes)
     integer(int32), intent(in) :: code
     logical :: yes
@@ -31,7 +31,7 @@ contains
     yes = code > -n_sides
   end function is_side
 
-  !> Whether a code represents a side or an obstacle, and not the boundary of a cell. The code must not be that of a disk.
+  !> Whether a code represents a side or an obstacle, and not the boundary of a cell. The code must not be the index of a disk.
   elemental function is_wall(code) result(yes)
     integer(int32), intent(in) :: code
     logical :: yes
@@ -55,7 +55,7 @@ contains
     m = 1 - n_sides - code
   end function obstacle_number
 
-  !> The axis normal to a side.
+  !> The index of the axis that is normal to a side.
   elemental function axis_of(side) result(axis)
     integer(int32), intent(in) :: side
     integer(int32) :: axis
@@ -71,7 +71,8 @@ contains
     sense = 2*modulo(side, 2) - 1
   end function sense_of
 
-  !> The code for leaving a cell through the face that corresponds to a side of the box.
+  !> The code of the event in which a disk leaves its cell through a face. The left, right, bottom and top faces are identified by
+  !> the corresponding side of the box.
   elemental function crossing(side) result(code)
     integer(int32), intent(in) :: side
     integer(int32) :: code
@@ -79,7 +80,7 @@ contains
     code = first_crossing + side
   end function crossing
 
-  !> The side that corresponds to the face of a cell, from the code of the crossing.
+  !> The side of the box that corresponds to the face in the code of a crossing.
   elemental function side_crossed(code) result(side)
     integer(int32), intent(in) :: code
     integer(int32) :: side
@@ -87,17 +88,17 @@ contains
     side = code - first_crossing
   end function side_crossed
 
-  !> The value of `last_partner` for a disk that has collided with its partner as the n-th in a series of simultaneous collisions.
-  !> Such series are rare; all other collisions store the plain id of the partner.
+  !> The value of `last_partner` after the n-th collision in a series of simultaneous collisions with the same partner. After any
+  !> other collision of two disks, `last_partner` is the id of the partner.
   elemental function repeated(id, n) result(last_partner)
-    integer(int32), intent(in) :: id               !! id of the partner, which is a disk
-    integer(int32), intent(in) :: n                !! length of the series, at most `most_repeats`
+    integer(int32), intent(in) :: id               !! id of the partner disk
+    integer(int32), intent(in) :: n                !! number of collisions in the series, at most `most_repeats`
     integer(int32) :: last_partner
 
     last_partner = id + n*per_repeat
   end function repeated
 
-  !> The id of the last partner, if it is a disk; otherwise the code of an obstacle, or 0.
+  !> The id of the last partner if the partner is a disk; otherwise the code of an obstacle, or 0.
   elemental function last_partner_id(last_partner) result(id)
     integer(int32), intent(in) :: last_partner
     integer(int32) :: id
@@ -106,7 +107,7 @@ contains
     if (last_partner > 0) id = modulo(last_partner, per_repeat)
   end function last_partner_id
 
-  !> Length of the series of simultaneous collisions to which the last collision belonged.
+  !> Number of collisions in the series of simultaneous collisions that includes the last collision of a disk.
   elemental function repeats(last_partner) result(n)
     integer(int32), intent(in) :: last_partner
     integer(int32) :: n

@@ -1,4 +1,4 @@
-!> Values of a frame and of a sample of the observables at the present time, as flat arrays.
+!> Values of frames and of observables at the present time, as flat arrays for the output.
 module sample_values
   use kinds, only: int32, int64, real64
   use observables, only: observable_list_t, observed
@@ -15,14 +15,15 @@ module sample_values
     logical :: is_count = .false.
   end type frame_column_t
 
-  !> Columns of a frame: first the columns that exist in all runs, then those that exist only in some runs.
+  !> Columns of a frame: first the columns that exist in all runs, then the columns that exist only in some runs.
   type(frame_column_t), parameter :: columns(*) = [frame_column_t("position", 2), frame_column_t("velocity", 2), &
     frame_column_t("event_count", is_count=.true.), frame_column_t("image", 2, is_count=.true.), &
     frame_column_t("angular_velocity"), frame_column_t("orientation")]
 
 contains
 
-  !> Columns of the frames of a simulation: the positions, and the other columns in `wanted` [default: all].
+  !> Columns of the frames of a simulation: the positions, and the columns named in `wanted`. Without `wanted` the frames have all
+  !> columns.
   pure function frame_columns(sim, wanted) result(list)
     type(simulation_t), intent(in) :: sim
     character(len=*), intent(in), optional :: wanted(:)   !! names of the wanted columns
@@ -33,7 +34,7 @@ contains
     if (present(wanted)) list = pack(list, [.true., (any(wanted == list(k)%name), k=2, size(list))])
   end function frame_columns
 
-  !> The frame of the present time, with disks in the order of the input.
+  !> The frame at the present time, with the disks in the order of the input.
   function frame_sample(sim, step, list) result(sample)
     type(simulation_t), intent(in) :: sim
     integer(int64), intent(in) :: step            !! number of the frame, counted from 0
@@ -43,7 +44,7 @@ contains
     real(real64) :: x(2), v(2), image(2)
     integer(int32) :: i, k, n
     integer :: c, first
-    integer :: at(size(columns))                  ! first element of each column in the sample; 0 if the column is not wanted
+    integer :: at(size(columns))                  ! index of the first element of each column; 0 without the column
 
     n = sim%n_disks()
     allocate (sample(2 + n*sum(list%width), 1))
@@ -76,7 +77,7 @@ contains
   end function frame_sample
 
   !> Moves a disk by whole periods into the box and counts the periods. Points on the left and lower side belong to the box, points
-  !> on the right and upper side do not. Shifts along y are applied first, because in a sheared box they also change x.
+  !> on the right and upper side do not. Shifts along y are applied first, because in a sheared box a shift along y also changes x.
   pure subroutine wrap(sim, x, v, image)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(inout) :: x(2)           !! [length]
@@ -96,12 +97,12 @@ contains
           x(1) = x(1) - periods*(upper - lower)
           image(1) = image(1) + periods
         end if
-        x(axis) = max(x(axis), lower)             ! the position can be outside only because of rounding
+        x(axis) = max(x(axis), lower)             ! only a rounding error can put the position outside
       end associate
     end do
   end subroutine wrap
 
-  !> The observables at the present time.
+  !> The values of all observables at the present time.
   pure function observable_sample(sim, step) result(sample)
     type(simulation_t), intent(in) :: sim
     integer(int64), intent(in) :: step            !! number of the sample, counted from 0

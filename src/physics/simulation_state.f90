@@ -14,11 +14,11 @@ module simulation_state
   private
   public :: specification_t, simulation_t, system_t
 
-  !> Factors for the bounds of sums. The bound of a sum is the smaller of two products: `common` times a typical term of the
-  !> heaviest disks, and `rare` times a typical term of the lightest disks.
+  !> Factors that determine the bound for the terms of a sum: see `exact_sums: choose_unit`. The bound is `common` times a typical
+  !> term of the heaviest disks or `rare` times a typical term of the lightest disks, whichever is smaller.
   real(real64), parameter :: common = 2.0_real64**7, rare = 2.0_real64**22
-  !> The work of walls and kicks may be far less than their parameters suggest, and it is zero before they first act. The units of
-  !> sums are therefore multiplied by this factor, so that the sums also resolve the energies of the undriven disks.
+  !> Factor by which the units of the sums are multiplied in driven simulations. The work of walls and kicks may be far less than
+  !> the estimate from their parameters. With the smaller units, the sums also resolve the energies of undriven disks.
   real(real64), parameter :: finer = 2.0_real64**(-30)
 
   !> The system: box, contact law, driving and features, which together determine the motion of the disks.
@@ -35,26 +35,27 @@ module simulation_state
     integer(int64) :: seed = 1                    !! seed of random numbers drawn during the run
   end type specification_t
 
-  !> The values given by the input and the state that a checkpoint stores.
+  !> A simulation: the values given by the input, and the state that a checkpoint stores.
   type, extends(specification_t) :: simulation_t
-    type(disk_t), allocatable :: disk(:)          !! (n) the disks, sorted by cells; `tag%id` is the position of a disk in the input
+    type(disk_t), allocatable :: disk(:)          !! (n) the disks, sorted by cells; `tag%id` is the number of a disk in the input
     type(tag_t), allocatable :: tag(:)            !! (n)
-    real(real64), allocatable :: own_mass(:)      !! (n) individual masses, allocated if those of a species differ [mass]
-    type(extra_t), allocatable :: extra(:)        !! (n) allocated if `has_extra`
-    real(real64) :: now = 0.0_real64              !! present time, since the epoch [time]
+    real(real64), allocatable :: own_mass(:)      !! (n) individual masses, allocated if masses within a species differ [mass]
+    type(extra_t), allocatable :: extra(:)        !! (n) optional data, allocated if `has_extra`
+    real(real64) :: now = 0.0_real64              !! present time, relative to the time origin `box%epoch` [time]
     logical :: events_done = .false.              !! all events up to and including `now` have been executed
-    real(real64) :: epoch_begin = 0.0_real64      !! start of the epoch, relative to the origin of time of this epoch [time]
-    real(real64) :: epoch_end = 0.0_real64        !! end of the epoch, relative to the origin of time; 0 if not known yet [time]
-    integer(int64) :: epoch_events = 0            !! number of events before the start of the epoch
-    ! For the detection of a collapse, an infinite series of events during which time does not advance:
-    real(real64) :: negligible_time = 0.0_real64  !! time in which no disk moves noticeably; 0 if it is not known yet [time]
-    real(real64) :: last_advance = 0.0_real64     !! time of the last advance by more than `negligible_time`, since the epoch [time]
+    real(real64) :: epoch_begin = 0.0_real64      !! start of the epoch, relative to the time origin `box%epoch` [time]
+    real(real64) :: epoch_end = 0.0_real64        !! end of the epoch, relative to `box%epoch`; 0 if not known yet [time]
+    integer(int64) :: epoch_events = 0            !! number of events from the start of the run to the start of the epoch
+    ! The next components serve to detect a collapse, which is an infinite series of events during which time does not advance.
+    real(real64) :: negligible_time = 0.0_real64  !! duration in which no disk moves noticeably; 0 if not known yet [time]
+    !> Time of the last advance by more than `negligible_time`, relative to `box%epoch` [time]
+    real(real64) :: last_advance = 0.0_real64
     integer(int64) :: events_then = 0             !! number of events that had been executed at the time `last_advance`
     integer(int64) :: kicks = 0                   !! number of kicks since the start of the run
-    integer(int64) :: changes = 0                 !! number of changes to forces, laws or velocities since the start of the run
+    integer(int64) :: changes = 0                 !! number of changes by the caller since the start of the run: see `changes`
     type(tally_t) :: tally                        !! counters and sums since the start of the run
-    real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
-    !> Kinetic energy at the time when the velocities were last set, at the start or by a change.
+    real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start of the run [energy]
+    !> Kinetic energy when the velocities were last set: at the start of the run, or by a change [energy]
     real(real64) :: reference_energy = 0.0_real64
     real(real64) :: typical_speed2 = 0.0_real64   !! largest mean square speed at the start and after changes [(length/time)**2]
   contains
@@ -96,7 +97,8 @@ contains
     t = self%box%epoch + self%now
   end function time
 
-  !> Whether a time has been reached and all events at this time have been executed. A run may stop between simultaneous events.
+  !> Whether a time has been reached and all events at this time have been executed. A run can stop at a time before all
+  !> simultaneous events have been executed.
   pure function has_reached(self, t) result(yes)
     class(simulation_t), intent(in) :: self
     real(real64), intent(in) :: t                 !! time since the start of the run [time]
@@ -113,9 +115,9 @@ contains
     n = size(self%disk, kind=int32)
   end function n_disks
 
-  !> Allocates the disks of all species in the order of the input. The caller sets individual masses later.
+  !> Allocates the disks of all species in the order of the input. The caller later sets masses that differ within a species.
   pure subroutine list_disks(self)
-    class(simulation_t), intent(inout) :: self    !! in: with all values given by the input
+    class(simulation_t), intent(inout) :: self    !! in: simulation with all values given by the input
     integer(int32) :: i
 
     call self%make_room(sum(self%species%count))
@@ -127,7 +129,7 @@ contains
     end do
   end subroutine list_disks
 
-  !> Whether disks have the data of `extra_t`.
+  !> Whether the disks have the optional data of `extra_t`.
   pure function has_extra(self) result(yes)
     class(simulation_t), intent(in) :: self
     logical :: yes
@@ -137,7 +139,7 @@ contains
 
   !> Allocates the arrays for n disks.
   pure subroutine make_room(self, n, like)
-    class(simulation_t), intent(inout) :: self    !! in: with all values given by the input
+    class(simulation_t), intent(inout) :: self    !! in: simulation with all values given by the input
     integer(int32), intent(in) :: n
     class(simulation_t), intent(in), optional :: like   !! the whole simulation, if `self` is one of its domains
     logical :: own_masses
@@ -161,7 +163,7 @@ contains
     if (allocated(self%extra)) whole%extra = self%extra(i)
   end function whole_disk
 
-  !> Sets all data of disk i, from this simulation or from another domain.
+  !> Sets all data of disk i to the given data, which are from this simulation or from another domain.
   pure subroutine place_disk(self, i, whole)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -213,7 +215,7 @@ contains
     if (equal) deallocate (self%own_mass)
   end subroutine simplify_masses
 
-  !> The periodic images of the box, for clocks of this epoch.
+  !> The periodic images of the box, for times relative to the time origin `box%epoch`.
   pure function images_now(self) result(images)
     class(simulation_t), intent(in) :: self
     type(images_t) :: images
@@ -262,8 +264,8 @@ contains
     self%extra(i)%spin = self%extra(i)%spin + change/self%inertia_of(i)
   end subroutine change_angular_momentum
 
-  !> Rotates disk i to its orientation at the time t. This procedure has to be called before `disks: advance_disk` changes the clock
-  !> of the disk.
+  !> Advances the orientation of disk i to the time t. `rotate_to` has to be called before `disks: advance_disk`, which changes the
+  !> clock of the disk.
   pure subroutine rotate_to(self, i, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -286,14 +288,14 @@ contains
     end associate
   end subroutine register_contact
 
-  !> Updates the sums of the flux changes: disk i had the velocity `before` until the time t, and has another velocity now. The time
-  !> integral of a flux is its present value times the time, minus the sum of its changes times the times at which they occurred.
-  !> This integral is exact at any time.
+  !> Updates the sums of the flux changes after the velocity of disk i has changed at the time t. The time integral of a flux is the
+  !> present flux times the present time, minus the sum over all changes of the flux, each multiplied by the time of the change.
+  !> This expression is exact at any time.
   pure subroutine record_velocity_change(self, i, before, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
-    real(real64), intent(in) :: before(2)         !! velocity before the change [length/time]
-    real(real64), intent(in) :: t                 !! time since the epoch [time]
+    real(real64), intent(in) :: before(2)         !! velocity of disk i before the change [length/time]
+    real(real64), intent(in) :: t                 !! time relative to the time origin `box%epoch` [time]
 
     if (.not. self%features%helfand) return
     associate (mass => self%mass_of(i), sums => self%tally%sum(flux_changes:flux_changes + 4))
@@ -335,7 +337,7 @@ contains
     yes = self%box%gives_energy() .or. self%drive%is_on()
   end function is_driven
 
-  !> Records the initial energy and chooses the units of the sums, unless this has been done.
+  !> Records the initial energy and chooses the units of the sums, unless an earlier call has already done so.
   pure subroutine start_sums(self)
     class(simulation_t), intent(inout) :: self
 
@@ -367,9 +369,10 @@ contains
     end do
   end function mean_square_speed
 
-  !> Chooses the units of the sums according to the sizes of typical terms, which are the terms of disks with the mean square speed
-  !> or the terms from walls and kicks. If masses differ widely, terms of the lightest disks are still summed with 40 binary digits.
-  !> Terms of the heaviest disks may exceed the bound of `exact_sum_t`; the addition of such rare terms takes slightly longer.
+  !> Chooses the units of the sums according to the sizes of typical terms. Typical terms follow from the mean square speed of the
+  !> disks and from the effects of gravity, walls and kicks. If masses differ widely, each term of the lightest disks still has 40
+  !> binary digits. Terms of the heaviest disks may exceed the bound of `exact_sum_t`; the addition of such rare terms takes
+  !> slightly longer.
   pure subroutine choose_units(self)
     class(simulation_t), intent(inout) :: self
     real(real64) :: mass(size(self%disk)), kicked(size(self%species))    ! [mass, (length/time)**2]

@@ -7,7 +7,8 @@ module tally
   private
   public :: kinetic_flux, tally_t
 
-  !> Kinds of terms, by their physical dimension, which determine the units of sums: see `simulation_state: choose_units`.
+  !> Kinds of terms with different physical dimensions. The kind of the terms determines the unit of a sum: see `simulation_state:
+  !> choose_units`.
   integer, parameter, public :: energies = 1, impulses = 2, virials = 3, energy_transfers = 4, momentum_transfers = 5
 
   type :: sum_t
@@ -18,18 +19,18 @@ module tally
   !> Indices of the sums over collisions. The list `sums` determines the units of the sums and their order in checkpoints and in the
   !> exchange between domains.
   integer, parameter, public :: virial = 1, dissipated = 2, heat = 3, work = 4, drive_energy = 5, stress = 6
-  integer, parameter, public :: heat_virial = 10, flux_changes = 12  ! after the four of the stress, after the two of the heat
+  integer, parameter, public :: heat_virial = 10, flux_changes = 12  ! stress has four components, heat_virial has two
   type(sum_t), parameter :: sums(*) = [ &
-    sum_t("virial", virials), &                    ! impulse times distance, over collisions of disks [energy time]
-    sum_t("dissipated", energies), &               ! kinetic energy dissipated [energy]
+    sum_t("virial", virials), &                    ! sum of impulse times distance over collisions of disks [energy time]
+    sum_t("dissipated", energies), &               ! dissipated kinetic energy [energy]
     sum_t("heat", energies), &                     ! energy transferred to disks by thermal walls [energy]
     sum_t("work", energies), &                     ! work done on disks by moving boundaries [energy]
     sum_t("drive_energy", energies), &             ! energy transferred to disks by kicks [energy]
-    ! Momentum change times distance, over collisions of disks [energy time].
+    ! Sums of momentum change times distance over collisions of disks [energy time].
     sum_t("stress_xx", virials), sum_t("stress_xy", virials), sum_t("stress_yx", virials), sum_t("stress_yy", virials), &
-    ! Energy transfer times distance, over collisions of disks [energy length].
+    ! Sums of energy transfer times distance over collisions of disks [energy length].
     sum_t("heat_virial_x", energy_transfers), sum_t("heat_virial_y", energy_transfers), &
-    ! Changes of `kinetic_flux` times time [energy time], [energy length].
+    ! Sums over all changes of `kinetic_flux`, each multiplied by the time of the change [energy time], [energy length].
     sum_t("flux_xx", momentum_transfers), sum_t("flux_xy", momentum_transfers), sum_t("flux_yy", momentum_transfers), &
     sum_t("flux_x", energy_transfers), sum_t("flux_y", energy_transfers)]
 
@@ -45,7 +46,7 @@ module tally
     real(real64) :: collapse = never               !! time of the first collapse, since the start of the run [time]
     type(exact_sum_t) :: sum(size(sums))
     integer(int64), allocatable :: surface_collisions(:)  !! (surfaces) number of collisions with each surface
-    type(exact_sum_t), allocatable :: surface_sums(:, :)   !! (3,surfaces) impulse along x and y; energy gained by disks
+    type(exact_sum_t), allocatable :: surface_sums(:, :)   !! (3,surfaces) impulse along x and y, and energy gained by disks
   contains
     procedure :: make_room
     procedure :: choose_units
@@ -66,18 +67,19 @@ contains
     allocate (self%surface_sums(gain, n))
   end subroutine make_room
 
-  !> Sets the unit of each sum according to the bound for its kind of terms (see `exact_sums: choose_unit`).
+  !> Sets the unit of each sum according to the bound for the terms of its kind (see `exact_sums: choose_unit`).
   pure subroutine choose_units(self, bound)
     class(tally_t), intent(inout) :: self
-    real(real64), intent(in) :: bound(:)           !! bound for each kind of terms
+    real(real64), intent(in) :: bound(:)           !! bound for the terms of each kind
 
     call self%sum%choose_unit(bound(sums%kind))
     call self%surface_sums(:gain - 1, :)%choose_unit(bound(impulses))
     call self%surface_sums(gain, :)%choose_unit(bound(energies))
   end subroutine choose_units
 
-  !> Fluxes of a disk in free flight: momentum, xx, xy and yy [energy]; kinetic energy along x and y [energy
-  !> length/time]. Their time integrals are the kinetic parts of the Helfand moments (Phys. Rev. 119, 1 (1960)).
+  !> Fluxes of a disk in free flight: the components xx, xy and yy of the momentum flux [energy], and the components x and y of the
+  !> kinetic energy flux [energy length/time]. The time integrals of these fluxes are the kinetic parts of the Helfand moments
+  !> (Physical Review 119, 1 (1960)).
   pure function kinetic_flux(mass, v)
     real(real64), intent(in) :: mass
     real(real64), intent(in) :: v(2)               !! [length/time]
@@ -86,7 +88,7 @@ contains
     kinetic_flux = mass*[v(1)*v(1), v(1)*v(2), v(2)*v(2), 0.5_real64*dot_product(v, v)*v]
   end function kinetic_flux
 
-  !> The value of a sum.
+  !> The value of the k-th sum.
   elemental function total(self, k)
     class(tally_t), intent(in) :: self
     integer, intent(in) :: k                       !! index in `sums`
@@ -109,7 +111,7 @@ contains
     call self%surface_sums%include(other%surface_sums)
   end subroutine include
 
-  !> Sets all counters and sums to zero. The units do not change.
+  !> Sets all counters and sums to zero. The units of the sums do not change.
   pure subroutine clear(self)
     class(tally_t), intent(inout) :: self
 
