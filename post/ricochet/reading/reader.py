@@ -1,4 +1,6 @@
-"""Read output files of Ricochet; only this module depends on the layout of the HDF5 file.
+"""Read output files of Ricochet.
+
+Only this module depends on the layout of the HDF5 file.
 
     from ricochet import read_run
     run = read_run("runs/gas.h5")
@@ -7,9 +9,10 @@
     run.speed(-1)            # (N,)    derived quantities take a frame, a slice or a list
     run.observable("all/kinetic_energy").value
 
-T frames, N disks, S species.  All quantities are in the units of the input file ("reduced units").
-Frames are read on demand, so a file may be larger than memory.  A file that is still being written
-(`.part`) is read up to its last committed frame.
+T is the number of frames, N the number of disks, and S the number of species.  All quantities are
+in the units of the input file ("reduced units").  Frames are read on demand, so a file may be
+larger than the memory of the computer.  A `.part` file, which the program is still writing, is read
+up to its last complete frame.
 """
 
 from collections.abc import Iterator, Mapping
@@ -40,11 +43,12 @@ DRIFTING = (
 
 
 class EventLog(NamedTuple):
-    """The event log: events (collisions of any kind) in chronological order, as arrays (E,).
+    """Arrays (E,) that describe the E events of a run in chronological order.
 
-    `j` is the id of the other disk; or 0, -1, -2, -3 for the left, right, bottom and top side; or
-    -4, -5, ... for the obstacles followed by the straight walls.  `momentum_change` is that of disk
-    i.
+    An event is a collision of disk `i` with another disk or with a boundary.  If `j` is positive,
+    `j` is the id of the second disk.  The values 0, -1, -2 and -3 of `j` denote the left, right,
+    bottom and top side of the box.  The values -4, -5, ... denote first the circular obstacles,
+    then the straight walls.  `momentum_change` is the momentum change of disk `i`.
     """
 
     time: np.ndarray
@@ -55,7 +59,7 @@ class EventLog(NamedTuple):
 
 
 class Event(NamedTuple):
-    """One event (collision of any kind), with `j` as in `EventLog`."""
+    """One event, described by the same quantities as in `EventLog`."""
 
     time: float
     i: int  # id of a disk
@@ -65,7 +69,7 @@ class Event(NamedTuple):
 
 
 class Obstacle(NamedTuple):
-    """A circular obstacle; disks stay outside it, or inside it if `inside` is true."""
+    """A circular obstacle, which encloses the disks if `inside` is true."""
 
     centre: np.ndarray
     radius: float
@@ -73,7 +77,10 @@ class Obstacle(NamedTuple):
 
 
 class Species(NamedTuple):
-    """The disks of one species; mass and radius may differ if they are from a starting file."""
+    """The disks of one species.
+
+    Masses and radii can differ within a species if a starting file specifies them.
+    """
 
     name: str
     masses: np.ndarray  # (n,)
@@ -82,30 +89,30 @@ class Species(NamedTuple):
 
     @property
     def alike(self) -> bool:
-        """Whether all disks of the species have the same mass and the same radius."""
+        """True if all disks of the species have the same mass and the same radius."""
         return bool(np.ptp(self.masses) == 0 and np.ptp(self.radii) == 0)
 
     @property
     def mass(self) -> float:
-        """Mass of the disks, or the mean mass if masses differ."""
+        """Mass of each disk, or the mean mass if the masses of the disks differ."""
         return float(self.masses[0] if self.alike else self.masses.mean())
 
     @property
     def radius(self) -> float:
-        """Radius of the disks, or the mean radius if radii differ."""
+        """Radius of each disk, or the mean radius if the radii of the disks differ."""
         return float(self.radii[0] if self.alike else self.radii.mean())
 
     @property
     def label(self) -> str:
-        """Name and mass, for a legend."""
+        """Name of the species and mass of its disks, for the legend of a figure."""
         return f"{self.name}, m = {span(self.masses)}"
 
 
 class Restitution(NamedTuple):
-    """Normal restitution of a contact.
+    """Coefficient of normal restitution of a pair of disks.
 
-    The restitution is `xi` for impact velocities above `speed`; for smaller velocities it follows
-    the law of viscoelastic disks.
+    If `law` is "constant", the coefficient is `xi` for all impact velocities.  Otherwise the
+    coefficient depends on the impact velocity below `speed`, and is `xi` above `speed`.
     """
 
     xi: float
@@ -118,13 +125,14 @@ class Restitution(NamedTuple):
 
     @property
     def name(self) -> float | str:
-        """The value, or a text with the law, which identifies the contact in a table."""
+        """The coefficient if it is constant; otherwise a text that names the law."""
         return self.xi if self.law == "constant" else f"{self:g}"
 
     def at(self, g: np.ndarray) -> np.ndarray:
-        """Return the restitution at normal impact velocities g, an array of any shape.
+        """Return the coefficients of restitution for an array `g` of normal impact velocities.
 
-        Ramirez et al., Phys. Rev. E 60, 4465 (1999): 1 - y + c y^2 with y ~ g^(1/5).
+        The coefficient is 1 - y + c y^2, where y is proportional to g^(1/5): see Ramirez et al.,
+        Phys. Rev. E 60, 4465 (1999).
         """
         c = {"power": 0.0, "viscoelastic": 0.6}[self.law]
         y = 2 * (1 - self.xi) / (1 + np.sqrt(1 - 4 * c * (1 - self.xi)))
@@ -134,10 +142,10 @@ class Restitution(NamedTuple):
 
 @dataclass(frozen=True)
 class Run:
-    """One run: constants as arrays, frames on demand, observables by name.
+    """The results of one run: arrays of constants, frames, and time series of observables.
 
-    `read_run` returns such an object.  T is the number of frames, N the number of disks; units are
-    those of the input.
+    `read_run` returns a `Run`.  T is the number of frames and N the number of disks.  All
+    quantities are in the units of the input file.
     """
 
     path: Path
@@ -162,17 +170,17 @@ class Run:
     _folder: object = field(default=None, kw_only=True, repr=False)  # keeps a temporary file
 
     def __repr__(self) -> str:
-        """Return one line for any number of disks."""
+        """Return a description of the run in one line."""
         kinds = ", ".join(f"{np.sum(kind.disks)} {kind.name}" for kind in self.by_species)
         frames = f"{self.n_frames} frame{'s' * (self.n_frames > 1)}, t = {span(self.time)}"
         return f"<Run {self.path}: {kinds}; {frames}>"
 
     def __len__(self) -> int:
-        """Return T, the number of frames."""
+        """Return the number of frames."""
         return len(self.time)
 
     def __getitem__(self, frame: int) -> "Frame":
-        """Return a frame; negative numbers count from the end."""
+        """Return the frame with the given number; the last frame also has the number -1."""
         if not -len(self) <= frame < len(self):
             raise NoSuchFrame(f"{self.path}: there is no frame {frame} of {len(self)}")
         return Frame(self, frame % len(self))
@@ -183,29 +191,29 @@ class Run:
 
     @property
     def n_disks(self) -> int:
-        """N, the number of disks."""
+        """Number of disks, N."""
         return len(self.mass)
 
     @property
     def n_frames(self) -> int:
-        """T, the number of frames."""
+        """Number of frames, T."""
         return len(self.time)
 
     @property
     def upper(self) -> np.ndarray:
-        """(2,) upper right corner of the box."""
+        """Coordinates (2,) of the upper right corner of the box."""
         return self.lower + self.edges
 
     @property
     def sides(self) -> list[dict[str, Any]]:
-        """The variables of each side in the input, in the order of `SIDES`."""
+        """Input variables of each side of the box, in the order of `SIDES`."""
         return [self.parameters.get("side", {}).get(name, {}) for name in SIDES]
 
     def corners_at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the corners of the box at given times.
+        """Return the corners of the box at the given times.
 
-        The corners change if sides move.  The position of a piston is interpolated between samples
-        of the observables.
+        If sides of the box move, the corners depend on time.  The position of a piston is
+        interpolated between the samples of the observables.
 
         Parameters
         ----------
@@ -233,20 +241,20 @@ class Run:
 
     @property
     def _offsets(self) -> np.ndarray:
-        """(4,) inward displacements of the initial positions of sides from the edges of the box."""
+        """Inward displacements (4,) of the sides from the edges of the box at the start."""
         ends = [end[axis] for axis in (0, 1) for end in (self.lower, self.upper)]
         starts = [side.get("position", end) for side, end in zip(self.sides, ends, strict=True)]
         return (np.array(starts, dtype=float) - ends) * [1, -1, 1, -1]
 
     @cached_property
     def piston_positions(self) -> dict[int, Series]:
-        """Time series of the positions of the pistons, by their numbers in `sides`."""
+        """Time series of the position of each piston; the keys are indices of `sides`."""
         free = [k for k, side in enumerate(self.sides) if side.get("motion") == "piston"]
         return {k: self.observable(f"sides/{SIDES[k]}/position") for k in free}
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """(2,) corners of the smallest rectangle that contains the box at all times."""
+        """Lower left and upper right corner of the area that the box covers during the run."""
         swings = np.array([outmost(side) for side in self.sides])
         swings = np.maximum(0.0, swings - self._offsets)
         for k, place in self.piston_positions.items():
@@ -256,7 +264,7 @@ class Run:
 
     @cached_property
     def by_species(self) -> tuple[Species, ...]:
-        """The species, in the order of the input file."""
+        """All species, in the order of the input file."""
         masks = [self.of_species(name) for name in self.names]
         return tuple(
             Species(name, self.mass[mask], self.radius[mask], mask)
@@ -264,7 +272,7 @@ class Run:
         )
 
     def of_species(self, name: str) -> np.ndarray:
-        """Return which disks belong to a species.
+        """Return an array that is true for the disks of the given species.
 
         Parameters
         ----------
@@ -274,7 +282,7 @@ class Run:
         Returns
         -------
         numpy.ndarray
-            (N,) mask
+            (N,) array that is true for the disks of the species
 
         Raises
         ------
@@ -291,7 +299,7 @@ class Run:
         return self.species == self.names.index(name) + 1
 
     def speed(self, frame: Index) -> np.ndarray:
-        """Return the speeds of all disks in the given frames.
+        """Return the speed of each disk in the given frames.
 
         Parameters
         ----------
@@ -332,10 +340,11 @@ class Run:
         return 0.5 * self.mass * np.sum(self.velocity[as_index(frame)] ** 2, axis=-1)
 
     def unwrapped(self, frame: Index) -> np.ndarray:
-        """Return positions that are continuous in time, without wrapping at periodic sides.
+        """Return positions that are continuous in time, also when disks cross periodic sides.
 
-        In a sheared box (Lees-Edwards boundary conditions) the upper periodic image is displaced by
-        gamma L_y t along x.
+        In a sheared box (Lees-Edwards boundary conditions) the periodic image of the box above the
+        box is displaced by gamma L_y t along x, where gamma is the shear rate and L_y the height of
+        the box.
 
         Parameters
         ----------
@@ -364,9 +373,9 @@ class Run:
         return place
 
     def displacement(self, frame: Index, origin: int = 0) -> np.ndarray:
-        """Return the distances of disks from their positions in another frame.
+        """Return the distance of each disk from its position in a reference frame.
 
-        Displacements across periodic sides are included.
+        The distances include the displacements of disks across periodic sides.
 
         Parameters
         ----------
@@ -388,7 +397,7 @@ class Run:
         return np.linalg.norm(self.unwrapped(frame) - self.unwrapped(origin), axis=-1)
 
     def per_disk(self, name: str) -> Frames:
-        """Return a quantity of each disk that only some runs contain.
+        """Return a quantity of each disk that only some output files contain.
 
         Parameters
         ----------
@@ -417,21 +426,21 @@ class Run:
 
     @property
     def angular_velocity(self) -> Frames:
-        """(T, N) angular velocities [1/time]; RunError if the disks cannot rotate."""
+        """Angular velocities (T, N) [1/time], which exist only if the disks can rotate."""
         return self.per_disk("angular_velocity")
 
     @property
     def orientation(self) -> Frames:
-        """(T, N) angles to the x axis [rad], not wrapped; RunError without a direction."""
+        """Angles (T, N) of the disks to the x axis [rad], not reduced modulo 2 pi."""
         return self.per_disk("orientation")
 
     @property
     def inertia(self) -> np.ndarray:
-        """(N,) moments of inertia."""
+        """Moments of inertia (N,) of the disks."""
         return float(self.parameter("contact", "inertia", 0.5)) * self.mass * self.radius**2
 
     def observable(self, name: str) -> Series:
-        """Return an observable with its times.
+        """Return the time series of an observable.
 
         Parameters
         ----------
@@ -460,21 +469,21 @@ class Run:
 
     @cached_property
     def _samples(self) -> int:
-        """Number of samples of each observable when the file was opened."""
+        """Number of samples of the observables, counted when the run was first read."""
         with open_file(self.path) as file:
             return committed(file, "observables")
 
     @cached_property
     def observables(self) -> tuple[str, ...]:
-        """The names of the observables."""
+        """Names of all observables in the file."""
         with open_file(self.path) as file:
             return tuple(series_in(file["observables"]))
 
     def to_dataframe(self) -> "pandas.DataFrame":
-        """Return the observables as a DataFrame of pandas, with a row for each sample.
+        """Return the observables as a pandas DataFrame, which has one row for each sample.
 
-        The index is the time.  Columns have the names of the observables, such as
-        `all/kinetic_energy`; vectors and tensors have a column for each component, such as
+        The index of the table is the time.  The columns have the names of the observables, such as
+        `all/kinetic_energy`.  Each component of a vector or tensor has its own column, such as
         `momentum_x` or `virial_tensor_xy`.
 
         Returns
@@ -510,10 +519,11 @@ class Run:
         return pandas.DataFrame(columns, index=pandas.Index(time, name="time"))
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return the frames as a Dataset of xarray, which must be installed.
+        """Return the frames as an xarray Dataset; the package xarray must be installed.
 
-        The dimensions are time, disk and component ("x", "y").  The Dataset contains all quantities
-        of the frames, mass, radius and species; its `attrs` contain path and seed.
+        The dimensions are "time", "disk" and "component" ("x" and "y").  The variables are all
+        quantities of the frames, and the mass, radius and species of each disk.  The attributes are
+        the path of the file and the seed.
 
         Returns
         -------
@@ -549,7 +559,7 @@ class Run:
         return xarray.Dataset(data, axes, {"path": str(self.path), "seed": self.seed})
 
     def event_log(self) -> EventLog:
-        """Return the event log: events (collisions of any kind) in chronological order.
+        """Return all collisions of disks with each other and with boundaries, in order of time.
 
         Returns
         -------
@@ -586,15 +596,15 @@ class Run:
 
     @cached_property
     def collisions_per_disk(self) -> Series:
-        """2 C / N at the times of observables, where C is the number of pair collisions so far."""
+        """Mean number of collisions of each disk with other disks, as a function of time."""
         time, collisions = self.observable("collisions")
         return Series(time, 2 * collisions / self.n_disks)
 
     def collisions_per_disk_at(self, time: np.ndarray) -> np.ndarray:
-        """Return the number of pair collisions per disk at given times, by interpolation.
+        """Return the mean number of collisions with other disks per disk at the given times.
 
-        If frames are more frequent than samples of the observables, the numbers of events in the
-        frames are used for the interpolation between these samples.
+        The number is interpolated between the samples of the observables.  If the file has more
+        frames than such samples, the interpolation also uses the event counts of the frames.
 
         Parameters
         ----------
@@ -604,7 +614,7 @@ class Run:
         Returns
         -------
         numpy.ndarray
-            (...) collisions of two disks per disk since the start
+            (...) mean number of collisions per disk since the start
 
         Examples
         --------
@@ -624,17 +634,18 @@ class Run:
 
     @cached_property
     def events_per_disk(self) -> np.ndarray:
-        """(T,) events per disk since the start at the times of frames."""
+        """Mean number (T,) of events per disk between the start and each frame."""
         if self.event_count is None:
             raise RunError(f"{self.path}: has no event_count in its frames")
         return np.array([self.event_count[k].mean() for k in range(self.n_frames)])
 
     def accessible_area(self, time: float | np.ndarray) -> np.ndarray:
-        """Return the accessible area at given times: the area of the box without its obstacles.
+        """Return the area of the box minus the area of its obstacles at the given times.
 
-        If disks are in a round container, the accessible area is the area of the container.  Sides
-        that move at constant velocity and pistons are at their positions at the given time.
-        Oscillating sides are at their mean positions, as in the pressure that the program writes.
+        If the disks are in a round container, the accessible area is the area of the container.
+        For pistons and for sides that move at constant velocity, the area depends on their
+        positions at the given times.  For oscillating sides, the area is calculated from their mean
+        positions, as in the pressure that the program writes.
 
         Parameters
         ----------
@@ -662,11 +673,12 @@ class Run:
         return area
 
     def pressure(self, t1: float, t2: float) -> float:
-        """Return the mean pressure between two times, which are rounded to the nearest samples.
+        """Return the mean pressure between the two samples closest in time to `t1` and `t2`.
 
-        The pressure is (<K> + dW / 2 dt) / <A>, where K is the kinetic energy relative to the flow
-        of a sheared box, W the virial, A the accessible area.  Means over time are computed with
-        the trapezoidal rule.
+        The pressure is (<K> + dW / (2 dt)) / <A>, where K is the kinetic energy, W the accumulated
+        virial, dt the time between the two samples, and A the accessible area.  In a sheared box, K
+        is the kinetic energy relative to the mean flow.  Averages over time are calculated with the
+        trapezoidal rule.
 
         Parameters
         ----------
@@ -698,11 +710,12 @@ class Run:
         return float((self.n_disks * time_mean(time, kinetic) + virial / (2 * duration)) / area)
 
     def pressure_tensor(self, t1: float, t2: float) -> np.ndarray:
-        """Return the mean pressure tensor (2, 2) between two times, rounded to the nearest samples.
+        """Return the mean pressure tensor between the samples closest in time to `t1` and `t2`.
 
-        The tensor is (<sum of m v_a v_b> + dW_ab / dt) / <A>, where W is the virial tensor.  The
-        trace of the pressure tensor is twice the `pressure`.  Some runs contain the virial tensor
-        only with `output.virial_tensor = .true.`.
+        The component ab of the tensor is (<sum of m v_a v_b> + dW_ab / dt) / <A>, where W is the
+        accumulated virial tensor, dt the time between the samples, and A the accessible area.  The
+        trace of the pressure tensor is twice the pressure.  The output file contains the virial
+        tensor if the input has `output.virial_tensor = .true.`, and in some other cases.
 
         Parameters
         ----------
@@ -732,7 +745,7 @@ class Run:
         return ((time_mean(time, kinetic) + virial / duration) / area).reshape(2, 2)
 
     def _between(self, name: str, t1: float, t2: float) -> Series:
-        """Return the samples of an observable from the nearest to t1 to the nearest to t2."""
+        """Return the samples of an observable between the samples nearest to `t1` and `t2`."""
         time, value = self.observable(name)
         first, last = (int(np.argmin(np.abs(time - t))) for t in (t1, t2))
         if not time[first] < time[last]:
@@ -743,14 +756,14 @@ class Run:
         return Series(time[first : last + 1], value[first : last + 1])
 
     def parameter(self, group: str, variable: str, default: Any = None) -> Any:
-        """Return the value of an input variable that was used in the run.
+        """Return the value of an input variable in this run, which may be its default.
 
         Parameters
         ----------
         group, variable : str
             names in the input, such as "contact" and "restitution"
         default : object
-            result if the variable has no value
+            value to return if the variable has no value
 
         Returns
         -------
@@ -766,12 +779,18 @@ class Run:
 
     @property
     def restitution(self) -> float:
-        """Restitution of collisions of two disks; NaN if it depends on species or velocity."""
+        """Coefficient of restitution of two disks.
+
+        The value is NaN if the coefficient depends on the species or on the velocity of the disks.
+        """
         return self.contact_law.xi if self.contact_law.law == "constant" else np.nan
 
     @property
     def contact_law(self) -> Restitution:
-        """Restitution of two disks, with its law; NaN if it depends on the species."""
+        """Coefficient of restitution of two disks, and its dependence on the velocity.
+
+        The coefficient is NaN if it depends on the species.
+        """
         contact = self.parameters.get("contact", {})
         values = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
         xi = float(values[0]) if len(values) == 1 else float("nan")
@@ -787,7 +806,7 @@ class Run:
 
     @cached_property
     def nature(self) -> Nature:
-        """The traits of the run: see `ricochet.nature`."""
+        """Traits of the run, which determine the theories that apply to the run."""
         lost = self.observable("dissipated_energy").value[-1]
         most = self.n_disks * self.observable("all/kinetic_energy").value[[0, -1]].max()
         return nature_of(
@@ -801,7 +820,7 @@ class Run:
 
     @property
     def termination_note(self) -> str:
-        """Reason why the run did not end by a stop rule; empty if it did."""
+        """Reason why the run ended early; empty if a stop rule ended the run."""
         note = "".join(filter(str.isprintable, str(self.provenance.get("note", ""))))
         if self.path.suffix != ".part":
             early = ":" if note.startswith("an inelastic collapse occurred") else " ended early:"
@@ -816,27 +835,27 @@ class Run:
 
     @property
     def shear_rate(self) -> float:
-        """Gradient along y of the x velocity; 0 unless the box is sheared."""
+        """Gradient along y of the mean velocity along x; 0 unless the box is sheared."""
         return float(self.parameter("box", "shear_rate", 0.0))
 
     @property
     def gravity(self) -> np.ndarray:
-        """(2,) acceleration by gravity."""
+        """Gravitational acceleration (2,)."""
         return np.asarray(self.parameter("box", "gravity", (0.0, 0.0)), dtype=float)
 
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame of a run; its arrays are read from the file on demand.
+    """One frame of a run, whose arrays are read from the file on demand.
 
-    `for frame in run` yields all frames, `run[-1]` is the last one.
+    A loop `for frame in run` visits all frames, and `run[-1]` is the last frame.
 
     Parameters
     ----------
     run : Run
         the run
     index : int
-        number of the frame, from 0
+        number of the frame; the first frame has the number 0
 
     Examples
     --------
@@ -857,21 +876,21 @@ class Frame:
 
     @property
     def position(self) -> np.ndarray:
-        """(N, 2) positions [length]."""
+        """Positions (N, 2) of the disks [length]."""
         return self.run.position[self.index]
 
     @property
     def velocity(self) -> np.ndarray:
-        """(N, 2) velocities [length/time]."""
+        """Velocities (N, 2) of the disks [length/time]."""
         return self.run.velocity[self.index]
 
     @property
     def speed(self) -> np.ndarray:
-        """(N,) speeds [length/time]."""
+        """Speeds (N,) of the disks [length/time]."""
         return self.run.speed(self.index)
 
     def per_disk(self, name: str) -> np.ndarray:
-        """Return a quantity of each disk that only some runs contain; see `Run.per_disk`."""
+        """Return a quantity of each disk in this frame; see `Run.per_disk`."""
         return self.run.per_disk(name)[self.index]
 
 
@@ -902,7 +921,10 @@ def read_run(path: str | Path) -> Run:
 
 
 def open_run(path: Path, folder: object = None) -> Run:
-    """Open the output file of a run; `folder` lives as long as anything that reads the file."""
+    """Open the output file of a run.
+
+    If `folder` is given, every object that reads the file later keeps a reference to `folder`.
+    """
     with open_file(path) as file:
         if DISKS not in file or "h5md" not in file:
             raise Unsound("an HDF5 file, but not of a Ricochet run")
@@ -913,7 +935,7 @@ def open_run(path: Path, folder: object = None) -> Run:
 
 
 def run_of(path: Path, file: h5py.File, folder: object = None) -> Run:
-    """Return the run that an open file contains."""
+    """Return the run that is stored in an open HDF5 file."""
     disks, count = file[DISKS], committed(file, DISKS)
     if {"pressure", "wall_collisions"} & set(file["observables"]):
         old = "was written by an earlier version of Ricochet, with other names"
@@ -953,14 +975,22 @@ def run_of(path: Path, file: h5py.File, folder: object = None) -> Run:
 
 
 def outmost(side: Mapping[str, Any]) -> float:
-    """Return the largest outward displacement of a side from its mean position [length]."""
+    """Return the largest outward displacement of a side during the run [length].
+
+    The reference is the mean position of an oscillating side, or the initial position of a side
+    that moves at constant velocity.
+    """
     if side.get("motion") == "constant_velocity":
         return max(0.0, -float(side["velocity"]) * float(side["end_time"] - side["start_time"]))
     return float(side["amplitude"]) if side.get("motion") in ("sine", "parabolic") else 0.0
 
 
 def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
-    """Return the inward displacement of a side from its mean position; see docs/theory.md."""
+    """Return the inward displacement of a moving side at the given times.
+
+    The reference is the mean position of an oscillating side, or the initial position of a side
+    that moves at constant velocity.  The formulae are in docs/theory.md.
+    """
     if side.get("motion") == "constant_velocity":
         start, end = side["start_time"], side["end_time"]
         return side["velocity"] * (np.clip(time, start, end) - start)
@@ -973,18 +1003,18 @@ def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
 
 
 def time_mean(time: np.ndarray, value: np.ndarray) -> np.ndarray:
-    """Average samples (T, ...) over time with the trapezoidal rule."""
+    """Return the time average of samples (T, ...), calculated with the trapezoidal rule."""
     return np.trapezoid(value, time, axis=0) / (time[-1] - time[0])
 
 
 def span(values: np.ndarray) -> str:
-    """Return the common value of an array as text, or its smallest and largest value."""
+    """Return the smallest and largest value as text, or one value if all values are equal."""
     ends = (f"{values.min():g}", f"{values.max():g}")
     return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 
 def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
-    """Yield the names of the time series in a group and in its subgroups."""
+    """Yield the names of all time series in an HDF5 group and in its subgroups."""
     for name, item in group.items():
         if isinstance(item, h5py.Group):
             if "value" in item:
@@ -994,7 +1024,7 @@ def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
 
 
 def series_of(file: h5py.File, name: str, count: int) -> Series:
-    """Return the first `count` samples of an observable of an open file."""
+    """Return the first `count` samples of an observable in an open HDF5 file."""
     if f"observables/{name}/value" not in file:
         near = did_you_mean(name, series_in(file["observables"]))
         raise Unsound(f"has no observable '{name}'{near}")
@@ -1005,12 +1035,18 @@ def series_of(file: h5py.File, name: str, count: int) -> Series:
 
 
 def committed(file: h5py.File, group: str) -> int:
-    """Return the number of valid samples of a group; an unfinished file is allocated in advance."""
+    """Return the number of samples in a group that have been written completely.
+
+    An unfinished file has space for further samples, which are not valid.
+    """
     return int(file[group]["committed"][()])
 
 
 def rows(data: h5py.Dataset, count: int | None = None) -> np.ndarray:
-    """Return the first rows of a dataset [all], with floating-point numbers in double precision."""
+    """Return the first `count` rows of a dataset, or all rows if `count` is None.
+
+    Floating-point numbers are converted to double precision.
+    """
     values = data[:count]
     if count is not None and len(values) < count:
         raise Unsound(f"{data.name} holds {len(values)} of {count} samples")
@@ -1018,7 +1054,7 @@ def rows(data: h5py.Dataset, count: int | None = None) -> np.ndarray:
 
 
 def obstacles_of(parameters: Mapping[str, Any]) -> tuple[Obstacle, ...]:
-    """Return the circular obstacles, in the order of their codes in the event log."""
+    """Return all circular obstacles, in the order of their numbers in the event log."""
     groups = parameters.get("obstacle", {})
     if "inside" not in groups:
         return ()
@@ -1029,13 +1065,13 @@ def obstacles_of(parameters: Mapping[str, Any]) -> tuple[Obstacle, ...]:
 
 
 def walls_of(parameters: Mapping[str, Any], group: str = "wall") -> np.ndarray:
-    """Return the straight walls (W, 2, 2), in the order of their codes in the event log."""
+    """Return the end points (W, 2, 2) of the W straight walls, in the order of the event log."""
     rows = parameters.get(f"{group}_rows", parameters.get(group))
     return np.stack([rows["from"], rows["to"]], axis=1) if rows else np.empty((0, 2, 2))
 
 
 def groups_of_rows(parameters: Mapping[str, Any], name: str) -> np.ndarray:
-    """Return the number (W,), from 0, of the group to which each obstacle belongs."""
+    """Return for each obstacle the index (W,) of its `&obstacle` group in the input file."""
     rows = parameters.get(f"{name}_rows")
     if rows:
         return np.asarray(rows["group"]) - 1
