@@ -1,1 +1,1 @@
-"""Theoretical formulas for comparison with measured values; none of them reads a run."""
+"""Theoretical formulas for comparison with measured values; the formulas do not read runs."""

@@ -1,7 +1,8 @@
 """Published results for hard disks: equation of state, collision rates, cooling, diffusion.
 
-eta = packing fraction, n = disks per area, s = diameter, m = mass, w = pair collisions per disk and
-time, chi = pair correlation at contact, Z = P / (n kT).
+In this module, eta is the packing fraction, n the number of disks per area, s the diameter, m the
+mass, w the number of pair collisions per disk and time, and chi the pair correlation function at
+contact.  The compressibility factor is Z = P / (n kT).
 """
 
 import math
@@ -33,26 +34,30 @@ __all__ = [
 ]
 
 CLOSE_PACKING = math.pi / math.sqrt(12)
-# Simulations: up to 0.5 the equation of state of Kolafa and Rottner, Mol. Phys. 104, 3435 (2006);
-# above 0.5 Erpenbeck and Luban, Phys. Rev. A 32, 2920 (1985).
+# Packing fractions and Z of the fluid, from published simulations. The values up to the packing
+# fraction 0.5 are from Kolafa and Rottner, Molecular Physics 104, 3435 (2006), and the values above
+# 0.5 from Erpenbeck and Luban, Physical Review A 32, 2920 (1985).
 FLUID = np.array([
     (0.05, 1.10839), (0.10, 1.23614), (0.15, 1.38804), (0.20, 1.57037), (0.25, 1.79159),
     (0.30, 2.06326), (0.35, 2.40150), (0.40, 2.82933), (0.45, 3.38054), (0.50, 4.10636),
     (CLOSE_PACKING / 1.6, 5.4963), (CLOSE_PACKING / 1.5, 6.6074), (CLOSE_PACKING / 1.4, 8.306),
 ])  # fmt: skip
-# Up to freezing at 0.698 no published values are known. These values were computed with this
-# program from two runs of 8000 disks and 1000 collisions per disk at each packing fraction, with
-# errors below 0.1 %; the last value is that of 1024^2 disks in `MELTING`.
+# No published values are known between the packing fraction 0.648 and freezing at 0.698. These
+# values of Z were computed with Ricochet from two runs of 8000 disks and 1000 collisions per disk
+# at each packing fraction, with errors below 0.1 %. The last value is that of 1024^2 disks in
+# `MELTING`.
 FREEZING = np.array([
     (0.66, 8.875), (0.67, 9.350), (0.68, 9.839), (0.69, 10.234),
     (0.698, 9.16934 * math.pi / 4 / 0.698),
 ])  # fmt: skip
-# Z_N = Z + c / N in a periodic box, at the first ten packing fractions.
+# Coefficient c of the equation Z_N = Z + c / N for N disks in a periodic box, at the first ten
+# packing fractions of `FLUID`.
 SHIFT = np.array(
     [-0.1036, -0.2152, -0.3361, -0.4680, -0.6131, -0.7741, -0.9549, -1.1605, -1.3981, -1.6776]
 )
-# P d^2 / kT near melting, periodic boxes: Li et al., J. Chem. Phys. 157, 234111 (2022), for 128^2;
-# Engel et al., Phys. Rev. E 87, 042134 (2013).
+# Packing fractions and P d^2 / kT near melting in periodic boxes, where d is the diameter. The
+# values for 128^2 disks are from Li et al., Journal of Chemical Physics 157, 234111 (2022). The
+# values for 256^2 and 1024^2 disks are from Engel et al., Physical Review E 87, 042134 (2013).
 MELTING = {
     "128² disks, Li et al. 2022": [
         (0.698, 9.1741), (0.704, 9.1856), (0.708, 9.1763), (0.712, 9.1655),
@@ -73,7 +78,10 @@ MELTING = {
 
 @cache
 def splines() -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
-    """Return splines of Z (1 - eta)^2, which is smooth and close to 1, and of c."""
+    """Return splines of Z (1 - eta)^2 and of the coefficient c of Z_N = Z + c / N.
+
+    The product Z (1 - eta)^2 is interpolated instead of Z, because it is smooth and close to 1.
+    """
     eta, z = np.concatenate([FLUID, FREEZING]).T
     smooth = scipy.interpolate.CubicSpline(np.append(0, eta), np.append(1, z * (1 - eta) ** 2))
     return smooth, scipy.interpolate.CubicSpline(
@@ -84,7 +92,7 @@ def splines() -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
 def henderson(eta: Number) -> Number:
     """Return Henderson's compressibility factor Z = P / (n kT) of the fluid.
 
-    D. Henderson, Mol. Phys. 30, 971 (1975).
+    The formula is from Henderson, Molecular Physics 30, 971 (1975).
 
     Parameters
     ----------
@@ -107,7 +115,8 @@ def henderson(eta: Number) -> Number:
 def simulated(eta: ArrayLike) -> np.ndarray:
     """Return Z = P / (n kT) of the fluid, interpolated between simulations.
 
-    The simulations are published, except for those between the packing fractions 0.648 and 0.698.
+    The simulations are published, except for the simulations at packing fractions between 0.648 and
+    0.698.
 
     Parameters
     ----------
@@ -117,7 +126,7 @@ def simulated(eta: ArrayLike) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        (...) Z; NaN above 0.698, where the fluid freezes
+        (...) Z, or NaN above 0.698, where the fluid freezes
 
     Examples
     --------
@@ -129,7 +138,7 @@ def simulated(eta: ArrayLike) -> np.ndarray:
 
 
 def simulated_finite(eta: ArrayLike, count: int) -> np.ndarray:
-    """Return Z = P / (n kT) of a fluid of finitely many disks in a periodic box.
+    """Return Z = P / (n kT) of a fluid of `count` disks in a periodic box.
 
     Parameters
     ----------
@@ -154,7 +163,7 @@ def simulated_finite(eta: ArrayLike, count: int) -> np.ndarray:
 def crystal(eta: Number, count: float = math.inf) -> Number:
     """Return Z = P / (n kT) of the crystal.
 
-    Alder, Hoover and Young, J. Chem. Phys. 49, 3688 (1968).
+    The formula is from Alder, Hoover and Young, Journal of Chemical Physics 49, 3688 (1968).
 
     Parameters
     ----------
@@ -181,16 +190,17 @@ def crystal(eta: Number, count: float = math.inf) -> Number:
 def adiabat(
     widths: np.ndarray, height: float, count: int, radius: float, walled: bool
 ) -> np.ndarray:
-    """Return T at the widths (W,) between two walls, one of which moves slowly.
+    """Return temperatures (W,) of a gas between two walls, one of which moves slowly.
 
-    T is divided by its value at the first width.
-
-    If `walled` is true, the other two sides are walls, too.  Otherwise the momentum along the
-    moving wall is conserved, and the kinetic energy is (N - 1/2) kT instead of N kT.  The change of
-    the kinetic energy is -F dw, where the force F on the side is P h minus the tension of the two
-    walls parallel to the motion.  According to scaled particle theory a wall has the tension kT n r
-    / (1 - eta) and a deficit of n r (1 - eta) / (1 + eta) disks per length: Helfand, Frisch and
-    Lebowitz, J. Chem. Phys. 34, 1037 (1961).  P follows from `simulated`.
+    `widths` (W,) are the distances of the two walls.  The temperatures are divided by the
+    temperature at the first width.  If `walled` is true, the two sides parallel to the motion are
+    walls, too.  If `walled` is false, the momentum along the moving wall is conserved, and the
+    kinetic energy is (N - 1/2) kT instead of N kT.  A change dw of the width changes the kinetic
+    energy by -F dw.  The force F on the moving wall is P h minus the tension of the two walls
+    parallel to the motion, where h is the height.  The pressure P follows from `simulated`.
+    According to scaled particle theory a wall has the tension kT n r / (1 - eta) and a deficit of n
+    r (1 - eta) / (1 + eta) disks per length (Helfand, Frisch and Lebowitz, Journal of Chemical
+    Physics 34, 1037 (1961)).
     """
     area = count * math.pi * radius**2
     eta = np.geomspace(1e-12, FREEZING[-1, 0], 50001)  # far from the walls
@@ -218,7 +228,8 @@ def published(eta: float, count: int, periodic: bool) -> float:
     Returns
     -------
     float
-        Z of the fluid up to 0.648 and of the crystal from 0.72 on; NaN between
+        Z of the fluid for packing fractions up to 0.648, Z of the crystal from 0.72, and NaN
+        between 0.648 and 0.72
 
     Examples
     --------
@@ -233,10 +244,12 @@ def published(eta: float, count: int, periodic: bool) -> float:
 
 
 def of_sizes(z: np.ndarray, eta: np.ndarray, alike: float) -> np.ndarray:
-    """Return Z of a fluid of many radii from Z of equal disks; `alike` is <r>^2 / <r^2>.
+    """Return Z of a fluid of disks with different radii r from Z of equal disks.
 
-    Santos, Yuste and Lopez de Haro, Mol. Phys. 96, 1 (1999): the second virial coefficient is
-    exact, and if Z of equal disks is that of scaled particle theory, so is the result.
+    The argument `alike` is <r>^2 / <r^2>.  The formula is from Santos, Yuste and Lopez de Haro,
+    Molecular Physics 96, 1 (1999).  The second virial coefficient of the result is exact.  If Z of
+    equal disks is from scaled particle theory, the result is Z of the mixture in scaled particle
+    theory.
     """
     return (1 - alike) / (1 - eta) + alike * z
 
@@ -290,15 +303,16 @@ def collision_rate(
     >>> round(hard_disks.collision_rate(2.0, 1.0, 1e4), 3)
     2.257
     """
-    # Mean relative speed at fixed energy, over the mean relative speed for Maxwell's distribution.
+    # c_n is the mean relative speed at fixed energy, divided by that of Maxwell's distribution.
     c_n = math.exp(math.lgamma(free) - math.lgamma(free + 0.5)) * math.sqrt(free)
     return 4 * (z - 1) * c_n / (math.sqrt(math.pi) * diameter) * math.sqrt(kt / mass)
 
 
 def haff_rate(xi: float) -> float:
-    """Return the cooling rate -d ln K / d tau of the homogeneous state.
+    """Return the cooling rate -d ln K / d tau of a homogeneous gas.
 
-    a2 is that of van Noije and Ernst, Granular Matter 1, 57 (1998).
+    K is the kinetic energy and tau the number of collisions per disk.  The second Sonine
+    coefficient a2 is from van Noije and Ernst, Granular Matter 1, 57 (1998).
 
     Parameters
     ----------
@@ -308,7 +322,7 @@ def haff_rate(xi: float) -> float:
     Returns
     -------
     float
-        rate per collision per disk
+        cooling rate per unit of tau
 
     Examples
     --------
@@ -320,7 +334,7 @@ def haff_rate(xi: float) -> float:
 
 
 def haff_by_collisions(tau: np.ndarray, xi: float) -> np.ndarray:
-    """Return K / K0 in the homogeneous state against collisions per disk.
+    """Return the energy of a homogeneous cooling gas as a function of collisions per disk.
 
     Parameters
     ----------
@@ -343,9 +357,9 @@ def haff_by_collisions(tau: np.ndarray, xi: float) -> np.ndarray:
 
 
 def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
-    """Return K / K0 in the homogeneous state against time.
+    """Return the energy of a homogeneous cooling gas as a function of time.
 
-    P. K. Haff, J. Fluid Mech. 134, 401 (1983).
+    The formula is from Haff, Journal of Fluid Mechanics 134, 401 (1983).
 
     Parameters
     ----------
@@ -368,10 +382,12 @@ def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
 
 
 def haff_soft(law: Restitution, thermal: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return w0 t, collisions per disk and K / K0 of viscoelastic disks with Maxwell's velocities.
+    """Return w0 t, collisions per disk and K / K0 of a cooling gas of viscoelastic disks.
 
-    `thermal` is the initial sqrt(kT/m).  For relative normal speeds g of colliding disks, u = m g^2
-    / 4 kT has an exponential distribution.
+    w0 is the initial collision rate, t the time, K the kinetic energy and K0 its initial value.
+    The velocities have Maxwell's distribution.  If g is the relative normal speed of colliding
+    disks, u = m g^2 / 4 kT therefore has an exponential distribution.  The argument `thermal` is
+    the initial sqrt(kT/m).
     """
     k, u = np.geomspace(1, 1e-26, 1000), np.linspace(0, 40, 2001)
     g = 2 * thermal * np.sqrt(k[:, None] * u)
@@ -386,7 +402,8 @@ def noise_temperature(
 ) -> float:
     """Return the temperature at which dissipation balances white-noise driving.
 
-    Van Noije and Ernst, Granular Matter 1, 57 (1998), for Maxwell's velocities and Henderson's chi.
+    The formula is from van Noije and Ernst, Granular Matter 1, 57 (1998), for velocities with
+    Maxwell's distribution and for chi from Henderson's equation of state.
 
     Parameters
     ----------
@@ -416,19 +433,21 @@ def noise_temperature(
 
 
 def speed_of_sound(eta: float, kt: float = 1.0, mass: float = 1.0) -> float:
-    """Return the adiabatic speed of sound of the fluid, c^2 = (d(eta Z)/d eta + Z^2) kT / m.
+    """Return the adiabatic speed of sound c of the fluid.
+
+    The speed follows from c^2 = (d(eta Z)/d eta + Z^2) kT / m with Henderson's formula for Z.
 
     Parameters
     ----------
     eta : float
-        packing fraction; Z follows from Henderson's formula
+        packing fraction
     kt, mass : float
         temperature and mass of a disk
 
     Returns
     -------
     float
-        c [velocity]
+        speed of sound [velocity]
 
     Examples
     --------
@@ -445,8 +464,9 @@ def enskog(
 ) -> dict[str, float]:
     """Return the transport coefficients of Enskog's theory.
 
-    D. M. Gass, J. Chem. Phys. 54, 1898 (1971).  The bulk viscosity is purely collisional.  D is the
-    first Sonine approximation.
+    The formulas are from Gass, Journal of Chemical Physics 54, 1898 (1971).  Only collisions
+    contribute to the bulk viscosity.  The diffusion coefficient D is in the first Sonine
+    approximation.
 
     Parameters
     ----------
@@ -479,10 +499,12 @@ def enskog(
 
 
 def contact_values(z: float, density: np.ndarray, diameter: np.ndarray) -> np.ndarray:
-    """Return chi_ij of a mixture (S,) from Z of equal disks, accurate to a percent.
+    """Return the pair correlations at contact (S, S) of a mixture of S species.
 
-    Jenkins and Mancini, J. Appl. Mech. 54, 27 (1987), with an improved chi of equal disks as in
-    Santos, Yuste and Lopez de Haro, J. Chem. Phys. 117, 5785 (2002).
+    The error of these values is about 1 %.  The argument `z` is Z of equal disks with the packing
+    fraction of the mixture.  The formula is from Jenkins and Mancini, Journal of Applied Mechanics
+    54, 27 (1987).  As in Santos, Yuste and Lopez de Haro, Journal of Chemical Physics 117, 5785
+    (2002), the formula is used with an improved chi of equal disks, which follows from `z`.
     """
     eta = math.pi / 4 * np.sum(density * diameter**2)
     mean = np.sum(density * diameter) / np.sum(density * diameter**2)
@@ -493,12 +515,13 @@ def contact_values(z: float, density: np.ndarray, diameter: np.ndarray) -> np.nd
 def enskog_mixture(
     z: float, density: np.ndarray, diameter: np.ndarray, mass: np.ndarray, kt: float = 1.0
 ) -> dict[str, float]:
-    """Return viscosities of a mixture (S,), and the decay time of the fluxes ("memory").
+    """Return viscosities of a mixture of S species, and the decay time "memory" of the fluxes.
 
-    Enskog's theory in first Sonine approximation, as in Lopez de Haro, Cohen and Kincaid, J. Chem.
-    Phys. 78, 2746 (1983), here in two dimensions.  The kinetic parts are multiplied by 1.022, the
-    correction by higher approximations for equal disks.  The bulk viscosity includes the difference
-    of the species' temperatures during an expansion.
+    The formulas are those of Enskog's theory in the first Sonine approximation, as in Lopez de
+    Haro, Cohen and Kincaid, Journal of Chemical Physics 78, 2746 (1983), but in two dimensions.
+    The kinetic parts are multiplied by 1.022, which is the correction from higher approximations
+    for equal disks.  The bulk viscosity includes the effect of different temperatures of the
+    species during an expansion.
     """
     total, pair = mass[:, None] + mass, (diameter[:, None] + diameter) / 2
     reduced = mass[:, None] * mass / total
@@ -524,7 +547,7 @@ def long_time_tail(
 ) -> np.ndarray:
     """Return the long-time tail of the velocity autocorrelation from mode-coupling theory.
 
-    J. R. Dorfman and E. G. D. Cohen, Phys. Rev. Lett. 25, 1257 (1970).
+    The formula is from Dorfman and Cohen, Physical Review Letters 25, 1257 (1970).
 
     Parameters
     ----------
@@ -538,7 +561,7 @@ def long_time_tail(
     Returns
     -------
     numpy.ndarray
-        (T,) <v(0) v(t)> / <v^2>
+        (T,) velocity autocorrelation <v(0) v(t)> / <v^2>
 
     Examples
     --------

@@ -20,23 +20,25 @@ __all__ = [
     "scattering_angle",
 ]
 
-#: A distribution function, or a probability density.
+#: Type of a distribution function or of a probability density.
 Law = Callable[[np.ndarray], np.ndarray]
 
-# Monte Carlo solutions of the Boltzmann equation for a dilute gas of hard disks (10^6 disks) that
-# start with equal speeds: (collisions per disk, excess kurtosis a2).
+# Relaxation of a dilute gas of disks that start with equal speeds, from Monte Carlo solutions of
+# the Boltzmann equation with 10^6 disks. Each point contains the number of collisions per disk and
+# the second Sonine coefficient a2.
 RELAXATION = np.transpose(
     [(0, 1, 2, 3, 4, 5, 6, 8), (-0.5, -0.370, -0.264, -0.184, -0.125, -0.0855, -0.0565, -0.025)]
 )
-# The same for a mixture of half m and half 4 m: (collisions per disk, temperature ratio heavy /
-# light).
+# Relaxation of a dilute mixture, from Monte Carlo solutions of the Boltzmann equation: half of the
+# disks have the mass m, and half the mass 4 m. Each point contains the number of collisions per
+# disk and the temperature of the heavy disks divided by that of the light disks.
 EQUIPARTITION = np.transpose(
     [(0, 1, 2, 3, 4, 5, 6, 8), (4, 2.02, 1.455, 1.228, 1.115, 1.062, 1.031, 1.005)]
 )
 
 
 def maxwell_pdf(u: np.ndarray) -> np.ndarray:
-    """Return the density of the reduced speed u = v / sqrt(2 kT / m) in equilibrium.
+    """Return the probability density of the reduced speed u = v / sqrt(2 kT / m) in equilibrium.
 
     Parameters
     ----------
@@ -80,8 +82,9 @@ def maxwell_cdf(u: np.ndarray) -> np.ndarray:
 def finite_n_cdf(count: int, periodic: bool = False) -> Law:
     """Return the exact distribution function of the reduced speed of disks with fixed total energy.
 
-    Between walls K/E has the distribution Beta(1, N-1) for any masses.  In a periodic box of equal
-    disks with total momentum 0, K N / (E (N-1)) has the distribution Beta(1, N-2).
+    Let K be the kinetic energy of a disk, E the total energy, and N the number of disks.  Between
+    walls, K / E has the distribution Beta(1, N - 1) for any masses.  In a periodic box of equal
+    disks with total momentum 0, K N / (E (N - 1)) has the distribution Beta(1, N - 2).
 
     Parameters
     ----------
@@ -106,10 +109,10 @@ def finite_n_cdf(count: int, periodic: bool = False) -> Law:
 
 
 def path_density(x: np.ndarray) -> np.ndarray:
-    """Return the density of free paths under molecular chaos.
+    """Return the probability density of the lengths of free paths under molecular chaos.
 
-    The collision rate nu(v) of a disk of speed v, divided by its mean w, follows from the mean
-    relative speed of such a disk in a gas with Maxwell's velocities.
+    The collision rate nu(v) of a disk with the speed v is proportional to the mean relative speed
+    between this disk and a gas with Maxwell's distribution of velocities.
 
     Parameters
     ----------
@@ -167,18 +170,20 @@ def scattering_angle(
     return np.arctan2(2 * kappa * b * cosine, 1 - 2 * kappa * cosine**2)
 
 
-# Steady T_rot / T of cooling rough disks with the moment of inertia m r^2 / 2 and without a Coulomb
-# limit, from direct simulations of the Boltzmann equation (10^5 disks, errors 0.002): (xi, beta) ->
-# ratio.
+# Steady temperature ratio T_rot / T of cooling rough disks for pairs (xi, beta) of normal and
+# tangential restitution. The disks have the moment of inertia m r^2 / 2 and no Coulomb limit. The
+# ratios are from direct simulations of the Boltzmann equation with 10^5 disks and have errors of
+# 0.002.
 ROUGH_RATIOS = {(0.9, 0.0): 0.4439, (0.9, 0.8): 1.0055, (0.85, 0.3): 0.708}
 
 
 def rough_rates(xi: float, beta: float, inertia: float) -> tuple[float, float, float]:
-    """Return the rates A, B, C of the temperatures of rough disks with Maxwell's velocities.
+    """Return the coefficients A, B and C of the equations for the temperatures of rough disks.
 
-    dT/ds = -2 (A T - B R) and dR/ds = 4 (B T - C R) per collision of a disk, with T = m <v^2> / 2
-    and R = I <omega^2>; Luding, Huthmann, McNamara and Zippelius, Phys. Rev. E 57, 3416 (1998).
-    `inertia` is the moment of inertia I divided by m r^2.
+    The temperatures T = m <v^2> / 2 and R = I <omega^2> satisfy dT/ds = -2 (A T - B R) and dR/ds =
+    4 (B T - C R), where s is the number of collisions per disk.  The velocities have Maxwell's
+    distribution.  The equations are from Luding, Huthmann, McNamara and Zippelius, Physical Review
+    E 57, 3416 (1998).  The argument `inertia` is the moment of inertia I divided by m r^2.
     """
     eta = inertia * (1 + beta) / (2 * inertia + 2)
     a = (1 - xi**2) / 4 + eta * (1 - eta) / 2
@@ -186,10 +191,10 @@ def rough_rates(xi: float, beta: float, inertia: float) -> tuple[float, float, f
 
 
 def rough_ratio(xi: float, beta: float, inertia: float) -> float:
-    """Return the ratio R / T that the two temperatures of cooling rough disks approach.
+    """Return the limit of the ratio R / T of the two temperatures of cooling rough disks.
 
-    Luding, Huthmann, McNamara and Zippelius, Phys. Rev. E 57, 3416 (1998), for Maxwell's
-    velocities.
+    The equations for the temperatures are from Luding, Huthmann, McNamara and Zippelius, Physical
+    Review E 57, 3416 (1998), for velocities with Maxwell's distribution.
 
     Parameters
     ----------
@@ -215,9 +220,9 @@ def rough_ratio(xi: float, beta: float, inertia: float) -> float:
 def rough_temperatures(
     tau: np.ndarray, start: tuple[float, float], xi: float, beta: float, inertia: float
 ) -> np.ndarray:
-    """Return the temperatures of cooling rough disks against collisions per disk.
+    """Return both temperatures of cooling rough disks as functions of collisions per disk.
 
-    The theory is that of `rough_ratio`.
+    The equations for the temperatures are those of `rough_ratio`.
 
     Parameters
     ----------
@@ -233,7 +238,7 @@ def rough_temperatures(
     Returns
     -------
     numpy.ndarray
-        (2, T) both temperatures
+        (2, T) translational and rotational temperature
 
     Examples
     --------
@@ -252,9 +257,10 @@ def pushed_width(
 ) -> tuple[float, float]:
     """Return mean and variance of the width of a box with a piston under a constant force.
 
-    The density of the widths is Q(w) (H - F w)^(f/2 - 1), evaluated at equally spaced widths (W,).
-    `places` is ln Q (NaN if unknown), `squares` the number f of degrees of freedom including that
-    of the piston, and `energy` is H - F w (docs/theory.md).
+    The probability density of the width w is proportional to Q(w) (H - F w)^(f/2 - 1), which
+    docs/theory.md derives.  The density is evaluated at equally spaced `widths` (W,).  The argument
+    `places` is ln Q, or NaN where Q is unknown.  The argument `squares` is the number f of degrees
+    of freedom, including that of the piston, and `energy` is H - F w.
     """
     log = np.where(np.isnan(places), -np.inf, places) + (squares / 2 - 1) * np.log(energy)
     density = np.exp(log - log.max())
@@ -265,12 +271,13 @@ def pushed_width(
 def demon_share(climb: float, layers: float, xi: float) -> float:
     """Return the fraction of a dilute gas in the fuller of two chambers above a vibrating floor.
 
-    A sawtooth floor of velocity V supplies the power n m g V to the n disks of a chamber.  In a
-    column of uniform temperature collisions dissipate n^2 m g s sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w,
-    where s is the diameter and w the width.  In a steady state the dissipation equals the power, so
-    that T/m = (2 V w / (n s sqrt(pi) (1 - xi^2)))^2.  The flux through a hole at the height h is
-    proportional to n^2 exp(-m g h / T) (J. Eggers, Phys. Rev. Lett. 83, 5322 (1999)).  In a steady
-    state the fluxes in both directions are equal; equal fractions are unstable if m g h > T.
+    A floor that moves as a sawtooth with the velocity V supplies the power n m g V to the n disks
+    of a chamber.  In a column of uniform temperature T, collisions dissipate the power n^2 m g s
+    sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w, where s is the diameter of a disk and w the width of a
+    chamber.  In a steady state both powers are equal, so that T/m = (2 V w / (n s sqrt(pi) (1 -
+    xi^2)))^2.  The flux out of a chamber through a hole at the height h is proportional to n^2
+    exp(-m g h / T) (Eggers, Physical Review Letters 83, 5322 (1999)).  In a steady state the fluxes
+    in both directions are equal.  The state with equal fractions is unstable if m g h > T.
 
     Parameters
     ----------
@@ -284,7 +291,7 @@ def demon_share(climb: float, layers: float, xi: float) -> float:
     Returns
     -------
     float
-        fraction in the fuller chamber; 1/2 above the threshold
+        fraction in the fuller chamber, which is 1/2 if the state with equal fractions is stable
 
     Examples
     --------
