@@ -1,6 +1,6 @@
 """Draw disks, walls and obstacles to scale with Matplotlib, and save figures.
 
-`plt.style.use(drawing.STYLE)` sets the style of the scripts in a notebook.
+In a notebook, `plt.style.use(drawing.STYLE)` selects the style that the scripts use for figures.
 """
 
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ OUTLINE = 0.12  # width of an outline divided by the diameter
 LEAST_POINTS = 4.0  # largest drawn diameter of enlarged disks
 WALL: dict[str, Any] = {"color": "0.25", "linewidth": 1.2}
 
-#: Quantities other than species by which disks can be coloured: label and name.
+#: Quantities that can determine the colours of disks: label, and dimension of the unit.
 COLOURINGS = {
     "speed": ("speed", "speed"),
     "displacement": ("displacement", "length"),
@@ -44,7 +44,7 @@ COLOURINGS = {
 
 
 def caption(runs: list[Run]) -> str:
-    """Return number of disks, restitution, varying parameters and seeds as text for a figure."""
+    """Return a caption with number of disks, restitution, seeds, and parameters that differ."""
     parts = [f"N = {listed({run.n_disks for run in runs})}"]
     restitutions = {run.restitution for run in runs}
     if all(map(np.isfinite, restitutions)):
@@ -60,19 +60,19 @@ def caption(runs: list[Run]) -> str:
 
 
 def titled(runs: list[Run]) -> str:
-    """Return the title of the input followed by the caption."""
+    """Return the title in the input, followed by the caption."""
     title = str(runs[0].parameter("run", "title", ""))
     return "\n".join(filter(None, (title, caption(runs))))
 
 
 def listed(values: set[float]) -> str:
-    """Return all of a few numbers as text, or the first and the last of many numbers."""
+    """List up to four numbers in a text; of more numbers, only the smallest and the largest."""
     words = [f"{value:g}" for value in sorted(values)]
     return ", ".join(words) if len(words) < 5 else f"{words[0]} to {words[-1]}"
 
 
 def numbers_of(run: Run) -> dict[str, float]:
-    """Return the input parameters that identify a system and are not in every caption."""
+    """Return the numerical input parameters that a caption contains if they differ between runs."""
     found = {**run.parameters.get("box", {}), **run.parameters.get("contact", {})}
     if found.get("wall_restitution") == run.restitution:
         del found["wall_restitution"]
@@ -93,26 +93,26 @@ def numbers_of(run: Run) -> dict[str, float]:
 
 
 def colours(count: int, first: int = 0) -> list[str]:
-    """Return the given number of colours from `COLOURS`, starting at `first`, or a colour map."""
+    """Return `count` colours: from `COLOURS`, starting at `first`, or from a colour map."""
     if first + count <= len(COLOURS):
         return COLOURS[first : first + count]
     return [to_hex(colour) for colour in plt.get_cmap()(np.linspace(0, 0.9, count))]
 
 
 def panel_grid(count: int, aspect: float) -> tuple[int, int]:
-    """Return rows and columns for `count` panels with this ratio of height to width."""
+    """Return the numbers of rows and columns for `count` panels with a given height / width."""
     columns = int(np.clip(np.ceil(np.sqrt(count * aspect * 1.4)), 1, count))
     rows = int(np.ceil(count / columns))
     return rows, int(np.ceil(count / rows))
 
 
 def label_of(run: Run, colour: str) -> str:
-    """Return the label of a colour scale with the unit."""
+    """Return the label of a colour scale, including the unit."""
     return run.units.label(*COLOURINGS[colour])
 
 
 def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
-    """Return the value (..., N) by which each disk is coloured; see `COLOURINGS`."""
+    """Return the values (..., N) that determine the colours of disks; see `COLOURINGS`."""
     if colour == "collisions" and run.event_count is not None:
         return run.event_count[as_index(frame)].astype(float)
     if colour == "psi6":
@@ -124,10 +124,10 @@ def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
 
 
 def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
-    """Return the upper end of a colour scale for a film; a few values exceed this end.
+    """Return the upper end of the colour scale of a film: the 99.5 % quantile of the values.
 
-    The end is computed from a selection of frames.  For displacements, which grow with time, it is
-    computed from the last frame.
+    The quantile is computed from a selection of frames.  For displacements, which grow with time,
+    the quantile is computed from the last frame.
     """
     some = [] if colour == "displacement" else frames[:: max(1, len(frames) // 40)]
     values = values_of(run, sorted({*some, frames[-1]}), colour)
@@ -136,7 +136,7 @@ def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
 
 
 def limits_of(colour: str, top: float) -> tuple[float, float]:
-    """Return the ends of a linear colour scale whose largest value is `top`."""
+    """Return the lower and the upper end of a linear colour scale with the largest value `top`."""
     return {"psi6": (-180.0, 180.0), "spin": (-top, top)}.get(colour, (0.0, top))
 
 
@@ -146,7 +146,7 @@ def colour_map(colour: str) -> str:
 
 
 def chosen_colour(run: Run, wish: str | None) -> str:
-    """Return the requested colouring, or the default; raise an error if data are missing."""
+    """Return the quantity for colours, `wish` or the default; raise an error if it has no data."""
     known = ("species", *COLOURINGS)
     if wish is not None and wish not in known:
         hint = did_you_mean(wish, known)
@@ -167,15 +167,16 @@ def aspect_of(run: Run) -> float:
 
 
 def lone(x: np.ndarray) -> dict[str, Any]:
-    """Return the style of a curve, with a marker if it has a single point."""
+    """Return the style of a curve with the abscissas `x`; a curve of one point has a marker."""
     return {"marker": "o", "ms": 3, "clip_on": False} if len(x) < 2 else {}
 
 
 def draw_box(axes: Axes, run: Run, time: float | None = None) -> None:
-    """Draw walls solid, periodic sides dashed and obstacles grey, with equal scales of the axes.
+    """Draw the sides of the box, the walls and the obstacles, with equal scales of both axes.
 
-    Moving sides are drawn at their positions at the given time [their mean positions]; the area
-    beyond them is grey.  Thermal and sliding walls are labelled.
+    Periodic sides are dashed, other sides and walls are solid, and obstacles are grey.  Moving
+    sides are drawn at their positions at `time`, by default at their mean positions, and the area
+    beyond moving sides is grey.  Thermal and sliding walls are labelled.
     """
     low, high = run.bounds
     (x0, y0), (x1, y1) = (run.lower, run.upper) if time is None else run.corners_at(time)
@@ -252,7 +253,7 @@ def name_walls(axes: Axes, run: Run) -> None:
 
 
 def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return indices and positions of disks and of their images that overlap the box."""
+    """Return indices and positions of all disks, and of periodic images that overlap the box."""
     which, places = [np.arange(run.n_disks)], [position]
     for shift in periods(run):
         if shift.any():
@@ -266,7 +267,7 @@ def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def points_per_length(axes: Axes) -> float:
-    """Return the length on paper, in points, of the unit of length in axes of equal scales."""
+    """Return the number of points on paper per unit of length, for axes with equal scales."""
     (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
     pixels = min(axes.bbox.width / (x1 - x0), axes.bbox.height / (y1 - y0))
     figure = axes.get_figure(root=True)
@@ -276,7 +277,7 @@ def points_per_length(axes: Axes) -> float:
 def drawn_diameters(axes: Axes, run: Run) -> np.ndarray:
     """Return the diameters (N,) with which disks are drawn.
 
-    Disks are drawn to scale, unless they are so small and far apart that they would be invisible.
+    Disks are drawn to scale, but disks that would be too small to be visible are enlarged.
     """
     apart = np.sqrt(np.prod(run.edges) / run.n_disks)
     least = min(LEAST_SHARE * apart, LEAST_POINTS / points_per_length(axes))
@@ -284,16 +285,17 @@ def drawn_diameters(axes: Axes, run: Run) -> np.ndarray:
 
 
 def note_on_size(axes: Axes, run: Run) -> str:
-    """Return a note for a title if disks are enlarged, otherwise ''."""
+    """Return a note for a title if disks are enlarged, otherwise an empty text."""
     larger = drawn_diameters(axes, run) > 2 * run.radius
     return ", small disks enlarged" if larger.any() else ""
 
 
 def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) -> EllipseCollection:
-    """Draw disks with `drawn_diameters` at `position` (N, 2), and their periodic images.
+    """Draw disks at `position` (N, 2), and their periodic images, with `drawn_diameters`.
 
-    In `style`, `array` (N,) colours disks by value, and `facecolors` sets colours directly.  If
-    disks are coloured by value, all species except the first have a black outline.
+    In `style`, `array` (N,) contains values that a colour map converts to colours, and `facecolors`
+    contains colours.  If disks are coloured by value, all species except the first have a black
+    outline.
     """
     which, places = with_images(run, position)
     diameters = drawn_diameters(axes, run)
@@ -310,7 +312,7 @@ def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) ->
 
 
 def radius_marks(axes: Axes, run: Run, frame: int) -> LineCollection | None:
-    """Draw a line from centre to rim at the orientation of each disk, or return None."""
+    """Draw the orientation of each disk as a radius; return None if there are no orientations."""
     if "orientation" not in run.disk_data:
         return None
     which, places = with_images(run, run.position[frame])
@@ -324,20 +326,20 @@ def radius_marks(axes: Axes, run: Run, frame: int) -> LineCollection | None:
 
 
 def band(axes: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, **style: Any) -> None:
-    """Draw a line with its error band."""
+    """Draw a curve with its error band."""
     axes.plot(x, y, **style)
     axes.fill_between(x, y - error, y + error, color=style["color"], alpha=0.25, lw=0)
 
 
 def bars(axes: Axes, height: Estimate, bins: np.ndarray, **style: Any) -> None:
-    """Draw a histogram with its errors."""
+    """Draw a histogram with its error bars."""
     axes.stairs(height.mean, bins, **style)
     middle = (bins[1:] + bins[:-1]) / 2
     axes.errorbar(middle, *height, fmt="none", color=style["color"], elinewidth=1)
 
 
 def noise_band(axes: Axes, count: int, colour: str, label: str = "") -> None:
-    """Draw the band that contains a2 of Maxwellian speeds with 95 % probability."""
+    """Draw the band that contains a2 of `count` Maxwellian speeds with a probability of 95 %."""
     reach = 2 * kurtosis_noise(count)
     axes.axhspan(-reach, reach, color=colour, alpha=0.15, lw=0, zorder=0, label=label)
 
@@ -349,12 +351,12 @@ def dilute_limit(axes: Axes, points: np.ndarray, of: str = "") -> None:
 
 
 def species_colours(run: Run) -> list[str]:
-    """Return a colour for each disk."""
+    """Return a colour for each disk, which is the colour of its species."""
     return [COLOURS[(s - 1) % len(COLOURS)] for s in run.species]
 
 
 def species_legend(figure: Figure, run: Run, by_outline: bool = False) -> None:
-    """Add a legend of the species below all panels, if there are several.
+    """Add a legend of the species below all panels if there are several species.
 
     Species are distinguished by colours or, with `by_outline`, by outlines as in `disk_collection`.
     """
@@ -382,7 +384,7 @@ def warn(figure: Figure, notes: Sequence[str]) -> None:
 
 
 def save(figure: Figure, path: Path, runs: list[Run], title: str) -> None:
-    """Write the figure, with its sources in the metadata, and make missing folders."""
+    """Write a figure to a file whose metadata name the runs; create missing folders."""
     sources = ", ".join(run.path.name for run in runs[:20]) + (", ..." if len(runs) > 20 else "")
     commits = sorted({str(run.provenance.get("git_commit", "unknown")) for run in runs})
     origin = f"{sources} (ricochet {', '.join(commits)})"

@@ -1,4 +1,4 @@
-"""Films in notebooks, which display the page of `player.py`."""
+"""Films of runs in notebooks; a film is the page that the script `player.py` makes."""
 
 import html
 import sys
@@ -12,7 +12,7 @@ class Film:
     """A film of a run, which a notebook displays and `save` writes to a file."""
 
     def __init__(self, run: Run, colour: str | None = None, height: int = 700):
-        """Make the page; `colour` is the quantity that colours disks, `height` is in pixels."""
+        """Make the page; `colour` names the quantity for colours, and `height` is in pixels."""
         if str(SCRIPTS) not in sys.path:
             sys.path.append(str(SCRIPTS))
         import player
@@ -24,5 +24,5 @@ class Film:
         return f'<iframe title="a film" style="{style}" srcdoc="{html.escape(self.page)}"></iframe>'
 
     def save(self, path: str | Path) -> None:
-        """Write the page to a file that any browser opens."""
+        """Write the film to an HTML file, which any browser displays."""
         Path(path).write_text(self.page, encoding="utf-8")
