@@ -1,4 +1,4 @@
-"""The library of the engine: its functions (described in `ricochet.h`) and their errors."""
+"""Load the library of the engine, which `ricochet.h` describes, and call its functions."""
 
 import ctypes
 import functools
@@ -13,7 +13,7 @@ ROOM = 100_000  # size of a message [bytes]
 
 
 def c_text(text: str | Path) -> bytes:
-    """Return a text or a path in the encoding of the library; zero bytes are refused."""
+    """Encode a text or a path for the library; raise an error if the text contains a zero byte."""
     words = os.fsencode(text) if isinstance(text, Path) else text.encode(errors="surrogateescape")
     if b"\0" in words:
         raise ValueError(f"{text!r} has a zero byte")
@@ -21,7 +21,7 @@ def c_text(text: str | Path) -> bytes:
 
 
 def opened(make: Callable[..., int], *arguments: object) -> int:
-    """Return a new handle from a function of the library, or raise its error."""
+    """Return the handle of a simulation that a library function creates, or raise its error."""
     message, code = ctypes.create_string_buffer(ROOM), ctypes.c_int()
     handle = make(*arguments, message, ROOM, ctypes.byref(code))
     if not handle:
@@ -30,7 +30,7 @@ def opened(make: Callable[..., int], *arguments: object) -> int:
 
 
 def called(function: Callable[..., int], *arguments: object) -> bool:
-    """Call a function of the library, raise its error, and return whether to call it again."""
+    """Call a library function, raise an error if it fails, and return whether to call it again."""
     message = ctypes.create_string_buffer(ROOM)
     code = function(*arguments, message, ROOM)
     if code > 1:
@@ -40,7 +40,7 @@ def called(function: Callable[..., int], *arguments: object) -> bool:
 
 @functools.cache
 def library(files: bool = False) -> ctypes.CDLL:
-    """Load the library; the version with functions for files needs the HDF5 of the system."""
+    """Load the library; its version with functions for files requires HDF5 on this machine."""
     name = "libricochet_files.so" if files else "libricochet.so"
     wish = os.environ.get("RICOCHET_LIBRARY")  # a folder
     places = [Path(wish)] if wish else [HERE / "lib", HERE.parents[1] / "build"]

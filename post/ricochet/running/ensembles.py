@@ -4,9 +4,10 @@
     table = ricochet.sweep("input/gas.nml", values, "runs/scan")
     table = ricochet.ensemble("runs/scan")       # a row per member run; also for runs/ensemble.sh
 
-A sweep can be interrupted and repeated at any time.  Its folder has the layout of
-`runs/ensemble.sh`: input.nml, manifest.txt with the overrides of each member run, NAME.h5 and
-NAME.log.  Therefore `sweep` continues the member runs of `runs/ensemble.sh` and vice versa.
+A sweep can be interrupted at any time; the same call of `sweep` then continues the sweep.  A folder
+contains input.nml, manifest.txt with the overrides of each member run, and the files NAME.h5 and
+NAME.log of each member run.  The script `runs/ensemble.sh` writes the same files, so that `sweep`
+and `runs/ensemble.sh` can continue the member runs of each other.
 """
 
 import contextlib
@@ -52,26 +53,26 @@ def sweep(
     folder: str | Path,
     executor: Executor | None = None,
 ) -> "pandas.DataFrame":
-    """Run a system with every combination of values of some variables, or a list of settings.
+    """Run an input with all combinations of the given values of variables.
 
-    Finished member runs are left out and interrupted ones continue.  After an interrupt, repeat the
-    same call.
+    Finished member runs are not repeated, and interrupted member runs are continued.  After an
+    interrupt, repeat the same call.
 
-    If the input differs from that of the finished members only in variables that may change when a
-    run is resumed, such as a later stop or another sampling schedule, the members are extended.
+    If the input has changed only in variables that may change when a run is resumed, finished
+    member runs are extended.  Examples are a later end of the run or a different sampling schedule.
 
     Parameters
     ----------
     system : str, Path or mapping
         the input, as for `ricochet.run`
     values : mapping of str to object, or list of them
-        a list of values, or a single value, for each variable; None stands for the default of the
-        variable; the first variable varies slowest.  If a list of such dictionaries is given, each
-        one is expanded separately, so that values of several variables can be varied together
+        for each variable a list of values, or a single value; None stands for the default value.
+        The first variable varies slowest.  For a list of dictionaries, `sweep` runs the
+        combinations of values in each dictionary, so that several variables can be varied together
     folder : str or Path
         folder for the files of the member runs
     executor : concurrent.futures.Executor, optional
-        executor for the member runs, with access to the same folder [all cores of this machine]
+        executor that runs the members and has access to the folder [all cores of this machine]
 
     Returns
     -------
@@ -81,7 +82,8 @@ def sweep(
     Raises
     ------
     ProgramError
-        if the program refuses the input of a member run; this is checked before any of them runs
+        if the program refuses the input of a member run; all inputs are checked before the first
+        run
     RunError
         if the folder or a member's log cannot be used, or if a member's name would be too long
     ValueError
@@ -133,7 +135,7 @@ def sweep(
 
 
 def choices_of(values: Mapping[str, Any]) -> dict[str, list[Any]]:
-    """Return a list of values for each variable."""
+    """Return a dictionary with a list of values for each variable."""
     return {
         name: [own] if isinstance(own, str) or not isinstance(own, Iterable) else list(own)
         for name, own in flat(values).items()
@@ -163,7 +165,7 @@ def check(text: str, members: Iterable[Mapping[str, Any]]) -> None:
 
 
 def names_of(members: Iterable[Mapping[str, Any]], taken: Mapping[str, str]) -> dict[str, str]:
-    """Return the overrides of each member run, as a line of a manifest, by its name."""
+    """Return a dictionary from the name of each member run to its overrides in the manifest."""
     found: dict[str, str] = {}
     known = dict(taken)
     for settings in members:
@@ -181,7 +183,7 @@ def names_of(members: Iterable[Mapping[str, Any]], taken: Mapping[str, str]) -> 
 
 
 def name_of(settings: Mapping[str, Any]) -> str:
-    """Return the name of the member run with these settings, as formed by runs/ensemble.sh."""
+    """Return the name that `sweep` and runs/ensemble.sh form for a member run from its settings."""
     parts = []
     for variable, value in settings.items():
         short = variable.removeprefix("species.")
@@ -194,7 +196,7 @@ def name_of(settings: Mapping[str, Any]) -> str:
 
 
 def words_of(settings: Mapping[str, object]) -> str:
-    """Return overrides as text for a line of a manifest."""
+    """Return the text of overrides in a line of the manifest."""
     words = {
         name: "" if value is None else value_text(name, value, ",")
         for name, value in settings.items()
@@ -203,7 +205,7 @@ def words_of(settings: Mapping[str, object]) -> str:
 
 
 def read_manifest(folder: Path) -> dict[str, str]:
-    """Return the overrides of each member run in a manifest."""
+    """Return a dictionary from the names of the member runs in a manifest to their overrides."""
     path = folder / "manifest.txt"
     if not path.is_file():
         return {}
@@ -212,7 +214,7 @@ def read_manifest(folder: Path) -> dict[str, str]:
 
 
 def remember(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
-    """Write input.nml and manifest.txt; settings of members with data must not change."""
+    """Write input.nml and manifest.txt; refuse new settings for member runs that have data."""
     door = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(door, fcntl.LOCK_EX)  # one command at a time, as in runs/ensemble.sh
@@ -222,7 +224,7 @@ def remember(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
 
 
 def remember_alone(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
-    """Write input.nml and manifest.txt while this process holds the lock."""
+    """Write input.nml and manifest.txt while this process holds the lock of the folder."""
     before = read_manifest(folder)
     path = folder / "input.nml"
     old = path.read_text(encoding="utf-8", errors="surrogateescape") if path.is_file() else text
@@ -246,7 +248,7 @@ def remember_alone(folder: Path, text: str, overrides: Mapping[str, str]) -> Non
 
 
 def may_continue(folder: Path, old: str, new: str) -> bool:
-    """Return whether inputs differ only in variables that may change when a run continues."""
+    """Return whether two inputs differ only in variables that may change when a run is resumed."""
     program = find_program()
     table = json.loads(subprocess.check_output([program, "--print-variables"]))
     kept = []
@@ -277,9 +279,9 @@ def put(path: Path, text: str) -> None:
 
 
 def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
-    """Return the paths of the finished and the unfinished file of a member run, None if absent.
+    """Return the paths of the finished and the unfinished output of a member run, or None.
 
-    A finished run that is being extended has both files, and counts as unfinished.
+    A finished run that is being extended has both files and is regarded as unfinished.
     """
     whole, part = folder / f"{name}.h5", folder / f"{name}.h5.part"
     unfinished = part if part.is_file() else None
@@ -287,7 +289,7 @@ def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
 
 
 def log_of(path: Path) -> TextIO:
-    """Open a member's log for appending; links and files with several names are refused."""
+    """Open the log of a member run for appending; refuse symbolic links and hard links."""
     way = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
     try:
         log = os.fdopen(os.open(path, way, 0o666), "a")
@@ -302,7 +304,7 @@ def log_of(path: Path) -> TextIO:
 
 
 def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
-    """Run a member that is not finished and not run by another process; return its exit code."""
+    """Run a member unless it is finished or runs in another process; return the exit code."""
     if not wanted(mark):
         return STOPPED
     with log_of(folder / f"{name}.log") as log:
@@ -338,12 +340,12 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
 
 
 def is_older(path: Path, other: Path) -> bool:
-    """Return whether a file was written before another file."""
+    """Return whether the file `path` was written before the file `other`."""
     return path.stat().st_mtime_ns < other.stat().st_mtime_ns
 
 
 def is_there(pid: int) -> bool:
-    """Return whether a process with this number exists on this machine."""
+    """Return whether a process with the number `pid` exists on this machine."""
     try:
         os.kill(pid, 0)
     except OSError as problem:
@@ -352,9 +354,9 @@ def is_there(pid: int) -> bool:
 
 
 def wanted(mark: Path) -> bool:
-    """Return whether the call of `sweep` with this mark continues.
+    """Return whether the call of `sweep` that created the file `mark` is still in progress.
 
-    The mark of a call whose process no longer exists is removed.
+    If the process of that call no longer exists, the file `mark` is deleted.
     """
     _, pid, _, host = mark.name.split(" ", 3)
     if host == os.uname().nodename and not is_there(int(pid)):
@@ -363,7 +365,7 @@ def wanted(mark: Path) -> bool:
 
 
 def finished_with(command: list[Any], mark: Path, **pipes: Any) -> int:
-    """Return the exit code of a command; it is stopped at a checkpoint if its mark vanishes."""
+    """Run a command and return its exit code; stop the command if the file `mark` is deleted."""
     process: subprocess.Popen[bytes] = subprocess.Popen(tied(command), **pipes)
     try:
         while True:
@@ -379,7 +381,10 @@ def finished_with(command: list[Any], mark: Path, **pipes: Any) -> int:
 
 
 def pairs_of(overrides: str) -> Iterator[tuple[str, str]]:
-    """Yield variables and values of a line of a manifest; a value in quotes may contain `--set`."""
+    """Yield variable and value of each override in a line of a manifest.
+
+    A value in quotes may contain the text `--set`.
+    """
     parts = overrides.removeprefix("--set ").split(" --set ") if overrides else []
     while parts:
         part = parts.pop(0)
@@ -390,14 +395,14 @@ def pairs_of(overrides: str) -> Iterator[tuple[str, str]]:
 
 
 def last_words(folder: Path, name: str) -> str:
-    """Return the last line of a member's log."""
+    """Return the last line in the log of a member run."""
     path = folder / f"{name}.log"
     lines = path.read_text(errors="replace").splitlines() if path.is_file() else []
     return lines[-1] if lines else ""
 
 
 def failed(folder: Path, name: str) -> bool:
-    """Return whether a member has reported a reason why it cannot continue."""
+    """Return whether the log of a member run ends with a reason why the run cannot continue."""
     words = last_words(folder, name)
     return not (files_of(folder, name)[0] or GOES_ON.fullmatch(words))
 
@@ -411,14 +416,14 @@ def ensemble(folder: str | Path) -> "pandas.DataFrame":
     Parameters
     ----------
     folder : str or Path
-        folder of `sweep` or of runs/ensemble.sh
+        folder of a sweep, which `sweep` or runs/ensemble.sh made
 
     Returns
     -------
     pandas.DataFrame
-        a row for each member run: name; each override by its full name; seed; state ('finished',
-        'unfinished' or 'failed'); reason why the run is not finished; wall_time [s]; and the last
-        value of each scalar observable
+        a row for each member run.  The columns are the name `member`, each override by its full
+        name, `seed`, `state` ('finished', 'unfinished' or 'failed'), the `reason` why the run is
+        not finished, `wall_time` [s], and the last value of each scalar observable
 
     Raises
     ------
@@ -444,7 +449,7 @@ def pandas_module() -> Any:
 
 
 def gathered(folder: Path) -> list[dict[str, Any]]:
-    """Return the rows of the table of `ensemble`."""
+    """Return the rows of the table that `ensemble` returns, with a row for each member run."""
     if not folder.is_dir():
         raise RunError(f"{folder}: there is no such folder")
     overrides = read_manifest(folder)
@@ -458,13 +463,13 @@ def gathered(folder: Path) -> list[dict[str, Any]]:
 
 
 def in_order(name: str) -> list[tuple[int, float, str]]:
-    """Return a sort key for names of members, in which numbers are ordered by value."""
+    """Return a sort key for the name of a member run; numbers in names are sorted by value."""
     parts = re.split(r"(\d+\.?\d*(?:e[+-]?\d+)?)", name)
     return [(0, float(part), "") if k % 2 else (1, 0.0, part) for k, part in enumerate(parts)]
 
 
 def row_of(folder: Path, name: str, overrides: str) -> dict[str, Any]:
-    """Return the row of a member run in the table."""
+    """Return the row of a member run in the table that `ensemble` returns."""
     row: dict[str, Any] = {"member": name}
     row |= {variable: typed(value) for variable, value in pairs_of(overrides)}
     finished, unfinished = files_of(folder, name)
@@ -503,7 +508,7 @@ def typed(value: str) -> object:
 
 
 def last_values(path: Path) -> dict[str, Any]:
-    """Return seed, wall time and the last value of each scalar observable."""
+    """Return seed, wall time and the last value of each scalar observable of a run."""
     with open_file(path) as file:
         row = {"seed": plain(file["parameters/run"].attrs["seed"])}
         row["wall_time"] = plain(file["provenance"].attrs.get("wall_time", np.nan))

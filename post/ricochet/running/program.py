@@ -26,16 +26,16 @@ from .starting import with_start
 STOPPED = 75
 PROGRESS = "\033[?7l"  # start of each update of the program's progress line on a terminal
 PAUSE = 30.0  # interval of progress lines without a terminal [s]
-#: Folders of the inputs: inside an installed package, and in a clone.
+#: Folders with the input files of Ricochet: in an installed package, and in a clone.
 INPUTS = (HERE / "input", HERE.parents[1] / "input")
 ESCAPES = re.compile(r"\033\[\??\d*[A-Za-z]")
 
 
 class ProgramError(RunError):
-    """Error for a program that could not start or finish.
+    """Error that is raised if the program cannot start or does not finish.
 
-    `message` contains the lines that the program printed, and `code` its exit code.  `path` is the
-    file with the completed part of the run, or None.
+    The attribute `message` contains the lines that the program printed, and `code` is the exit code
+    of the program.  The attribute `path` is the file with the completed part of the run, or None.
     """
 
     def __init__(self, message: str, code: int, path: Path | None = None):
@@ -44,7 +44,7 @@ class ProgramError(RunError):
         self.message, self.code, self.path = message, code, path
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return all parts, so that worker processes can report the error."""
+        """Return all attributes, so that `pickle` can pass the error from a worker process."""
         return type(self), (self.message, self.code, self.path)
 
 
@@ -57,26 +57,27 @@ def run(
     threads: int | None = None,
     progress: bool = True,
 ) -> Run:
-    """Simulate a system and open the result.
+    """Run the program with an input, and return the finished run.
 
     Parameters
     ----------
     system : str, Path or mapping
-        an input file, its text, or a dictionary of its groups, as in `{"species": {"count": 9,
-        "radius": 0.1}}`, with a list of dictionaries for a repeated group; radius, mass,
-        angular_velocity and orientation of a species may be arrays, with a value for each position
+        an input file, the text of an input, or a dictionary of its groups, such as `{"species":
+        {"count": 9, "radius": 0.1}}`.  The value of a repeated group is a list of dictionaries.
+        The radius, mass, angular_velocity and orientation of a species may be arrays with a value
+        for each position
     overrides : mapping of str to object, optional
-        values of variables, as in `{"species.gas.mass": 2}` or `{"contact": {"restitution": 0.9}}`;
-        None stands for the default of a variable
+        values of variables that replace those of the input, such as `{"species.gas.mass": 2}` or
+        `{"contact": {"restitution": 0.9}}`; None stands for the default value of a variable
     output : str or Path, optional
-        the output file [a temporary file, which is removed with the last object that reads it]
+        the output file [a temporary file, which is deleted when no object can read the file]
     force, resume : bool
-        the options of the program with these names
+        whether the program is started with the option `--force` or `--resume`
     threads : int, optional
-        `run.threads`
+        value of the variable `run.threads`
     progress : bool
-        whether progress is shown: continuously on a terminal and in a notebook, otherwise as a line
-        every 30 s
+        whether to show the progress: continuously on a terminal and in a notebook, elsewhere as a
+        line every 30 s
 
     Returns
     -------
@@ -86,8 +87,7 @@ def run(
     Raises
     ------
     ProgramError
-        if the program reports an error; `message` contains its lines, `code` its exit code, and
-        `path` is the file with the completed part of the run
+        if the program reports an error, which the attributes of the exception describe
 
     Examples
     --------
@@ -142,7 +142,7 @@ def example(name: str) -> Path:
     Raises
     ------
     RunError
-        if there is no such input; the message lists the names
+        if there is no input file with this name; the message lists the existing names
 
     Examples
     --------
@@ -159,7 +159,7 @@ def example(name: str) -> Path:
 
 
 def whole_threads(threads: int | None) -> int:
-    """Return the number of threads; 0 stands for the number given in the input."""
+    """Check and return the number of threads; 0 stands for the number given in the input."""
     if threads is None:
         return 0
     if not isinstance(threads, Integral) or not 1 <= threads <= 1024:
@@ -168,7 +168,11 @@ def whole_threads(threads: int | None) -> int:
 
 
 def find_program() -> str:
-    """Return the path of the program: RICOCHET, build/ricochet of this clone, or that on PATH."""
+    """Return the path of the program.
+
+    If the environment variable RICOCHET is set, its value is the path.  Otherwise the program is
+    searched in the installed package, in the folder `build` of this clone, and on PATH.
+    """
     root = HERE.parents[1]
     if wish := os.environ.get("RICOCHET"):
         places = [Path(wish)]
@@ -187,7 +191,7 @@ def find_program() -> str:
 
 
 def watched(command: list[str], progress: bool = True) -> tuple[int, list[str]]:
-    """Run the command with a progress bar, and return its exit code and its messages.
+    """Run a command with a progress bar, and return its exit code and its messages.
 
     If Python is interrupted or killed, the program writes a checkpoint and ends.
     """
@@ -224,10 +228,11 @@ def watched(command: list[str], progress: bool = True) -> tuple[int, list[str]]:
 
 
 def tied(command: list[str]) -> list[str]:
-    """Return a command that writes a checkpoint and stops when Python ends for any reason.
+    """Return a command that receives the signal SIGTERM when this Python process ends.
 
-    The command uses setpriv of util-linux if it is installed, because a function between fork and
-    exec is not safe in a process with threads.
+    The signal lets the program write a checkpoint and end.  If the tool setpriv of util-linux is
+    installed, it requests the signal, because a Python function between fork and exec would not be
+    safe in a process with several threads.
     """
     setpriv = shutil.which("setpriv") if sys.platform == "linux" else None
     return [setpriv, "--pdeathsig", "TERM", "--", *command] if setpriv else command
@@ -251,10 +256,10 @@ def lines_from(terminal: int) -> Iterator[str]:
 
 
 def unseen(system: str | Path | Mapping[str, Any], place: Path | None = None) -> str | None:
-    """Return the text of an input that is not a file, or None for a file.
+    """Return the text of an input that is a text or a dictionary, or None if the input is a file.
 
-    Starting files of arrays are written to the folder of `place`, by default to a folder of this
-    process.
+    Arrays with a value for each disk are written to starting files in the folder of `place`, by
+    default in a temporary folder of this process.
     """
     if isinstance(system, Mapping):
         return namelist(system, place)
@@ -265,9 +270,9 @@ def unseen(system: str | Path | Mapping[str, Any], place: Path | None = None) ->
 
 
 def namelist(groups: Mapping[str, Any], place: Path | None = None) -> str:
-    """Return groups of variables as the text of an input file, which the program checks.
+    """Return the text of an input file with the given groups; the program checks the values.
 
-    Values for each disk are written to starting files beside `place`.
+    Arrays with a value for each disk are written to starting files in the folder of `place`.
     """
     text = []
     for name, content in groups.items():
@@ -296,7 +301,7 @@ def settings_of(overrides: Mapping[str, Any]) -> list[str]:
 
 
 def flat(overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """Return overrides by full names: `{"run": {"seed": 2}}` means `{"run.seed": 2}`."""
+    """Return overrides with full names as keys, such as "run.seed" instead of nested groups."""
     if not isinstance(overrides, Mapping):
         kind = type(overrides).__name__
         raise TypeError(f"values are a dictionary as {{'run.seed': 2}}, not {kind}")
@@ -321,7 +326,7 @@ def without_options(message: str, settings: Iterable[str]) -> str:
 
 
 def named(message: str, text: str | None) -> str:
-    """Replace line numbers in messages of the program by names if the input is not a file."""
+    """Replace line numbers in messages by names of groups if the input is not a file."""
     if text is None:
         return message
     input_lines = text.splitlines()

@@ -1,12 +1,12 @@
-"""The engine in this process: simulations that can be advanced, analysed, saved and loaded.
+"""Simulations in memory, which Python can advance, change, analyse, save and load.
 
     with ricochet.Simulation("input/gas.nml", {"run.seed": 2}) as gas:
         gas.advance(time=1.0)
         gas.position, gas.observable("all/kinetic_energy"), gas.next_events(3)
 
-The library (`make library`) contains the engine of the program.  The state of a simulation is
-bit-identical to that of `build/ricochet` with the same input, and does not depend on the
-intermediate times at which `advance` returns.
+The library (`make library`) contains the engine of the program.  For the same input, the state of a
+`Simulation` is bit-identical to the state in a run of `build/ricochet`.  The state does not depend
+on the intermediate times at which `advance` returned.
 """
 
 import ctypes
@@ -44,7 +44,7 @@ NEVER = 2**63 - 1
 ROUNDING = 1e-14  # relative rounding error of a time
 FASTEST = 1e100  # largest number that is allowed in an input
 ALIVE: "weakref.WeakSet[Simulation]" = weakref.WeakSet()
-#: Numbers of the arrays of a simulation in the library, and their names here.
+#: Type of the elements of each array of a simulation.
 COLUMNS = {
     "position": float,
     "velocity": float,
@@ -58,12 +58,12 @@ COLUMNS = {
 
 
 class Simulation:
-    """A simulation in memory, which begins at its initial state.
+    """A simulation in the memory of this process, which starts at the initial state.
 
     Parameters
     ----------
     system : str, Path or mapping
-        an input file, its text, or its groups, as for `ricochet.run`
+        an input file, the text of an input, or a dictionary of its groups, as for `ricochet.run`
     overrides : mapping of str to object, optional
         values of variables, as for `ricochet.run`, such as {"contact.restitution": 0.9} or
         {"contact": {"restitution": 0.9}}
@@ -73,7 +73,7 @@ class Simulation:
     Raises
     ------
     ProgramError
-        if the input contains an error; the message is that of the program
+        if the input contains an error; the exception contains the message of the program
 
     Examples
     --------
@@ -104,7 +104,7 @@ class Simulation:
             raise ProgramError(without_options(message, settings), problem.code) from None
 
     def __repr__(self) -> str:
-        """Return one line: disks, time and numbers of events."""
+        """Return a line with numbers of disks, time, and numbers of collisions and events."""
         if not getattr(self, "_handle", None):
             return "<Simulation: closed>"
         names = [*self.parameters["species"]]
@@ -115,13 +115,13 @@ class Simulation:
 
     @classmethod
     def _of(cls, text: str, settings: list[str]) -> Self:
-        """Return a simulation of the text of an input with the settings GROUP.VARIABLE=VALUE."""
+        """Return a simulation of the input `text`; each of `settings` is GROUP.VARIABLE=VALUE."""
         self = cls.__new__(cls)
         self._begin(text, settings)
         return self
 
     def _begin(self, text: str, settings: list[str], threads: int | None = None) -> None:
-        """Start a simulation of the text of an input with the settings GROUP.VARIABLE=VALUE."""
+        """Start the simulation of the input `text`; each of `settings` is GROUP.VARIABLE=VALUE."""
         words = c_text(text), c_text("\n".join(settings))
         engine = library(files=b".h5" in b"".join(words))
         self._take(opened(engine.ricochet_open, *words, whole_threads(threads)))
@@ -134,12 +134,12 @@ class Simulation:
 
     @classmethod
     def load(cls, path: str | Path, threads: int | None = None) -> Self:
-        """Return the simulation from the last checkpoint of a finished or unfinished run.
+        """Return a simulation in the state of the last checkpoint of a finished or unfinished run.
 
         Parameters
         ----------
         path : str or Path
-            the output file, or its `.part`
+            the output file of the run, or the unfinished output, whose name ends in `.part`
         threads : int, optional
             number of threads [that of the input, or one]
 
@@ -165,10 +165,11 @@ class Simulation:
         return self
 
     def save(self, path: str | Path, force: bool = False, input: str | Path | None = None) -> Path:
-        """Write a file from which `ricochet INPUT -o path --resume` continues.
+        """Write an output file that the command `ricochet INPUT -o path --resume` can continue.
 
-        The file contains samples of two states: the initial and the present one.  After a call of
-        `change`, INPUT must be the changed input, which this method writes to the file `input`.
+        The file contains samples of the initial state and of the present state.  If `change` has
+        changed variables, INPUT must be the changed input, which this method writes to the file
+        `input`.
 
         Parameters
         ----------
@@ -177,13 +178,13 @@ class Simulation:
         force : bool
             whether an existing file may be replaced
         input : str or Path, optional
-            file to which the present input is written: a new file, or an unedited file that an
-            earlier `save` wrote
+            file to which the present input is written; the file must be new, or written by an
+            earlier `save` and not edited since
 
         Returns
         -------
         Path
-            `path` with `.part` at its end
+            the path of the file, which is `path` with `.part` at its end
 
         Raises
         ------
@@ -207,7 +208,7 @@ class Simulation:
         return path.with_name(f"{path.name}.part")
 
     def close(self) -> None:
-        """Free the memory of the simulation, which cannot be used afterwards.
+        """Free the memory of the simulation; the simulation cannot be used after this call.
 
         Examples
         --------
@@ -233,9 +234,10 @@ class Simulation:
     def copy(self) -> Self:
         """Return an independent simulation in the same state.
 
-        The copy and the original continue bit-identically.  `copy.copy`, `copy.deepcopy` and
-        `pickle` work, too.  A pickle contains a checkpoint, so it may be loaded by another process
-        or later; a starting file that the input names must exist there.
+        After the same calls, the copy and the original are in bit-identical states.  The functions
+        `copy.copy`, `copy.deepcopy` and `pickle.dumps` also copy a simulation.  A pickle contains a
+        checkpoint, so that another process can load the pickle.  If the input names a starting
+        file, this file must exist when the pickle is loaded.
 
         Returns
         -------
@@ -276,12 +278,13 @@ class Simulation:
         events: int | None = None,
         on_event: Callable[[Event], object] | None = None,
     ) -> Self:
-        """Continue until the first of these limits, counted from the start of the run, is reached.
+        """Advance the simulation until one of the limits is reached.
 
-        Without limits, the stop rules of the input apply.  As in a run of the program, the
-        simulation ends earlier if no further event can occur, or if a gas that only loses energy
-        has cooled to 1e-25 of its initial temperature.  After an interrupt (Ctrl-C) the simulation
-        is in the state at that moment and can continue.
+        All limits are counted from the start of the run.  Without limits, the stop rules of the
+        input apply.  As in a run of the program, the simulation ends before a limit if no further
+        event can occur, or if a gas that only loses energy has cooled to 1e-25 of its initial
+        temperature.  After an interrupt (Ctrl-C), the simulation is in the state at the moment of
+        the interrupt and can be continued.
 
         Parameters
         ----------
@@ -290,21 +293,23 @@ class Simulation:
         collisions : int, optional
             number of collisions of two disks
         events : int, optional
-            number of events (collisions of any kind); simultaneous events are never separated
+            number of events (collisions of any kind); `advance` never ends between simultaneous
+            events
         on_event : callable, optional
-            function of an `Event` that is called after each event, while the simulation is in the
-            state of that moment and may be changed; a true result ends the advance after the events
-            of this moment.  With this function each event takes about 20 us
+            function that is called with an `Event` after each event.  The function may read and
+            change the simulation, which is in the state just after the event.  If the function
+            returns a true value, `advance` ends after all events of that time.  If `on_event` is
+            given, each event takes about 20 microseconds
 
         Returns
         -------
         Simulation
-            this one
+            this simulation
 
         Raises
         ------
         ValueError
-            if a limit has already been passed, or if neither an argument nor the input contains a
+            if a limit has already been passed, or if neither the arguments nor the input set a
             limit
         RunError
             if no further event can occur, so that no limit can be reached
@@ -357,23 +362,23 @@ class Simulation:
         events: int | None = None,
         on_event: Callable[[Event], object] | None = None,
     ) -> Self:
-        """Continue for a time or a number of collisions or events; see `advance`.
+        """Advance the simulation by a time, or by a number of collisions or events.
 
         Parameters
         ----------
         time : float, optional
-            time from now
+            duration by which to advance
         collisions : int, optional
             number of further collisions of two disks
         events : int, optional
-            number of further collisions of any kind
+            number of further events (collisions of any kind)
         on_event : callable, optional
             function that is called after each event, as for `advance`
 
         Returns
         -------
         Simulation
-            this one
+            this simulation
 
         Raises
         ------
@@ -413,7 +418,7 @@ class Simulation:
                 stopped = bool(on_event(event)) or stopped
 
     def _last_events(self, most: int) -> np.ndarray:
-        """Return records (E, 6) of the latest events: time, i, j, impulse, momentum change."""
+        """Return an array (E, 6): time, i, j, impulse and momentum change of the latest events."""
         records = np.empty((most, 6))
         with self._open() as handle:
             n = library().ricochet_last_events(handle, most, records.ctypes.data)
@@ -422,22 +427,22 @@ class Simulation:
     def event_log(self, most: int) -> EventLog:
         """Return the latest events in chronological order.
 
-        At least the latest million events are stored.
+        The engine stores at least the latest million events.
 
         Parameters
         ----------
         most : int
-            number of events; there may be fewer
+            largest number of events to return
 
         Returns
         -------
         EventLog
-            (E,) times, partners and impulses
+            times, numbers of the disks, and impulses of E events
 
         Raises
         ------
         RunError
-            unless the input has `output.event_log = .true.`
+            if the input does not contain `output.event_log = .true.`
 
         Examples
         --------
@@ -453,21 +458,23 @@ class Simulation:
         return EventLog(records[:, 0], ids[:, 0], ids[:, 1], records[:, 3], records[:, 4:])
 
     def _endless(self) -> bool:
-        """Return whether the input contains no stop rule except a limit of the wall time."""
+        """Return whether the input sets no stop rule other than a limit of the wall-clock time."""
         return self.parameters.get("stop", {}).keys() <= {"wall_clock"}
 
     def _go_on(self, limits: tuple[float, int, int], patience: float) -> bool:
-        """Advance towards the limits for a few seconds; return whether they are not yet reached."""
+        """Advance for at most `patience` [s]; return whether no limit has been reached yet."""
         with self._open() as handle:
             return called(library().ricochet_advance, handle, *limits, patience)
 
     def _settle(self) -> float:
-        """Complete all events up to the present time, and return a time with a reproducible state.
+        """Advance to the next time at which the state is reproducible, and return this time.
 
-        At the end of a call `time` may be rounded, and a shift of the engine's origin of time may
-        be due.  At a later time that the engine reaches exactly, both are complete, and another run
-        has the same state at that time.  The engine measures time from its origin, and the sum of
-        both may skip every second representable time.
+        After a call of `advance`, the attribute `time` may be rounded, and the engine may still
+        have to shift its origin of time.  Therefore `_settle` advances to a slightly later time
+        that the engine reaches exactly.  Another simulation that advances to that later time has
+        the same state.  The time of a simulation is the sum of this origin and the time since the
+        origin.  The sum may skip every second floating-point number, so that several later times
+        are tried.
         """
         ulps = 0
         while self.time != self._settled:
@@ -477,11 +484,11 @@ class Simulation:
         return self._settled
 
     def change(self, values: Mapping[str, Any]) -> Self:
-        """Change variables of the running simulation from the present time on.
+        """Change variables of the simulation at the present time.
 
         The variables that can change are gravity, the driving, the collision rules of disks and
-        boundaries, and the temperatures, velocities and motions of boundaries.  The resulting
-        change of the total energy is added to the work.
+        boundaries, and the temperatures, velocities and motions of boundaries.  If the total energy
+        changes, the change of the energy counts as work.
 
         Parameters
         ----------
@@ -491,12 +498,12 @@ class Simulation:
         Returns
         -------
         Simulation
-            this one
+            this simulation
 
         Raises
         ------
         ProgramError
-            if a variable cannot change; in this case no variable is changed
+            if a variable cannot be changed; in this case all variables keep their values
 
         Examples
         --------
@@ -528,12 +535,12 @@ class Simulation:
 
     @property
     def input(self) -> str:
-        """The present input, including overrides and changes, as the text of a file."""
+        """Text of an input file with the present values, including overrides and changes."""
         return self._text("input")
 
     @property
     def changes(self) -> list[tuple[float, str, str]]:
-        """Changes during the simulation: time, name and value of each."""
+        """Time, name of the variable, and new value of each change during the simulation."""
         found = []
         for line in self._text("changes").splitlines():
             time, _, rest = line.partition(" ")
@@ -542,7 +549,7 @@ class Simulation:
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """All variables and their values by group, in the format of `Run.parameters`."""
+        """Values of all input variables by group, in the format of `Run.parameters`."""
         found: dict[str, Any] = {}
         for whole, value in self._values().items():
             *groups, name = whole.split(".")
@@ -561,13 +568,13 @@ class Simulation:
         return found
 
     def _values(self) -> dict[str, Any]:
-        """Return the values of all variables that have a value, by GROUP.NAME.VARIABLE."""
+        """Return the values of all variables that have a value; each key is GROUP.NAME.VARIABLE."""
         lines = (line.split(" = ", 1) for line in self._text("parameters").splitlines())
         return {name: json.loads(text) if ", ... " not in text else text for name, text in lines}
 
     @property
     def nature(self) -> Nature:
-        """The physical properties of the simulation so far: see `ricochet.nature`."""
+        """Physical properties of the simulation until the present time; see `ricochet.nature`."""
         energy = self.observable("all/kinetic_energy") * self.n_disks
         lost = self.observable("dissipated_energy")
         return nature_of(
@@ -593,7 +600,7 @@ class Simulation:
 
     @property
     def n_disks(self) -> int:
-        """N, the number of disks."""
+        """Number N of disks."""
         return self._counts()[0]
 
     @property
@@ -607,7 +614,7 @@ class Simulation:
         return self._counts()[2]
 
     def _column(self, name: str) -> np.ndarray:
-        """Return a read-only copy of an array of `COLUMNS`, disks in the order of the input."""
+        """Return a read-only copy of an array in `COLUMNS`; disks are in the order of the input."""
         values = np.empty((self.n_disks, 2))
         with self._open() as handle:
             width = library().ricochet_column(handle, name.encode(), values.ctypes.data)
@@ -618,10 +625,10 @@ class Simulation:
 
     @property
     def position(self) -> np.ndarray:
-        """(N, 2) positions [length] within the box where an axis is periodic; a read-only copy.
+        """Positions of the disks, (N, 2) [length], as a read-only copy.
 
-        All positions can be set at once: disks must not overlap, and the change of energy counts as
-        work.
+        Along a periodic axis, all positions are inside the box.  All positions can be set at once,
+        if no disks overlap at the new positions; the change of energy counts as work.
         """
         return self._column("position")
 
@@ -632,7 +639,10 @@ class Simulation:
 
     @property
     def velocity(self) -> np.ndarray:
-        """(N, 2) velocities [length/time]; a read-only copy; all can be set at once."""
+        """Velocities of the disks, (N, 2) [length/time], as a read-only copy.
+
+        All velocities can be set at once; the change of energy counts as work.
+        """
         return self._column("velocity")
 
     @velocity.setter
@@ -651,32 +661,40 @@ class Simulation:
 
     @property
     def angular_velocity(self) -> np.ndarray:
-        """(N,) angular velocities [1/time]; AttributeError if the disks cannot rotate."""
+        """Angular velocities, (N,) [1/time]; raises AttributeError if the disks cannot rotate."""
         return self._column("angular_velocity")
 
     @property
     def orientation(self) -> np.ndarray:
-        """(N,) angles to the x axis [rad], not wrapped; AttributeError without orientations."""
+        """Orientations of the disks, (N,) [rad].
+
+        An orientation is an angle from the x axis, which is not reduced modulo 2 pi.  If the disks
+        have no orientations, AttributeError is raised.
+        """
         return self._column("orientation")
 
     @property
     def image(self) -> np.ndarray:
-        """(N, 2) periods crossed by each disk; AttributeError without a periodic side."""
+        """Number of box lengths that each disk has moved across periodic sides, (N, 2).
+
+        Adding these numbers, times the edges of the box, to the positions gives continuous paths.
+        If no side is periodic, AttributeError is raised.
+        """
         return self._column("image")
 
     @property
     def radius(self) -> np.ndarray:
-        """(N,) radii [length]."""
+        """Radii of the disks, (N,) [length]."""
         return self._column("radius")
 
     @property
     def mass(self) -> np.ndarray:
-        """(N,) masses."""
+        """Masses of the disks, (N,)."""
         return self._column("mass")
 
     @property
     def species(self) -> np.ndarray:
-        """(N,) numbers of the species, from 1, in the order of the input."""
+        """Number of the species of each disk, (N,), counted from 1 in the order of the input."""
         return self._column("species")
 
     def _observed(self) -> dict[str, np.ndarray]:
@@ -698,7 +716,7 @@ class Simulation:
 
     @property
     def observables(self) -> list[str]:
-        """The names of the observables, which are those of the output file."""
+        """Names of the observables, which are the names in an output file."""
         return list(self._observed())
 
     def observable(self, name: str) -> Any:
@@ -737,12 +755,12 @@ class Simulation:
         Parameters
         ----------
         most : int
-            number of events; there may be fewer
+            largest number of events to return
 
         Returns
         -------
         list of tuple
-            (time, i, j) of each event, i and j as in `EventLog`
+            time, i and j of each event; the numbers i and j are defined as in `EventLog`
 
         Raises
         ------
@@ -765,7 +783,7 @@ class Simulation:
 
 
 def restored(kind: type[Simulation], data: bytes, start_energy: float) -> Simulation:
-    """Return the simulation of a checkpoint that was pickled."""
+    """Return the simulation whose checkpoint `data` was stored in a pickle."""
     with tempfile.TemporaryDirectory(prefix="ricochet-") as folder:
         path = Path(folder) / "state.h5.part"
         path.write_bytes(data)
@@ -775,7 +793,10 @@ def restored(kind: type[Simulation], data: bytes, start_energy: float) -> Simula
 
 
 def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return the table of all obstacles if a group has a file or points; its own row is emptied."""
+    """Return the table of all obstacles or walls if a row of the input names a file or points.
+
+    In such a row, the coordinates are replaced by NaN.
+    """
     if not any({"file", "points"} & row.keys() for row in rows):
         return {}
     wide = {"from": 2, "to": 2} if group == "wall" else {"centre": 2, "radius": 1}
@@ -794,7 +815,7 @@ def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict[str, A
 
 
 def after_fork() -> None:
-    """Close, in a child process, the simulations that another thread was advancing at the fork."""
+    """Close, in the child of a fork, the simulations that another thread was advancing."""
     for simulation in ALIVE:
         if not simulation._lock.acquire(blocking=False):
             simulation._handle = None
@@ -808,7 +829,7 @@ class Held:
     """Context manager that locks a simulation, so that no other thread advances or closes it."""
 
     def __init__(self, simulation: Simulation):
-        """Store the simulation; `with` acquires the lock and returns the handle."""
+        """Store the simulation; the statement `with` acquires its lock and returns its handle."""
         self.simulation = simulation
 
     def __enter__(self) -> int:

@@ -1,4 +1,4 @@
-"""Starting files: arrays of disks in the text format that `species.file` reads."""
+"""Starting files: text files with arrays of disks, which the variable `species.file` names."""
 
 import functools
 import itertools
@@ -14,18 +14,19 @@ from ..reading.files import TemporaryFolder, destination
 
 SPECIES = re.compile(r"[1-9]\d*|[A-Za-z][A-Za-z0-9_-]{0,39}")  # as read by the program
 
-#: Columns whose name in the text is shorter.
+#: Columns of a starting file whose names differ from the names of the arrays.
 TURNING = {"angular_velocity": "omega", "orientation": "angle"}
 
-#: Variables of a species, besides position and velocity, that may have a value for each disk.
+#: Variables of a species, other than position and velocity, that may be arrays over its disks.
 PER_DISK = ("radius", "mass", "angular_velocity", "orientation")
 NUMBERS = itertools.count(1)
 
 
 def with_start(group: Mapping[str, Any], place: Path | None) -> Mapping[str, Any]:
-    """Return a species whose arrays with a value for each disk are in a starting file.
+    """Write the arrays of a species to a starting file, and return the species with that file.
 
-    The name of the file begins with `place`; without it the file exists until this process ends.
+    The name of the file begins with `place`.  If `place` is None, the file is temporary and exists
+    until this process ends.
     """
     columns = {name: group[name] for name in PER_DISK if np.size(group.get(name, 0)) > 1}
     if not columns:
@@ -61,11 +62,12 @@ def write_start(
     angular_velocity: ArrayLike | None = None,
     orientation: ArrayLike | None = None,
 ) -> Path:
-    """Write a starting file of disks, for `file = 'PATH'` of a species.
+    """Write a starting file, which the variable `file` of a species in an input can name.
 
-    Quantities that are not given are determined by the input.  `write_start("bed.txt",
-    **np.load("a.npz"))` writes the arrays with these names from a file of NumPy.  Numbers are
-    written with all digits.
+    The input determines the quantities that the starting file does not contain.  If a NumPy file
+    contains arrays with the names of the parameters, the call `write_start("bed.txt",
+    **np.load("a.npz"))` writes these arrays.  Numbers are written with 17 significant digits, so
+    that reading restores exactly the same values.
 
     Parameters
     ----------
@@ -76,16 +78,17 @@ def write_start(
     velocity : array_like, optional
         (N, 2) [length/time]
     radius, mass : array_like, optional
-        (N,) or one value for all
+        (N,), or one value for all disks
     species : array_like, optional
-        (N,) or one value for all: names of species, or numbers of species in the input (from 1)
+        (N,), or one value for all disks: names of species, or numbers of species in the input,
+        which are counted from 1
     angular_velocity, orientation : array_like, optional
-        (N,) or one value for all [1/time], [rad]
+        (N,), or one value for all disks [1/time], [rad]
 
     Returns
     -------
     Path
-        the file
+        the path of the starting file
 
     Raises
     ------
