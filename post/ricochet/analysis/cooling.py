@@ -1,7 +1,8 @@
 """Cooling gases: energies averaged over runs, Haff's law, temperatures of rough disks.
 
-tau is the number of collisions per disk.  `Curves` is a dictionary by name; grids are arrays, and
-quantities measured on a grid are estimates.
+In this module, tau is the number of collisions per disk.  A dictionary of the type `Curves`
+contains arrays with the points of grids, and estimates of quantities that were measured at the
+points of a grid.
 """
 
 from collections.abc import Sequence
@@ -41,7 +42,7 @@ SETTLED = 0.005  # relative distance from its limit at which the ratio is regard
 
 
 def on_grid(x: Sequence[Any], y: Sequence[Any], points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Interpolate curves y (K, T) of each run on a common grid, up to the shortest run."""
+    """Interpolate K curves (K, T) of each run on a common grid that ends with the shortest run."""
     grid = np.linspace(0, min(own[-1] for own in x), points)
     each = zip(x, y, strict=True)
     return grid, np.array([[np.interp(grid, own, k) for k in tracks] for own, tracks in each])
@@ -53,16 +54,17 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
     Parameters
     ----------
     runs : list of Run
-        (R,) runs of gases that cool
+        (R,) runs of cooling gases
     points : int
         number of points of each curve
 
     Returns
     -------
     dict of str to numpy.ndarray or Estimate
-        (points,) each: "K_all" and "K_SPECIES", divided by the initial energy of all disks, against
-        "collisions_per_disk"; "energy_all" and "energy_SPECIES" against "time"; "ratio" of the
-        temperatures of the heaviest and the lightest species
+        (points,) curves by name.  The energies "K_all" and "K_SPECIES", divided by the initial
+        energy of all disks, are functions of "collisions_per_disk".  The energies "energy_all" and
+        "energy_SPECIES" are functions of "time".  The curve "ratio" is the temperature of the
+        heaviest species divided by that of the lightest species
 
     Raises
     ------
@@ -96,7 +98,7 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
 
 
 def moving_energy(run: Run, name: str = "all") -> np.ndarray:
-    """Return the kinetic energy per disk (T,) at the observables; it must not start at 0."""
+    """Return the kinetic energy per disk (T,) in the observables, which must not start at 0."""
     energy = run.observable(f"{name}/kinetic_energy").value
     if name == "all" and not energy[0] > 0:
         raise Refused(f"{run.path}: starts with disks at rest, which cannot cool")
@@ -107,17 +109,20 @@ def moving_energy(run: Run, name: str = "all") -> np.ndarray:
 
 
 def first_rate(run: Run) -> float:
-    """Return the initial collision rate from the equation of state or from counted collisions.
+    """Return the initial collision rate w0 of a gas of cooling disks.
+
+    For equal disks, w0 follows from the equation of state, and for mixtures from counted
+    collisions.
 
     Parameters
     ----------
-    run : Run
-        a simulation of smooth disks that cool in a periodic box
+    run : ricochet.Run
+        a run of smooth disks that cool in a periodic box
 
     Returns
     -------
     float
-        w0 [1/time]
+        initial collision rate w0 [1/time]
 
     Raises
     ------
@@ -143,7 +148,7 @@ def first_rate(run: Run) -> float:
 
 
 def counted_rate(run: Run) -> float:
-    """Return w0 from the first collisions of disks, corrected for the preceding cooling."""
+    """Return the initial collision rate w0 from the first collisions, corrected for the cooling."""
     time, tau = run.collisions_per_disk
     first = min(int(np.searchsorted(tau, 1.0)), len(tau) - 1)
     slower = (1 - run.restitution**2) * tau[first] / 4
@@ -155,14 +160,14 @@ def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     Parameters
     ----------
-    run : Run
-        a simulation of smooth disks that cool in a periodic box
+    run : ricochet.Run
+        a run of smooth disks that cool in a periodic box
 
     Returns
     -------
     w0_t, tau, k : numpy.ndarray
-        (T,) time in units of the initial mean free time, collisions per disk, energy divided by the
-        initial energy
+        (T,) time in units of the initial mean free time, collisions per disk, and energy divided by
+        the initial energy
 
     Examples
     --------
@@ -186,7 +191,8 @@ def soft_law(runs: list[Run]) -> tuple[np.ndarray, np.ndarray, np.ndarray] | Non
     Returns
     -------
     tuple of numpy.ndarray or None
-        w0 t, collisions per disk and K / K0; None for a constant restitution
+        time times the initial collision rate, collisions per disk, and energy divided by the
+        initial energy, or None if the restitution is constant
 
     Examples
     --------
@@ -205,30 +211,31 @@ def haff(
     soft: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
     points: int = 200,
 ) -> tuple[Curves, Estimate, float, Estimate]:
-    """Compare runs of one restitution with Haff's law.
+    """Compare the cooling of runs that have the same restitution with Haff's law.
 
     Parameters
     ----------
     tracks : list of tuple
-        (R,) `energy_left` of each run
+        (R,) result of `energy_left` for each run
     xi : float
         restitution
     soft : tuple, optional
-        `soft_law` of the runs
+        result of `soft_law` for the runs
     points : int
         number of points of each curve
 
     Returns
     -------
     curves : dict of str to numpy.ndarray or Estimate
-        (points,) K / K0 against time and against collisions, each with its predicted curve, and the
-        cooling rate
-    rate : Estimate
-        the cooling rate per collision or, if `soft` is given, the `exponent`
+        (points,) energy divided by the initial energy as a function of time and of collisions per
+        disk, the predictions for both functions, and the cooling rate
+    rate : ricochet.statistics.Estimate
+        the cooling rate per collision or, if `soft` is given, the exponent of the decay in time
     end : float
-        collisions per disk at which the homogeneous state ends; NaN if it does not end
-    end_error : Estimate
-        `end` with its error
+        number of collisions per disk at which the homogeneous state ends, or NaN if the homogeneous
+        state lasts until the end of the run
+    end_error : ricochet.statistics.Estimate
+        the number `end`, with its error
 
     Examples
     --------
@@ -280,12 +287,12 @@ def exponent(time: np.ndarray, energy: np.ndarray) -> float:
     Parameters
     ----------
     time, energy : numpy.ndarray
-        (T,) the curve, in logarithmic steps of time
+        (T,) points of the curve, at times with equal ratios
 
     Returns
     -------
     float
-        p, which is 2 for Haff's law and 5/3 for viscoelastic disks
+        the exponent p, which is 2 for Haff's law and 5/3 for viscoelastic disks
 
     Examples
     --------
@@ -298,7 +305,10 @@ def exponent(time: np.ndarray, energy: np.ndarray) -> float:
 
 
 def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray) -> float:
-    """Return the tau after which the rate stays below `SLOW` times its prediction, or NaN."""
+    """Return the number of collisions per disk after which a gas is no longer homogeneous, or NaN.
+
+    After this number of collisions, the cooling rate stays below `SLOW` times the prediction `law`.
+    """
     slow = rate < SLOW * law
     if not slow[-1]:
         return float("nan")
@@ -309,12 +319,12 @@ def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray
 
 
 def rough_law(run: Run) -> tuple[float, float, float]:
-    """Return the contact parameters of rough disks if the theory of rough disks applies.
+    """Return the contact parameters of rough disks; raise an error if the theory does not apply.
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
 
     Returns
     -------
@@ -324,7 +334,7 @@ def rough_law(run: Run) -> tuple[float, float, float]:
     Raises
     ------
     Refused
-        if the theory does not apply
+        if the theory of cooling rough disks does not apply to the run
 
     Examples
     --------
@@ -361,7 +371,8 @@ def rough(runs: list[Run], points: int = 200) -> Curves:
     Returns
     -------
     dict of str to numpy.ndarray or Estimate
-        (points,) "T", "T_rot" and "ratio" against "collisions_per_disk"
+        (points,) translational temperature "T", rotational temperature "T_rot" and their "ratio",
+        as functions of "collisions_per_disk"
 
     Examples
     --------
@@ -384,7 +395,7 @@ def steady_ratio(runs: list[Run], law: tuple[float, float, float]) -> Estimate:
     runs : list of Run
         (R,) runs of rough disks that differ by their seed
     law : tuple of float
-        `rough_law` of the runs
+        result of `rough_law` for the runs
 
     Returns
     -------

@@ -4,29 +4,31 @@
     found = correlations.measured([read_run("runs/glass.h5")], waves=[5.2], skip=0)
     found["small"]["msd"]                # a Curve: lags x, means y, errors
 
-The functions are means over pairs of samples at times t0 and t, against the lag t - t0, for each
-species and for "all" disks; r is the displacement of a disk from t0 to t:
+Each correlation function is a mean over pairs of samples at times t0 and t, as a function of the
+lag t - t0, for one species or for "all" disks.  If r is the displacement of a disk from t0 to t,
+the functions are:
 
-    msd        <r^2>
-    vacf       <v(t0) v(t)>, which is the mean square speed at lag 0 diffusion  <v(t0) r> / 2, half
-    the integral of vacf; not for driven disks alpha2     <r^4> / (2 <r^2>^2) - 1, the non-Gaussian
-    parameter: 0 where r is Gaussian overlap    share of the disks with r < `reach` [0.3 mean
-    diameters] F_s(k)     <J0(k r)>, the mean of exp(i k r) over all directions, for each k of
-    `waves`
+    msd        <r^2>, the mean square displacement
+    vacf       <v(t0) v(t)>, the velocity autocorrelation; the mean square speed at lag 0
+    diffusion  <v(t0) r> / 2, half the integral of vacf; not for driven disks
+    alpha2     <r^4> / (2 <r^2>^2) - 1, the non-Gaussian parameter: 0 where r is Gaussian
+    overlap    fraction of the disks with r < `reach` [0.3 mean diameters]
+    F_s(k)     <J0(k r)>, the mean of exp(i k r) over all directions, for each k of `waves`
 
-Displacements and velocities are relative to the centre of mass along axes where its velocity is
-conserved, or performs a random walk that noise drives (drive.keep_momentum = .false.).
+Along axes where the velocity of the centre of mass is conserved, or changed only by noise
+(drive.keep_momentum = .false.), displacements and velocities are relative to the centre of mass.
 
-Lags are chosen logarithmically: in each twelfth of a power of ten, the lag that occurs for most
-pairs of samples.  This works for samples at equal steps, in logarithmic steps, in bursts, and for
-mixtures of these.  Every sample with a partner at a lag serves as an origin t0.  If this would take
-too long, only the first sample in each sixteenth of a lag is an origin.  This does not make
-correlations of displacements less accurate, but it makes correlations of velocities less accurate
-at lags of many free times. This is the multiple-tau correlator of Ramirez et al., J. Chem. Phys.
-133, 154103 (2010), without its means over neighbouring samples, so that each lag is exact.
+Lags are spaced logarithmically: in each twelfth of a power of ten, the lag of most pairs of samples
+is used.  These lags are suitable for samples at equal intervals, at logarithmic intervals, in
+bursts, and for combinations of such samples.  A sample is an origin t0 for a lag if another sample
+is later by this lag.  If the sums over all origins would take too long, only the first sample in
+each sixteenth of a lag is an origin.  With fewer origins, correlations of displacements are as
+accurate as with all origins, but correlations of velocities are less accurate at lags of many mean
+free times.  The method is the multiple-tau correlator of Ramirez et al., Journal of Chemical
+Physics 133, 154103 (2010), but without means over neighbouring samples, so that each lag is exact.
 
-Errors follow from the scatter of the runs.  For a single run they follow from the scatter of
-sixteenths of its time, for lags up to an eighth of this time; longer lags have no error (NaN).
+Errors follow from the scatter of the runs.  For a single run, errors follow from the scatter of
+sixteen parts of the run.  Lags above an eighth of the duration of a single run have no error (NaN).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -112,19 +114,19 @@ def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
     first, last : float
         the shortest and the longest time after the start of a burst [time]
     apart : float
-        time from the start of one burst to the start of the next
+        time from the start of one burst to the start of the next burst
     until : float
-        time of the last possible sample [time]
+        latest possible time of a sample [time]
 
     Returns
     -------
     numpy.ndarray
-        (T,) times, from 0 on
+        (T,) times in increasing order, which start at 0
 
     Raises
     ------
     ValueError
-        unless 0 < first <= last <= until and apart > 0
+        if the arguments do not satisfy 0 < first <= last <= until and apart > 0
 
     Examples
     --------
@@ -141,11 +143,11 @@ def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
 
 
 class Correlator:
-    """Sums over pairs of samples of a run or a simulation; samples are added successively.
+    """Time correlations of a run or a simulation, whose samples are added one after the other.
 
-    The required memory is bounded: only samples that still need partners are stored, in long runs
-    about 16 for each lag.  `pickle` saves the complete state, so that a measurement can be
-    continued exactly.
+    The required memory is bounded, because a sample is stored only until all its pairs have been
+    added.  In long runs, about 16 samples are stored for each lag.  A pickle contains the complete
+    state of a correlator, so that a measurement can be continued exactly.
     """
 
     def __init__(
@@ -156,7 +158,7 @@ class Correlator:
         reach: float | None = None,
         lags: np.ndarray | None = None,
     ):
-        """Prepare sums for these times, wavenumbers [1/length] and lags [all lags of the times]."""
+        """Prepare sums for sampling times, wavenumbers [1/length] and lags [`lags_of` times]."""
         cools = {"inelastic"} if source.nature.cooling else set()
         what = "time correlations require a steady state without flow"
         allow(source, what, *TRAITS.keys() - FLOWING - cools)
@@ -183,13 +185,17 @@ class Correlator:
         self.last = np.full(len(self.lags), -1.0)  # slot of its last origin
 
     def follow(self, source: Run | Simulation) -> Self:
-        """Add the missing samples of a run, which may be unfinished, or of a simulation."""
+        """Add the samples after the last added sample, from a run or a simulation.
+
+        The run may be unfinished.  When the run contains more samples, `follow` can be called
+        again.  A simulation is advanced to the times of the samples.
+        """
         for place, velocity in samples(source, self.times[self.done :]):
             self.add(place, velocity)
         return self
 
     def add(self, place: np.ndarray, velocity: np.ndarray) -> None:
-        """Add a sample: positions (N, 2), continuous in time, and velocities (N, 2)."""
+        """Add a sample: positions (N, 2), not wrapped into the box, and velocities (N, 2)."""
         place, velocity = (
             values - self.kept * np.average(values, axis=0, weights=self.mass)
             for values in (place, velocity)
@@ -215,7 +221,7 @@ class Correlator:
     def count(
         self, origins: np.ndarray, lags: np.ndarray, place: np.ndarray, v: np.ndarray
     ) -> None:
-        """Add the pairs of this sample with the origins (P,) at the lags (P,)."""
+        """Add P pairs of samples: this sample with the samples `origins` (P,) at `lags` (P,)."""
         before, v0 = (np.stack([self.held[k][part] for k in origins]) for part in (0, 1))
         way = place - before
         square, half = np.einsum("pna,pna->pn", way, way), np.einsum("pna,pna->pn", v0, way) / 2
@@ -229,7 +235,7 @@ class Correlator:
         np.add.at(self.sums, where, np.moveaxis(np.array(values) @ self.shares, 0, 2))
 
     def amounts(self, name: str, species: int) -> np.ndarray:
-        """Return sums (L, B) over the pairs that begin in each block of time."""
+        """Return the sums (L, B) at L lags over the pairs that begin in each block of time."""
         names = (*FIXED, *(f"F_s({k:g})" for k in self.waves))
         if name != "alpha2":
             return self.sums[:, :, species, names.index(name)]
@@ -240,13 +246,16 @@ class Correlator:
         return fourth / (2 * m2**2) - m4 / m2**3 * square + (m4 / m2**2 - 1) * self.pairs
 
     def means(self, name: str, species: int = 0) -> np.ndarray:
-        """Return the means (L,) over all pairs; NaN for lags without pairs."""
+        """Return the means (L,) over all pairs at each lag, or NaN at lags without pairs."""
         number = self.pairs.sum(axis=1)
         return self.amounts(name, species).sum(axis=1) / np.where(number > 0, number, np.nan)
 
 
 def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield positions, continuous in time, and velocities at the times that the run contains."""
+    """Yield positions, which are not wrapped into the box, and velocities at the given times.
+
+    A simulation is advanced to these times.  For a run, the iteration ends after the last frame.
+    """
     if isinstance(source, Simulation):
         box = source.parameters["box"]
         edges = np.subtract(box["upper"], box["lower"])
@@ -265,7 +274,7 @@ def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.nd
 
 
 def mean_of(members: Sequence[Correlator], name: str, species: int, lags: np.ndarray) -> Estimate:
-    """Return the means, with errors, at the lags with these numbers."""
+    """Return means and errors of a correlation function at the lags with the given indices."""
     means = [one.means(name, species)[lags] for one in members]
     if len(means) > 1:
         return estimate(means)
@@ -279,7 +288,7 @@ def mean_of(members: Sequence[Correlator], name: str, species: int, lags: np.nda
 
 
 def curves(members: Sequence[Correlator]) -> dict[str, dict[str, Curve]]:
-    """Return the correlation functions of correlators by species and by name.
+    """Return the correlation functions that correlators measured, by species and by name.
 
     Parameters
     ----------
@@ -289,7 +298,7 @@ def curves(members: Sequence[Correlator]) -> dict[str, dict[str, Curve]]:
     Returns
     -------
     dict of str to dict of str to Curve
-        by species and "all", then by name; the module docstring lists the names
+        the functions by species, including "all", and by name; the module docstring lists the names
 
     Examples
     --------
@@ -314,7 +323,7 @@ def correlators(
     reach: float | None = None,
     skip: float | None = None,
 ) -> list[Correlator]:
-    """Correlate the steady state of each run at the lags of the first run.
+    """Measure the correlations of each run in its steady state, at the lags of the first run.
 
     Parameters
     ----------
@@ -323,9 +332,10 @@ def correlators(
     waves : iterable of float
         wavenumbers of F_s(k, t) [1/length]
     reach : float, optional
-        distance below which a disk overlaps with its earlier position [0.3 mean diameters]
+        displacement below which a disk counts as overlapping with its earlier position [0.3 mean
+        diameters]
     skip : float, optional
-        collisions per disk that are left out at the start [until no observable drifts]
+        duration of the equilibration, in collisions per disk [until no observable drifts]
 
     Returns
     -------
@@ -371,7 +381,7 @@ def measured(runs: Sequence[Run], **options: Any) -> dict[str, dict[str, Curve]]
     Returns
     -------
     dict of str to dict of str to Curve
-        by species and "all", then by name; x contains the lags, y the means
+        the functions by species, including "all", and by name; x contains lags, and y means
 
     Examples
     --------

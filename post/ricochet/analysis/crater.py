@@ -1,7 +1,7 @@
 """Craters: identify projectile and bed, and measure the size of the crater.
 
-The projectile is the species 'projectile', or else the only disk that moves at the start.  All
-other disks form the bed.
+The projectile is the disk of the species 'projectile'. If there is no such species, the projectile
+is the only disk that moves at the start.  All other disks form the bed.
 """
 
 from typing import Any, NamedTuple
@@ -43,7 +43,7 @@ class Crater(NamedTuple):
     side_collisions: int
 
 
-#: Traits of runs in which only the projectile moves the bed.
+#: Traits that a run may have if only the projectile sets the bed in motion.
 QUIET: tuple[str, ...]
 QUIET = (
     "inelastic",
@@ -66,13 +66,13 @@ def energy_fraction(run: Run) -> float:
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
 
     Returns
     -------
     float
-        `stop.energy_fraction`
+        value of the variable `stop.energy_fraction`
 
     Examples
     --------
@@ -87,15 +87,15 @@ def ended_by_time(run: Run, size: Crater) -> bool:
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
-    size : Crater
-        its crater
+    run : ricochet.Run
+        the run to analyse
+    size : ricochet.crater.Crater
+        result of `crater` for the run
 
     Returns
     -------
     bool
-        whether the run ended with more energy than this fraction
+        whether the energy left, divided by the initial energy, exceeds `stop.energy_fraction`
 
     Examples
     --------
@@ -110,15 +110,15 @@ def box_takes_part(run: Run, side_collisions: float) -> bool:
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     side_collisions : float
         number of collisions with the sides; it may be a mean over runs
 
     Returns
     -------
     bool
-        whether the number of collisions exceeds one per hundred disks
+        whether the number of collisions with the sides exceeds one per hundred disks
 
     Examples
     --------
@@ -131,10 +131,11 @@ def box_takes_part(run: Run, side_collisions: float) -> bool:
 def enough_disks(mass_ratio: float, restitution: float, fraction: float) -> float:
     """Estimate the number of disks for which the crater does not reach the sides of the box.
 
-    About 3.4 M (1/f - 1) / (1 - xi^2) disks of a sufficiently large bed are hit, and the bed must
-    contain 2.2 times this number.  Both factors were measured for beds in the lower half of a
-    square box at a packing fraction of 0.5, M from 10 to 50, xi from 0.3 to 0.8, radius ratios from
-    2 to 10 and f = 0.1.
+    In a sufficiently large bed, about 3.4 M (1/f - 1) / (1 - xi^2) disks are hit.  A bed is
+    sufficiently large if it contains 2.2 times this number of disks.  The factors 3.4 and 2.2 were
+    measured for beds in the lower half of a square box, at a packing fraction of 0.5.  The mass
+    ratio M was from 10 to 50, the restitution xi from 0.3 to 0.8, the ratio of radii from 2 to 10,
+    and the energy fraction f was 0.1.
 
     Parameters
     ----------
@@ -166,8 +167,8 @@ def projectile(run: Run) -> int:
 
     Parameters
     ----------
-    run : Run
-        a simulation with a species 'projectile', or with a single disk that moves at the start
+    run : ricochet.Run
+        a run with a species 'projectile', or with a single disk that moves at the start
 
     Returns
     -------
@@ -177,7 +178,7 @@ def projectile(run: Run) -> int:
     Raises
     ------
     RunError
-        if there is no such disk
+        if the run contains no such disk
 
     Examples
     --------
@@ -195,17 +196,17 @@ def projectile(run: Run) -> int:
 
 
 def bed(run: Run) -> np.ndarray:
-    """Return the disks that belong to the bed.
+    """Return a mask of the disks that belong to the bed.
 
     Parameters
     ----------
-    run : Run
-        a simulation with a projectile
+    run : ricochet.Run
+        a run with a projectile
 
     Returns
     -------
     numpy.ndarray
-        (N,) mask of all disks but the projectile
+        (N,) mask of all disks except the projectile
 
     Examples
     --------
@@ -218,14 +219,14 @@ def bed(run: Run) -> np.ndarray:
 
 
 def displaced(run: Run, frame: int = -1) -> np.ndarray:
-    """Return the bed disks that are further than their radius from their first position.
+    """Return a mask of the bed disks whose displacement is larger than their radius.
 
     Parameters
     ----------
-    run : Run
-        a simulation with a projectile
+    run : ricochet.Run
+        a run with a projectile
     frame : int
-        the frame [the last]
+        number of the frame [the last frame]
 
     Returns
     -------
@@ -245,8 +246,8 @@ def crater(run: Run) -> Crater:
 
     Parameters
     ----------
-    run : Run
-        a simulation in which a projectile meets a bed at rest
+    run : ricochet.Run
+        a run in which a projectile meets a bed at rest
 
     Returns
     -------
@@ -256,7 +257,7 @@ def crater(run: Run) -> Crater:
     Raises
     ------
     Refused
-        if anything except a projectile moves the bed
+        if anything other than a projectile can move the bed
 
     Examples
     --------
@@ -287,12 +288,15 @@ def crater(run: Run) -> Crater:
 
 
 def hole(run: Run) -> np.ndarray:
-    """Return the outline of the largest region below half of the bed's packing fraction.
+    """Return the outline of the hole that a projectile has made in the bed.
+
+    The hole is the largest region where the local packing fraction has fallen below half of the
+    initial median of the bed.
 
     Parameters
     ----------
-    run : Run
-        a simulation with a projectile
+    run : ricochet.Run
+        a run with a projectile
 
     Returns
     -------
@@ -320,7 +324,7 @@ def area(ring: np.ndarray) -> float:
 
 
 def packing_field(run: Run, frame: int, cells: int = 240) -> tuple[np.ndarray, ...]:
-    """Return x and y of grid cells and the area fraction (y, x), smoothed over a few disks."""
+    """Return x and y of grid cells, and the smoothed packing fraction (y, x) of the bed."""
     here = bed(run)
     side = run.edges.max() / cells
     shape: Any = np.maximum(1, np.round(run.edges / side)).astype(int)

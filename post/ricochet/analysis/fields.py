@@ -1,11 +1,12 @@
 """Fields of runs in a steady state on a grid of cells, and profiles between two walls.
 
 The docstring of post/fields.py defines the fields.  Errors are computed by the jackknife over
-blocks of time of all runs.  A block is so long that its start and its end are independent.  The
-jackknife also removes a bias: if the flow is estimated from the same n values as the temperature,
-the temperature relative to this flow is too small by the fraction 1 / n.  Blocks of unequal weight
-are treated as in Busing, Meijer and van der Leeden, Stat. Comput. 9, 3 (1999).  Shapes refer to C
-cells and G blocks.
+blocks of time of all runs.  A block of time is so long that the states at its start and at its end
+are independent.  The jackknife also removes a bias: if the flow is estimated from the same n values
+as the temperature, the temperature relative to this flow is too small by the fraction 1 / n.
+Blocks of unequal weight are treated as in Busing, Meijer and van der Leeden, Statistics and
+Computing 9, 3 (1999).  In the shapes of arrays, C is the number of cells and G the number of
+blocks.
 """
 
 from collections.abc import Callable
@@ -38,13 +39,13 @@ FEWEST_DISKS = 3  # fewest disks in a cell without any one block, for kT, stress
 LONG = 1.5  # length of a block in units of the statistical inefficiency
 POINTS = 1 << 16  # used with obstacles to find the accessible area
 ACROSS = SIDES[:2], SIDES[2:]  # the two sides perpendicular to each axis
-#: Traits of gases between two walls to which the theory applies.
+#: Traits that a gas between two walls may have if Enskog's theory applies to the gas.
 LAWFUL = {"walls", "thermal_walls", "unequal_temperatures", "sliding_surfaces"}
 Cells = tuple[int, int]
 
 
 class Fluxes(NamedTuple):
-    """Fluxes from one wall to the opposite wall, per length and time."""
+    """Fluxes of momentum and energy from one wall to the opposite wall, per length and time."""
 
     pressure: Any  # momentum along the axis; a number or an `Estimate`
     shear: Any  # momentum along the walls; a number or an `Estimate`
@@ -52,7 +53,7 @@ class Fluxes(NamedTuple):
 
 
 class Block(NamedTuple):
-    """A part of the steady state of a run."""
+    """A block of time, which is a part of the steady state of a run."""
 
     run: Run
     frames: list[int]
@@ -65,7 +66,7 @@ class Block(NamedTuple):
 
 
 class Members(NamedTuple):
-    """Pseudo-values of the jackknife (G, ...), one for each block."""
+    """Pseudo-values (G, ...) of the jackknife, one for each block of time."""
 
     values: np.ndarray
     share: np.ndarray  # fraction of the sample that is in the block
@@ -77,16 +78,17 @@ class Members(NamedTuple):
         return np.where(seen.sum(axis=0) > 1, mean, np.nan)
 
     def rests(self) -> np.ndarray:
-        """Return deviations (G, ...), the sum of whose squares is the squared standard error."""
+        """Return weighted deviations (G, ...); the sum of squares is the squared standard error."""
         seen = self.share > 0
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.sqrt(self.share / (1 - self.share) / seen.sum(axis=0))
             return np.where(seen, root * (self.values - self.mean()), 0)
 
     def estimate(self, kinship: np.ndarray | float = 0.0) -> Estimate:
-        """Return mean and error.
+        """Return the mean with its error.
 
-        `kinship` is twice the sum of products of neighbouring blocks over the sum of squares.
+        The argument `kinship` is the correlation of neighbouring blocks: twice the sum of products
+        of neighbouring deviations, divided by the sum of squared deviations.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             error = np.sqrt(np.sum(self.rests() ** 2, axis=0))
@@ -98,7 +100,7 @@ class Members(NamedTuple):
 def jackknife(
     of: Callable[[np.ndarray], np.ndarray], sums: np.ndarray, weights: np.ndarray
 ) -> Members:
-    """Return the pseudo-values (G, ...) of a function of sums over blocks, with their weights."""
+    """Return the jackknife pseudo-values (G, ...) of a function of sums over blocks of time."""
     with np.errstate(divide="ignore", invalid="ignore"):
         total = sums.sum(axis=0)
         rest = np.stack([of(total - one) for one in sums])
@@ -110,7 +112,7 @@ def jackknife(
 
 
 def steady_frames(run: Run, skip: float | None) -> list[int]:
-    """Return the frames after `skip` collisions per disk, by default the second half."""
+    """Return the frames after `skip` collisions per disk, by default the second half of the run."""
     if any(side.get("motion") in ("constant_velocity", "piston") for side in run.sides):
         why = "has a side that moves away from its position (motion); fields require fixed cells"
         raise Refused(f"{run.path}: {why}")
@@ -123,7 +125,10 @@ def steady_frames(run: Run, skip: float | None) -> list[int]:
 
 
 def own_motion(run: Run, frames: list[int]) -> np.ndarray:
-    """Return velocities (F, N, 2) relative to the shear flow and to a driven centre of mass."""
+    """Return velocities (F, N, 2) relative to the shear flow and to the centre of mass.
+
+    The motion of the centre of mass is subtracted only if noise moves the centre of mass.
+    """
     v = run.velocity[frames]
     if run.shear_rate:
         height = run.position[frames][..., 1] - run.lower[1]
@@ -134,10 +139,11 @@ def own_motion(run: Run, frames: list[int]) -> np.ndarray:
 
 
 def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
-    """Return the largest statistical inefficiency of slow quantities, in frames.
+    """Return the largest statistical inefficiency of slowly varying quantities, in frames.
 
-    These quantities are mass, momentum and energy: their totals and their Fourier components of the
-    longest wavelengths across the cells.
+    These quantities are the totals of mass, momentum and energy, and the Fourier components of
+    their densities with the longest wavelengths in the directions in which the box is divided into
+    cells.
     """
     place, v = (run.position[frames] - run.lower) / run.edges, own_motion(run, frames)
     waves, found = [np.ones(place.shape[:2])], 1.0
@@ -154,10 +160,11 @@ def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
 
 
 def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[Block], float]:
-    """Return the blocks of the steady state of all runs, and the largest expected `kinship`.
+    """Return the blocks of time of all runs, and the largest expected correlation of neighbours.
 
-    The largest expected kinship is that of means over parts of a series with the autocorrelation
-    exp(-t).  It is NaN if there are too few blocks for an error.
+    The largest expected correlation is the correlation of the means over neighbouring blocks of a
+    series whose autocorrelation function is exp(-t).  If there are too few blocks for an error, the
+    correlation is NaN.
     """
     refuse_others(runs)
     steady = [steady_frames(run, skip) for run in runs]
@@ -177,11 +184,11 @@ def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[B
 
 
 def kinship(members: Members, blocks: list[Block], most: float) -> np.ndarray:
-    """Return the correlation of neighbouring blocks, (F,), of fields (G, F, C).
+    """Return the correlations (F,) of neighbouring blocks for F fields (G, F, C).
 
-    The result is twice the sum of products of neighbouring blocks over the sum of squares.  It is
-    limited to the range from 0 to `most`, and averaged over all cells, because a single cell has
-    too few blocks for an estimate.
+    A correlation is twice the sum of products of neighbouring deviations, divided by the sum of
+    squared deviations.  Both sums include all cells, because a single cell has too few blocks for
+    an estimate.  The correlations are limited to the range from 0 to `most`.
     """
     size, same = len(blocks), [a.run is b.run for a, b in pairwise(blocks)]
     rest = np.nan_to_num(members.rests())
@@ -195,7 +202,7 @@ def kinship(members: Members, blocks: list[Block], most: float) -> np.ndarray:
 
 
 def reach(run: Run, cells: Cells, axis: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return start and end of the accessible range of centres along an axis in each cell."""
+    """Return start and end, in each cell, of the range that centres can reach along an axis."""
     gap = 0 if run.periodic[axis] else radius
     sides = np.linspace(0, run.edges[axis], cells[axis] + 1)
     sides = run.lower[axis] + sides.clip(gap, run.edges[axis] - gap)
@@ -203,12 +210,12 @@ def reach(run: Run, cells: Cells, axis: int, radius: float) -> tuple[np.ndarray,
 
 
 def places(run: Run, cells: Cells) -> np.ndarray:
-    """Return the centres of cells.
+    """Return the centres of the parts of cells that the centres of disks can reach.
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     cells : tuple of int
         numbers of cells along x and y
 
@@ -227,7 +234,10 @@ def places(run: Run, cells: Cells) -> np.ndarray:
 
 
 def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
-    """Return the area (C,) accessible to centres, accurate to 0.5 % of a cell beside obstacles."""
+    """Return the area (C,) of each cell that centres of disks with the given radius can reach.
+
+    In cells beside obstacles, the error is at most 0.5 % of the area of a cell.
+    """
     spans, inner = [], []
     step = np.sqrt(run.edges.prod() / POINTS)
     for k in (0, 1):
@@ -258,7 +268,7 @@ def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
 
 
 def sums(block: Block, cells: Cells, areas: list[np.ndarray], own: np.ndarray) -> np.ndarray:
-    """Return sums (12, C) over the disks of a mask (N,) in each cell in the given frames.
+    """Return 12 sums (12, C) for each cell over the frames of a block and the disks in a mask (N,).
 
     The sums are the number of frames, the number of disks, disks per area, and the sums of m, m v,
     m v v (xx, xy, yy), m v^2 v / 2 and I omega^2.  In a sheared box v is relative to the shear
@@ -289,11 +299,11 @@ BY_FRAMES = np.array([name.startswith(("density", "stress", "heat")) for name in
 
 
 def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
-    """Return the fields (12, C) that follow from `sums`; NaN in cells without disks.
+    """Return the fields (12, C) that follow from `sums`; fields of cells without disks are NaN.
 
-    In cells with fewer than `FEWEST_DISKS` disks, kT, stress and heat flux are NaN.  If the flow
-    has the gradient g, it changes by g h across a cell of width h and contributes m (g h)^2 / 12 to
-    m v v; this contribution is subtracted.
+    In cells with fewer than `FEWEST_DISKS` disks, kT, stress and heat flux are NaN.  A flow with
+    the gradient g changes by g h across a cell of width h.  This change of the flow contributes m
+    (g h)^2 / 12 per disk to the sum of m v v, and the contribution is subtracted.
     """
     frames, n, dense, mass, mx, my, xx, xy, yy, qx, qy, turning = total
     u, v, density = mx / mass, my / mass, dense / frames
@@ -335,17 +345,18 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     runs : list of Run
         (R,) runs of one input, which differ by their seed
     skip : float, optional
-        collisions per disk that are left out at the start [the first half of each run]
+        duration of the equilibration, in collisions per disk [the first half of each run]
     cells : tuple of int
         numbers of cells along x and y
     species : str, optional
-        name of the species whose disks are measured; kT is relative to its flow [all disks]
+        name of the species whose disks are measured, with kT relative to the flow of the species
+        [all disks]
 
     Returns
     -------
     Fields
-        means and errors over blocks of time of all runs; NaN in cells that contain disks in fewer
-        than two blocks
+        means and errors of the fields, which are NaN in cells that contain disks in fewer than two
+        blocks of time
 
     Raises
     ------
@@ -365,7 +376,7 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     parts = np.stack([sums(block, cells, areas, own) for block in blocks])
     weights = parts[:, np.where(BY_FRAMES, 0, 1)]
     values, share = jackknife(lambda total: of_sums(total, run, cells), parts, weights)
-    # The conserved motion of the centre of mass reduces the thermal energy of all disks
+    # If the total momentum is conserved, the thermal energy of all disks is smaller
     # (docs/theory.md).
     values[:, NAMES.index("temperature")] *= run.n_disks / free_disks(run)
     for axis, name in enumerate(("kT_x", "kT_y")):
@@ -392,7 +403,7 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
 
 
 def gained(block: Block, name: str) -> np.ndarray:
-    """Return the increase of a cumulative observable during a block."""
+    """Return the increase of a cumulative observable during a block of time."""
     time, value = block.run.observable(name)
     if len(time) < 2:
         raise RunError(f"{block.run.path}: too few observables in the steady state")
@@ -401,7 +412,7 @@ def gained(block: Block, name: str) -> np.ndarray:
 
 
 def fluxes(blocks: list[Block], axis: int) -> Members:
-    """Return the `Fluxes` (G, 3) from the momentum and energy transferred to both walls."""
+    """Return the fluxes (G, 3) that follow from the momentum and energy passed to both walls."""
     run, (near, far) = blocks[0].run, ACROSS[axis]
     length = 2 * run.edges[1 - axis]
     parts = []
@@ -418,11 +429,12 @@ def fluxes(blocks: list[Block], axis: int) -> Members:
 def expected(
     run: Run, axis: int, x: np.ndarray, flux: Fluxes, middle: tuple[float, float]
 ) -> np.ndarray:
-    """Integrate flow along the walls, kT and density (P, 3) from the middle to positions x.
+    """Predict the flow, kT and density (P, 3) at positions x from the values in the middle.
 
-    The pressure is uniform; dT/dx = -(energy - shear u) / conductivity, du/dx = -shear / viscosity.
-    Raises ValueError if a gas with these fluxes would require a negative temperature or a density
-    above close packing.
+    The flow u is parallel to the walls, and the pressure is uniform.  The equations dT/dx =
+    -(energy - shear u) / conductivity and du/dx = -shear / viscosity are integrated, where `energy`
+    and `shear` are fluxes.  If a gas with these fluxes would require a negative temperature or a
+    density above close packing, ValueError is raised.
     """
     diameter, mass = 2 * run.radius[0], run.mass[0]
     per_disk = np.pi * diameter**2 / 4
@@ -468,7 +480,7 @@ def has_theory(runs: list[Run], axis: int) -> bool:
     Returns
     -------
     bool
-        whether two such walls exist and the disks are smooth, elastic and of one species
+        whether two opposite walls exist, and the disks are smooth, elastic and of one species
 
     Examples
     --------
@@ -487,8 +499,8 @@ def prediction(
 
     Parameters
     ----------
-    measured : Fields
-        fields in cells along the axis
+    measured : ricochet.fields.Fields
+        fields in a row of cells along the axis
     axis : int
         axis across the walls: 0 for x, 1 for y
     x : numpy.ndarray
@@ -497,14 +509,15 @@ def prediction(
     Returns
     -------
     profiles : dict of str to Estimate or None
-        (P,) "flow", "temperature" and "density"; None if no gas has such fluxes
+        (P,) predicted "flow", "temperature" and "density", or None if no gas can have the measured
+        fluxes
     fluxes : Fluxes
-        pressure, shear stress and heat flux measured at the walls
+        the pressure, shear stress and heat flux measured at the walls
 
     Raises
     ------
     RunError
-        if there are too few disks in the middle
+        if too few disks are in the middle between the walls
 
     Examples
     --------

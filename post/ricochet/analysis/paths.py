@@ -1,4 +1,4 @@
-"""Exact paths of disks between frames, from the event log: free flights between collisions."""
+"""Exact paths of disks between frames, which follow from the collisions in the event log."""
 
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ class Turns(NamedTuple):
 
 
 def why_unknown(run: Run, log: EventLog) -> str:
-    """Return the reason why the log does not determine the paths; empty if it does."""
+    """Return the reason why the event log does not determine the paths, or an empty text."""
     if log.momentum_change is None:
         return "the log has no momentum_change"
     if run.nature & KICKED:
@@ -27,16 +27,17 @@ def why_unknown(run: Run, log: EventLog) -> str:
 
 
 def seen(run: Run, log: EventLog, frames: list[int]) -> np.ndarray:
-    """Return the number of events (T,) of the log before each frame."""
+    """Return the number of events in the event log before each frame, (T,)."""
     if run.event_count is None:
         return np.searchsorted(log.time, run.time[frames], "right")
-    # The number is unambiguous even if several events have the same time.
+    # The counts of events of all disks determine this number even if several events have the same
+    # time.
     hits = run.event_count[frames].sum(axis=1, dtype=np.int64)
     return np.searchsorted(np.cumsum(1 + (log.j > 0)), hits, "right")
 
 
 def turns_between(run: Run, log: EventLog, frames: list[int], ends: np.ndarray) -> Turns:
-    """Return all collisions between these frames; `ends` are the numbers of events before each."""
+    """Return all collisions between `frames`; `ends` is the number of events before each frame."""
     if log.momentum_change is None:
         raise ValueError("the log has no momentum_change")
     some = slice(ends[0], ends[-1])
@@ -49,7 +50,7 @@ def turns_between(run: Run, log: EventLog, frames: list[int], ends: np.ndarray) 
     signs = np.where(order < len(i), 1, -1)[:, None]
     event, disk, frame = event[order] + ends[0], disk[order], frame[order]
     gain = signs * log.momentum_change[event] / run.mass[disk, None]
-    # Cumulative sums that are reset for each disk and each frame.
+    # The cumulative sums of velocity changes start at 0 for each disk and each frame.
     first = np.flatnonzero(np.diff(frame * run.n_disks + disk, prepend=-1))
     sums = np.cumsum(gain, axis=0)
     sums -= np.repeat(sums[first] - gain[first], np.diff(first, append=len(disk)), axis=0)

@@ -2,11 +2,11 @@
 
 The speeds of each frame are scaled by the energy of the frame, so that conserved and slowly
 fluctuating energies do not influence the test.  Scaled speeds deviate less from the expected
-distribution than independent values would (Lilliefors, J. Am. Stat. Assoc. 62, 399 (1967)).  The
-p-values therefore follow from random frames that have the same numbers of disks and are scaled in
-the same way.  The velocities in these frames are uniformly distributed on the sphere of constant
-energy, relative to the centre of mass along the `comoving` axes. Correlated frames are weighted
-according to their statistical inefficiency.
+distribution than independent values would (Lilliefors, Journal of the American Statistical
+Association 62, 399 (1967)).  The p-values therefore follow from random frames with the numbers of
+disks and the scaling of the measured frames.  The velocities in a random frame are uniformly
+distributed on the sphere of constant energy.  Along `comoving` axes, the velocities are relative to
+the centre of mass.  Correlated frames are weighted according to their statistical inefficiency.
 """
 
 from collections.abc import Sequence
@@ -27,9 +27,10 @@ BINS = 30  # of equal probability
 DRAWN = 4000  # drawn samples
 MOST = 1000  # speeds of a drawn sample; more have the same distribution of the scaled statistics
 MANY = 2000  # number of disks above which the motion of the centre of mass is negligible
-#: Thresholds for the excess of a statistical inefficiency over 1, times the square root of the
-#: number of frames: one standard deviation of its noise for cumulative counts, of which two are
-#: independent, and two standard deviations for the counts in all bins.
+#: The noise of a statistical inefficiency is inversely proportional to the square root of the
+#: number of frames F. An estimate is used only if it exceeds 1 by more than a threshold divided by
+#: sqrt(F). The threshold is one standard deviation of the noise for cumulative counts, about two of
+#: which are independent. The threshold is two standard deviations for the counts in all bins.
 LEAST_DISTANCE, LEAST_CHI2 = 1.4, 4 / np.sqrt(BINS - 1)
 TAIL = 0.05  # fraction of the samples that an exponential tail replaces
 
@@ -46,9 +47,10 @@ class SpeedTest(NamedTuple):
 
 
 def shares(run: Run, frames: Index, name: str) -> np.ndarray:
-    """Return the energies (F, n) of a species divided by the mean energy of the frame.
+    """Return the energies (F, n) of the disks of a species, divided by the mean energy per disk.
 
-    In equilibrium the mean energy is that of all disks, otherwise that of the species.
+    In equilibrium, the mean energy is that of all disks in the frame.  Otherwise the mean energy is
+    that of the species in the frame.
     """
     energy, own = thermal_energy(run, frames), run.of_species(name)
     unit = energy if run.nature.in_equilibrium else energy[:, own]
@@ -56,7 +58,7 @@ def shares(run: Run, frames: Index, name: str) -> np.ndarray:
 
 
 class Sample(NamedTuple):
-    """Frames of disks of one species that share an energy with others."""
+    """Properties of frames in which disks of one species share a fixed energy with other disks."""
 
     sharing: int  # disks that share the energy
     own: int  # disks of the species
@@ -67,11 +69,11 @@ class Sample(NamedTuple):
     ] = ()  # masses of all disks, those of the species first; () if masses do not matter
 
     def law(self) -> Law:
-        """Return the distribution function of u with which samples are compared."""
+        """Return the expected distribution function of the reduced speed u of a sample."""
         return finite_n_cdf(self.sharing, all(self.axes) and self.own == self.sharing)
 
     def smaller(self) -> "Sample":
-        """Return a sample of at most `MOST` speeds with the same scaled statistics."""
+        """Return a sample of about `MOST` speeds, whose statistics have the same distribution."""
         most = self
         if self.sharing > MANY or not any(self.axes):
             own = min(self.own, MANY)
@@ -79,7 +81,7 @@ class Sample(NamedTuple):
         return most._replace(frames=min(self.frames, -(-MOST // most.own)))
 
     def draw(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Return the `shares` (count, frames * own) of random samples."""
+        """Return `count` random samples of the energies in `shares`, (count, frames * own)."""
         size = count * self.frames
         if self.mass:
             mass = np.array(self.mass)
@@ -96,7 +98,7 @@ class Sample(NamedTuple):
 
 
 def sample_of(run: Run, name: str, frames: int) -> Sample:
-    """Return the properties of the sample of `shares` of a species."""
+    """Return the properties of a sample of `frames` frames, for the disks of a species in a run."""
     own, axes = run.of_species(name), tuple(map(bool, comoving(run) | bool(run.shear_rate)))
     count = int(own.sum())
     mass = (*run.mass[own], *run.mass[~own]) if any(axes) and run.n_disks <= MANY else ()
@@ -104,7 +106,10 @@ def sample_of(run: Run, name: str, frames: int) -> Sample:
 
 
 def statistics_of(values: np.ndarray) -> np.ndarray:
-    """Return n D^2 and chi^2 (2, S) of samples (S, n) that should be uniform from 0 to 1."""
+    """Return n D^2 and chi^2 (2, S) of S samples (S, n), compared with a uniform distribution.
+
+    The distribution is uniform from 0 to 1.  D is the Kolmogorov-Smirnov distance.
+    """
     samples, n = values.shape
     ranks, ordered = np.arange(n) / n, np.sort(values, axis=1)
     distance = np.maximum(ordered - ranks, ranks + 1 / n - ordered).max(axis=1)
@@ -116,7 +121,7 @@ def statistics_of(values: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def by_chance(sample: Sample) -> np.ndarray:
-    """Return n D^2 and chi^2 (2, DRAWN) of random samples in increasing order."""
+    """Return n D^2 and chi^2 (2, DRAWN) of random samples, each sorted in increasing order."""
     rng, law, parts = np.random.default_rng(1), sample.law(), []
     for _ in range(10):
         parts.append(statistics_of(law(np.sqrt(sample.draw(rng, DRAWN // 10)))))
@@ -124,9 +129,10 @@ def by_chance(sample: Sample) -> np.ndarray:
 
 
 def chance(found: float, drawn: np.ndarray) -> float:
-    """Return the fraction of random statistics (S,) that exceed the measured statistic.
+    """Return the probability that a random statistic exceeds the measured statistic `found`.
 
-    Beyond the largest random statistics an exponential tail is used.
+    The probability is the fraction of the sorted random statistics `drawn` (S,) that exceed
+    `found`.  Above their 95 % quantile, the distribution is replaced by an exponential tail.
     """
     first = int(len(drawn) * (1 - TAIL))
     if found <= drawn[first]:
@@ -136,11 +142,11 @@ def chance(found: float, drawn: np.ndarray) -> float:
 
 
 def per_frame(counts: np.ndarray, least: float) -> float:
-    """Return the statistical inefficiency of counts in bins (F, B) of a run.
+    """Return the statistical inefficiency of counts in B bins and F frames, (F, B), of a run.
 
-    The result is 1 unless the estimate exceeds 1 by more than `least` / sqrt(F), the size of random
-    deviations.  Without this threshold the noise of the estimate would distort the p-value of chi^2
-    with many bins.
+    The result is 1 unless the estimate exceeds 1 by more than `least` / sqrt(F), which is the size
+    of random deviations.  Without this threshold, the noise of the estimate would distort the
+    p-value of chi^2 if there are many bins.
     """
     found = statistical_inefficiency(counts) if len(counts) > 2 else 1.0
     return found if found > 1 + least / np.sqrt(len(counts)) else 1.0
@@ -161,9 +167,10 @@ def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> Speed
     Returns
     -------
     SpeedTest
-        both statistics with their probabilities.  If no distribution is known, the law is "none"
-        and these numbers are NaN: for disks that conserve their angular momentum in a round
-        container, and for fewer than three disks that are not in equilibrium with others
+        both statistics with their probabilities.  If the expected distribution is not known, `law`
+        is "none" and these numbers are NaN. The distribution is not known for disks that conserve
+        their angular momentum in a round container, and for fewer than three disks that share a
+        fixed energy
 
     Examples
     --------

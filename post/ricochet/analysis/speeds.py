@@ -21,23 +21,24 @@ __all__ = [
 def kt_of_frames(
     run: Run, frames: Index, species: str | None = None, component: int | None = None
 ) -> np.ndarray:
-    """Return kT of the given frames, without any conserved motion of the centre of mass.
+    """Return kT in the given frames, excluding any conserved motion of the centre of mass.
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
-    frames : Index
+    run : ricochet.Run
+        the run to analyse
+    frames : ricochet.arrays.Index
         frames to use
     species : str, optional
-        the species [all disks together]
+        name of the species [all disks together]
     component : int, optional
-        0 for kT_x, 1 for kT_y, the temperatures of the velocity components [mean of both]
+        0 for the temperature kT_x of the x components of velocities, 1 for kT_y of the y components
+        [the mean of kT_x and kT_y]
 
     Returns
     -------
     numpy.ndarray
-        (F,) kT; velocities are relative to the flow of a sheared box
+        (F,) kT; in a sheared box, velocities are relative to the shear flow
 
     Examples
     --------
@@ -62,14 +63,15 @@ def reduced_speeds(
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
-    frames : Index
+    run : ricochet.Run
+        the run to analyse
+    frames : ricochet.arrays.Index
         frames to use
     each : bool
-        whether each frame is scaled with its own kT instead of the mean kT of all frames
+        whether the speeds of each frame are scaled with kT of that frame instead of the mean kT of
+        all frames
     species : str, optional
-        the species [all]
+        name of the species [all species]
 
     Returns
     -------
@@ -100,7 +102,7 @@ def reduced_speeds(
 
 
 def moment(u: np.ndarray, power: int, independent: float) -> Estimate:
-    """Return the mean of a power of speeds after scaling them to a mean square of 1."""
+    """Return the mean of u^power for speeds u that are first scaled to a mean square of 1."""
     mean = np.mean(u**power)
     rest = u**power - power / 2 * mean * u**2
     return Estimate(mean, np.std(rest) / np.sqrt(independent))
@@ -115,21 +117,22 @@ def all_move(run: Run, frame: int) -> bool:
 def relaxation(
     run: Run, until: float = 16, frames: int | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the second Sonine coefficient a2 of early frames against collisions per disk.
+    """Return collisions per disk and the second Sonine coefficient a2 of speeds in early frames.
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     until : float
-        collisions per disk up to which frames are used
+        largest number of collisions per disk in the frames that are used
     frames : int, optional
-        number of frames from the first one on, instead of `until`
+        number of frames from the start of the run, which replaces `until`
 
     Returns
     -------
     tau, a2 : numpy.ndarray
-        (F,) collisions per disk and coefficient; frames with disks at rest are left out
+        (F,) collisions per disk, and the coefficient a2; frames in which all disks of a species are
+        at rest are left out
 
     Examples
     --------
@@ -160,8 +163,8 @@ def means(runs: Sequence[Run], frames: Sequence[Index], name: str) -> tuple[Esti
     Returns
     -------
     tuple of Estimate
-        speed and energy; errors follow from the scatter of the runs or, for a single run, of its
-        frames
+        mean speed and mean energy; the errors follow from the scatter of the runs or, for a single
+        run, from the scatter of its frames
 
     Examples
     --------

@@ -1,7 +1,8 @@
 """Means with errors, fits, and goodness-of-fit tests.
 
-Errors are computed in two ways: by `estimate` for independent values, such as runs that differ by
-their seed, and by `correlated_mean` for a single series in time, whose samples are correlated.
+Two functions compute errors.  The function `estimate` is for independent values, such as the
+results of runs that differ by their seed.  The function `correlated_mean` is for a single series in
+time, whose samples are correlated.
 """
 
 from collections.abc import Callable, Sequence
@@ -43,14 +44,14 @@ FEWEST_RUNS = 4  # smallest number of runs whose scatter is used as a weight
 
 
 class Estimate(NamedTuple):
-    """A mean with its error, which is half the 68 % interval."""
+    """A mean with its error; the error is half the width of the 68 % confidence interval."""
 
     mean: Any  # a number, or an array of any shape
     error: Any  # same shape as the mean
 
 
 class Curve(NamedTuple):
-    """Points with the errors of y; (P,) each."""
+    """P points of a curve, with the errors of y."""
 
     x: np.ndarray
     y: np.ndarray
@@ -68,7 +69,7 @@ class LawTest(NamedTuple):
 
 
 class PowerLaw(NamedTuple):
-    """Power law y = factor x^exponent; the error is that of a weighted fit."""
+    """Power law y = factor x^exponent, with the error of the exponent from a weighted fit."""
 
     factor: float
     exponent: float
@@ -79,7 +80,8 @@ class PowerLaw(NamedTuple):
     def misses(self, runs: int) -> bool:
         """Return whether the points deviate from the power law by more than their errors explain.
 
-        The test, that of Welch (1951), allows for errors that were estimated from `runs` runs.
+        The test of Welch (1951) takes into account that the errors were estimated from only `runs`
+        runs.
         """
         if self.free < 1 or runs < FEWEST_RUNS:
             return False
@@ -105,8 +107,8 @@ def goodness_of_fit(
     bins : int
         number of bins of equal probability for the chi-square test
     independent : int, optional
-        number of independent values in the sample [all values]; it is smaller than the number of
-        values if these are correlated
+        number of independent values in the sample [the number of values]; a sample of correlated
+        values contains fewer independent values
 
     Returns
     -------
@@ -137,7 +139,7 @@ ONE_SIGMA = float(scipy.special.ndtr(1))  # importing scipy.stats takes a second
 
 
 def student(samples: ArrayLike) -> Any:
-    """Return the ratio of half the 68 % interval of a mean to its standard error (Student's t).
+    """Return Student's factor t: half the 68 % interval of a mean, divided by its standard error.
 
     Parameters
     ----------
@@ -163,14 +165,14 @@ def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
     Parameters
     ----------
     values : array_like
-        (..., R, ...) the values; `axis` runs over R runs
+        (..., R, ...) the values of R runs
     axis : int
         axis of the runs
 
     Returns
     -------
     Estimate
-        (...) mean and half its 68 % interval, by Student's t; NaN for a single value
+        (...) mean, and half its 68 % interval from Student's t; the error of a single value is NaN
 
     Examples
     --------
@@ -186,22 +188,22 @@ def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
 
 
 def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estimate:
-    """Propagate the error of a curve to a number that is derived from it.
+    """Propagate the error of a curve to a number that is derived from the curve.
 
     Parameters
     ----------
     of : callable
         function that returns a number for a curve (P,), such as the time at which the curve crosses
         a level
-    curve : Estimate
+    curve : ricochet.statistics.Estimate
         (P,) the curve with its error
 
     Returns
     -------
     Estimate
-        the number for the mean curve, and half the difference between the numbers for the curve
-        plus its error and for the curve minus its error; NaN if one of these numbers is NaN, or if
-        the curve has no error
+        mean and half the difference of two numbers, which are derived from the curve plus its error
+        and from the curve minus its error; both are NaN if one of these numbers is NaN, or if the
+        curve has no error
 
     Examples
     --------
@@ -227,18 +229,21 @@ class SeriesMean(NamedTuple):
     """The mean of a correlated series, with its error and diagnostics."""
 
     mean: float
-    error: float  # half the 68 % interval; NaN for fewer than `FEWEST` independent samples
+    error: float  # half the 68 % interval, or NaN for fewer than `FEWEST` independent samples
     samples: float  # number of independent samples
     drift: float  # slope over its error; a standard Gaussian variable without a drift
     freedom: float = np.inf  # degrees of freedom of the error
 
     def scaled(self, factor: float, offset: float = 0.0) -> "SeriesMean":
-        """Return the mean of the series offset + factor x."""
+        """Return the mean of the series offset + factor x, where x is the original series."""
         return self._replace(mean=offset + factor * self.mean, error=abs(factor) * self.error)
 
 
 def cells(series: np.ndarray, count: int) -> np.ndarray:
-    """Return the means of `count` equal parts of a series (T,), which end at its last sample."""
+    """Return the means of about `count` equal parts of a series (T,).
+
+    Samples at the start of the series that do not fill a part are left out.
+    """
     width = max(1, len(series) // count)
     return series[len(series) % width :].reshape(-1, width).mean(axis=1)
 
@@ -246,10 +251,11 @@ def cells(series: np.ndarray, count: int) -> np.ndarray:
 def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
     """Estimate the statistical inefficiency 1 + 2 tau of a series.
 
-    tau is the integrated autocorrelation time in samples.  The variance of the mean is the variance
-    for independent samples times the statistical inefficiency.  The window of the sum and the
-    correction for the unknown mean are those of U. Wolff, Comput. Phys. Commun. 156, 143 (2004), S
-    = 1.5.  Sums that end at the first negative term would underestimate the error of short series.
+    tau is the integrated autocorrelation time, in samples.  The variance of the mean of correlated
+    samples is the variance for independent samples times the statistical inefficiency.  The largest
+    lag in the sum of autocorrelations, and the correction for the unknown mean, are those of Wolff,
+    Computer Physics Communications 156, 143 (2004), with the parameter S = 1.5.  A sum that ends at
+    the first negative autocorrelation would underestimate the error of short series.
 
     Parameters
     ----------
@@ -257,7 +263,7 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
         (T,) samples at equal intervals, or (T, K) samples of K quantities, whose autocorrelations
         are added
     least : float
-        lower bound of the result; anticorrelated samples have values below 1
+        lower bound of the result, which is below 1 for anticorrelated samples
 
     Returns
     -------
@@ -287,20 +293,22 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
 def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
     """Estimate the mean of a correlated series, or the ratio of the sums of two correlated series.
 
-    The error is that of the mean of the series amount - ratio * per, from its slowest waves.
+    The error is that of the mean of the series amount - ratio * per, which is estimated from the
+    slowest Fourier components of this series.
 
     Parameters
     ----------
     amount : array_like
         (T,) samples of a series in equilibrium, such as numbers of collisions
     per : array_like
-        (T,) series by which the amounts are divided, such as durations; or a number
+        (T,) series by whose sum the sum of the amounts is divided, such as durations; or a number
 
     Returns
     -------
     SeriesMean
-        the ratio of the sums, its error, the effective number of independent samples of the series,
-        and its drift; the error is NaN if a few parts contain most of the sum of `per`
+        the ratio of the sums with its error, and the effective number of independent samples and
+        the drift of the series; the error is NaN if a few parts of the series contain most of the
+        sum of `per`
 
     Examples
     --------
@@ -328,10 +336,10 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
     """Return standard error of the mean, degrees of freedom and drift of a series (T,).
 
     The square of the error is the mean square of the first coefficients of the cosine transform,
-    divided by the length of the series: E. Lazarus, D. J. Lewis, J. H. Stock and M. W. Watson, J.
-    Bus. Econ. Stat. 36, 541 (2018).  Only so few coefficients are used that their waves are slower
-    than the correlations of the series.  The drift is the ratio of the first coefficient to the
-    following ones.
+    divided by the length of the series.  The method is that of Lazarus, Lewis, Stock and Watson,
+    Journal of Business and Economic Statistics 36, 541 (2018).  The number of coefficients is
+    limited to waves that are slower than the correlations of the series.  The drift is the ratio of
+    the first coefficient to the following coefficients, expressed as a standard Gaussian variable.
     """
     parts = cells(series, FINE)
     per_sample = max(1e-9, statistical_inefficiency(parts))
@@ -348,8 +356,8 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
 def equilibration(series: np.ndarray) -> int:
     """Return the number of samples before a series becomes stationary.
 
-    The result is twice the number of samples that White's rule leaves out (MSER; K. P. White,
-    Simulation 69, 323 (1997)).  The rule minimises the standard error of the mean of the remaining
+    The result is twice the number of samples that White's rule (MSER) leaves out (White, Simulation
+    69, 323 (1997)).  White's rule minimises the standard error of the mean of the remaining
     samples.
 
     Parameters
@@ -360,7 +368,7 @@ def equilibration(series: np.ndarray) -> int:
     Returns
     -------
     int
-        index of the first sample to use, at most half of the series
+        index of the first sample to use, at most half the length of the series
 
     Examples
     --------
@@ -378,8 +386,9 @@ def equilibration(series: np.ndarray) -> int:
 def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
     """Combine the means of independent runs into one mean.
 
-    The error follows from the errors of the runs.  If the runs scatter by more than these errors
-    explain, or if a run has no error, the error follows from the scatter of the runs instead.
+    The error of the combined mean follows from the errors of the runs.  If the means of the runs
+    scatter by more than their errors explain, or if a run has no error, the error of the combined
+    mean follows from this scatter.
 
     Parameters
     ----------
@@ -389,8 +398,8 @@ def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
     Returns
     -------
     SeriesMean
-        the mean of the means; its `samples` are the sum over the runs or, if the error follows from
-        the scatter, the number of runs
+        the mean of the means; the attribute `samples` is the sum over the runs or, if the error
+        follows from the scatter, the number of runs
 
     Examples
     --------
@@ -412,7 +421,7 @@ def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
 
 
 def squares(means: Sequence[SeriesMean]) -> np.ndarray:
-    """Return the squares (R,) of the standard errors of means, without Student's factor t."""
+    """Return the squares (R,) of the standard errors of means, which exclude Student's factor t."""
     return np.array([(one.error / student(one.freedom + 1)) ** 2 for one in means])
 
 
@@ -421,7 +430,7 @@ FEW = 10  # independent samples
 
 
 def scatter_p(means: Sequence[SeriesMean]) -> float:
-    """Return the probability of at least this scatter of runs if their errors are correct."""
+    """Return the probability that means with these errors scatter at least as much as `means`."""
     mean, error, _, _, freedom = np.array(means).T
     if len(means) < 2 or not np.all(error > 0):
         return 1.0
@@ -430,17 +439,17 @@ def scatter_p(means: Sequence[SeriesMean]) -> float:
 
 
 def has_drift(mean: SeriesMean) -> bool:
-    """Determine whether the halves of a series differ by more than chance explains.
+    """Determine whether a series drifts by more than chance explains.
 
     Parameters
     ----------
-    mean : SeriesMean
+    mean : ricochet.statistics.SeriesMean
         the mean of the series
 
     Returns
     -------
     bool
-        whether the probability of such a difference is below `UNLIKELY`
+        whether the probability that such a drift occurs by chance is below `UNLIKELY`
 
     Examples
     --------
@@ -453,8 +462,8 @@ def has_drift(mean: SeriesMean) -> bool:
 def has_trend(series: np.ndarray) -> bool:
     """Determine whether a straight line explains most of the variance of a series.
 
-    `correlated_mean` interprets such a trend as a long autocorrelation and then finds no
-    significant drift.
+    The function `correlated_mean` interprets such a trend as a long autocorrelation and therefore
+    finds no significant drift.
 
     Parameters
     ----------
@@ -482,14 +491,14 @@ def diagnostics(name: str, means: Sequence[SeriesMean]) -> list[str]:
     Parameters
     ----------
     name : str
-        name of the quantity in the sentences
+        name of the quantity in the returned sentences
     means : sequence of SeriesMean
         (R,) the means of the runs
 
     Returns
     -------
     list of str
-        a sentence for each reason; empty without reasons
+        a sentence for each reason; an empty list if the mean is reliable
 
     Examples
     --------
@@ -583,7 +592,7 @@ def binned(values: np.ndarray, bins: np.ndarray, independent: int | None = None)
 def excess_kurtosis(speed: np.ndarray) -> float:
     """Return the second Sonine coefficient a2 = <v^4> / (2 <v^2>^2) - 1 of speeds.
 
-    The speeds are those of disks in two dimensions.
+    The formula is for speeds in two dimensions.
 
     Parameters
     ----------
@@ -615,7 +624,8 @@ def rounded_to_error(mean: float, error: float) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        mean and error, rounded to two digits of the error; the mean only if the error is NaN
+        mean and error, rounded to two significant digits of the error; only the mean if the error
+        is NaN
 
     Examples
     --------
@@ -633,9 +643,9 @@ def rounded_to_error(mean: float, error: float) -> tuple[str, ...]:
 def kurtosis_noise(count: int) -> float:
     """Return the standard deviation of `excess_kurtosis` for Maxwellian speeds.
 
-    To first order a2 is the deviation of the sample mean of x^2 / 2 - 2 x from its expected value,
-    where x = v^2 has an exponential distribution with mean 1.  The variance of x^2 / 2 - 2 x is 20
-    / 4 + 4 * 1 - 2 * 4 = 1.
+    The square x = v^2 of a Maxwellian speed v has an exponential distribution, here with mean 1.
+    To first order, a2 is the deviation of the sample mean of x^2 / 2 - 2 x from the expected value.
+    The variance of x^2 / 2 - 2 x is 20 / 4 + 4 * 1 - 2 * 4 = 1.
 
     Parameters
     ----------
@@ -667,12 +677,14 @@ def fit_power_law(
     x, y : numpy.ndarray
         (P,) the points; points with a coordinate that is not positive are left out
     y_error : numpy.ndarray, optional
-        (P,) errors of y [equal weights; the error follows from the scatter of the points]
+        (P,) errors of y; without them all points have equal weights, and the error of the fit
+        follows from the scatter of the points
 
     Returns
     -------
     PowerLaw or None
-        factor and exponent with error; None for fewer than three different x
+        factor and exponent, with the error of the exponent, or None if fewer than three points have
+        different x
 
     Examples
     --------

@@ -1,8 +1,9 @@
 """The stream function of a measured flow on a grid of cells.
 
-In a steady state the flux of disks j = n u has no divergence, so that j_x = d psi / dy and j_y = -d
-psi / dx.  The contour lines of psi are the streamlines of the mean flow.  The difference of psi
-between two streamlines is the number of disks that pass between them per time.
+In a steady state the flux of disks j = n u has no divergence.  Therefore a stream function psi
+exists, with j_x = d psi / dy and j_y = -d psi / dx.  The contour lines of psi are the streamlines
+of the mean flow.  The difference of psi between two streamlines is the number of disks that pass
+between these streamlines per unit of time.
 """
 
 import numpy as np
@@ -16,21 +17,23 @@ __all__ = ["stream_function"]
 def stream_function(run: Run, flux: np.ndarray) -> np.ndarray:
     """Fit a stream function to the flux of disks in cells.
 
-    The derivatives of the stream function are a flux with the smallest sum of squared deviations
-    from the measured flux.  The fit removes the part of the noise that has a divergence.
+    The fit minimises the sum of squared deviations between the measured flux and the flux that
+    follows from the stream function.  The fit thereby removes the part of the noise that has a
+    divergence.
 
     Parameters
     ----------
-    run : Run
-        a simulation with the same box; no flux passes its walls
+    run : ricochet.Run
+        a run in the same box; no flux passes through the walls of the box
     flux : numpy.ndarray
-        (2, NY, NX) density times flow along x and y [1/(length time)]; NaN in cells without data,
-        as inside obstacles, is treated as 0
+        (2, NY, NX) density times flow along x and y [1/(length time)]; the value NaN, as in cells
+        inside obstacles, is treated as 0
 
     Returns
     -------
     numpy.ndarray
-        (NY + 1, NX + 1) values at the corners of the cells [1/time]; 0 at the lower left corner
+        (NY + 1, NX + 1) stream function at the corners of the cells [1/time], which is 0 at the
+        lower left corner
 
     Examples
     --------
@@ -41,8 +44,8 @@ def stream_function(run: Run, flux: np.ndarray) -> np.ndarray:
     _, rows, columns = flux.shape
     edges = run.edges / (columns, rows)
     unknowns, corners = corner_unknowns(rows, columns, run.periodic)
-    # A row of `corners` expresses the value at a corner by unknowns; differences of corners are
-    # fluxes.
+    # Each row of the matrix `corners` expresses psi at one corner as a sum of unknowns. Differences
+    # of psi between corners of a cell determine the flux in the cell.
     number = np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, columns + 1)
     lower, upper, left, right = number[:-1], number[1:], number[:, :-1], number[:, 1:]
     ends = slice(None, -1), slice(1, None)
@@ -63,7 +66,7 @@ def stream_function(run: Run, flux: np.ndarray) -> np.ndarray:
 
 
 def differences(terms: list[tuple[np.ndarray, float]], count: int) -> scipy.sparse.csr_array:
-    """Return the sparse matrix whose rows add the corners of a cell with these factors."""
+    """Return a sparse matrix; each row adds values at the corners of one cell, times factors."""
     cells = terms[0][0].size
     rows = np.tile(np.arange(cells), len(terms))
     columns = np.concatenate([corner.ravel() for corner, _ in terms])
@@ -76,10 +79,10 @@ def corner_unknowns(
 ) -> tuple[int, scipy.sparse.csr_array]:
     """Return the number of unknowns, and the matrix from unknowns to values at the corners.
 
-    The first unknowns are the values at corners that are not on walls; periodic images of a corner
-    share an unknown.  Each wall has one value, which is 0 at the lower or left wall.  For a
-    periodic axis a further unknown is the flux through the whole box, by which psi differs between
-    opposite sides.
+    The first unknowns are the values of psi at corners that are not on walls; all periodic images
+    of a corner have one common unknown.  Psi is constant on each wall, and is 0 on the lower wall
+    and on the left wall.  For each periodic axis, a further unknown is the flux along this axis
+    through the whole box, which is the difference of psi between the opposite sides.
     """
     y, x = np.meshgrid(np.arange(rows + 1), np.arange(columns + 1), indexing="ij")
     fixed = np.zeros(x.shape, dtype=bool)

@@ -1,6 +1,7 @@
 """Structure of a run: pair correlation, structure factor, clusters and bond order.
 
-The functions use SciPy only, because the available libraries support periodic boxes but not walls.
+The functions use SciPy only, because the available libraries for the analysis of structure support
+periodic boxes but not walls.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -29,13 +30,13 @@ MOST_TERMS = 3e8  # largest number of terms of S(k) in a frame
 
 
 def periods(run: Run) -> np.ndarray:
-    """Return the shifts (M, 2) to the box itself and to its neighbouring periodic images."""
+    """Return the displacements (M, 2) of the periodic images of the box, including 0."""
     along = [(-1, 0, 1) if periodic else (0,) for periodic in run.periodic]
     return run.edges * np.array([(i, j) for i in along[0] for j in along[1]])
 
 
 def refuse(run: Run, *traits: str) -> None:
-    """Raise an error for sheared runs, and for walls if wave vectors are needed."""
+    """Raise an error if the run has one of the given traits."""
     law = "structure is found in boxes at rest" + ", S(k) in periodic ones" * ("walls" in traits)
     allow(run, law, *TRAITS.keys() - set(traits))
 
@@ -46,23 +47,24 @@ def pair_correlation(
     """Return the pair correlation function g(r) averaged over frames.
 
     g(r) is the density of disks at the distance r from a disk, divided by the mean density of the
-    box.  Between walls, which may move, only disks far from the walls are used as centres.
+    box.  In a box with walls, which may move, only disks far from the walls are used as centres.
 
     Parameters
     ----------
-    run : Run
-        a simulation in a box at rest
-    frames : Index
+    run : ricochet.Run
+        a run in a box at rest
+    frames : ricochet.arrays.Index
         the frames: a number, a slice, or a list
     edges : numpy.ndarray
         (B + 1,) edges of the bins of r, in mean diameters
     pair : tuple of str, optional
-        two species: g(r) is the density of the second species around disks of the first [all disks]
+        names of two species, for g(r) of the second species around disks of the first species [all
+        disks]
 
     Returns
     -------
     numpy.ndarray
-        (B,) g(r); NaN where there are no pairs
+        (B,) g(r), or NaN if there are no pairs of disks
 
     Raises
     ------
@@ -96,7 +98,7 @@ def pair_correlation(
 
 
 def masks(run: Run, pair: tuple[str, str] | None) -> list[np.ndarray]:
-    """Return the masks (N,) of two species (one mask if both are equal) or of all disks."""
+    """Return a list with the masks (N,) of the species in `pair`, or with the mask of all disks."""
     return [run.of_species(name) for name in dict.fromkeys(pair)] if pair else [run.species > 0]
 
 
@@ -105,25 +107,25 @@ def structure_factor(
 ) -> np.ndarray:
     """Return the structure factor S(k) = <|sum of exp(i k x)|^2> / N averaged over frames.
 
-    Of each pair of wave vectors k and -k only one is used.  For many disks only a part of the wave
-    vectors is evaluated.
+    Only one of the wave vectors k and -k is used, because S(k) = S(-k).  If there are many disks,
+    only a part of the wave vectors is used.
 
     Parameters
     ----------
-    run : Run
-        a simulation in a periodic box
-    frames : Index
+    run : ricochet.Run
+        a run in a periodic box
+    frames : ricochet.arrays.Index
         the frames: a number, a slice, or a list
     edges : numpy.ndarray
         (B + 1,) edges of the bins of k, in 1 / mean diameter
     pair : tuple of str, optional
-        two species: S(k) is the product of the sums over the disks of each species, divided by the
-        square root of the product of their numbers of disks [all disks]
+        names of two species; S(k) is then the product of the sums over the disks of each species,
+        divided by the geometric mean of the numbers of disks [all disks]
 
     Returns
     -------
     numpy.ndarray
-        (B,) S(k); NaN in bins without a wave vector of the box
+        (B,) S(k), or NaN in bins without a wave vector of the box
 
     Raises
     ------
@@ -166,9 +168,9 @@ def evenly(run: Run, frames: Index = slice(None), most: int = 50) -> list[int]:
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
-    frames : Index
+    run : ricochet.Run
+        the run to analyse
+    frames : ricochet.arrays.Index
         frames from which to select [all]
     most : int
         largest number of frames to return
@@ -176,7 +178,7 @@ def evenly(run: Run, frames: Index = slice(None), most: int = 50) -> list[int]:
     Returns
     -------
     list of int
-        numbers of the frames, in order
+        numbers of the selected frames, in increasing order
 
     Examples
     --------
@@ -250,17 +252,17 @@ def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray:
 
     Parameters
     ----------
-    run : Run
-        a simulation in a box at rest
-    frame : Index
+    run : ricochet.Run
+        a run in a box at rest
+    frame : ricochet.arrays.Index
         number of a frame, or index of several frames
     gap : float
-        largest gap between neighbours [length]
+        largest gap between the rims of neighbouring disks [length]
 
     Returns
     -------
     int or numpy.ndarray
-        the number of disks; (F,) for several frames
+        the number of disks, as an array (F,) for several frames
 
     Examples
     --------
@@ -289,16 +291,16 @@ def bond_order(run: Run, frame: Index) -> np.ndarray:
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
-    frame : Index
+    run : ricochet.Run
+        the run to analyse
+    frame : ricochet.arrays.Index
         number of a frame, or index of several frames
 
     Returns
     -------
     numpy.ndarray
-        (N,) complex, or (F, N) for several frames; the modulus is 1 for six neighbours at equal
-        angles
+        (N,) complex numbers, or (F, N) for several frames; the modulus is 1 if a disk has six
+        neighbours at equal angles
 
     Examples
     --------
@@ -332,23 +334,23 @@ def bond_correlation(
 ) -> np.ndarray:
     """Return the correlation function g6(r) = Re <psi6*(0) psi6(r)> of bond order.
 
-    For many disks only a part of them is used as centres.
+    If there are many disks, only a part of the disks is used as centres.
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
-    frames : Index
+    run : ricochet.Run
+        the run to analyse
+    frames : ricochet.arrays.Index
         frames to use
     psi : sequence of numpy.ndarray
-        (F, N) `bond_order` of each of the frames
+        (F, N) result of `bond_order` for each of the frames
     edges : numpy.ndarray
         (B + 1,) edges of the bins of r, in mean diameters
 
     Returns
     -------
     numpy.ndarray
-        (B,) g6(r); NaN where there are no pairs
+        (B,) g6(r), or NaN in bins without pairs of disks
 
     Examples
     --------

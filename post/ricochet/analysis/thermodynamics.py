@@ -1,9 +1,10 @@
 """Pressure, collision rates and temperature of runs in equilibrium, with errors.
 
-The pressure can be measured in three independent ways: by the virial of the pair collisions, by the
-collision rate (equal disks), and by the force on the sides.  Z = P / (n kT).  kT is exact where the
-kinetic energy is conserved, otherwise a mean over time.  `skip` is the duration of the
-equilibration in collisions per disk; earlier samples are left out.  With None this duration is
+The pressure P can be measured in three independent ways: from the virial of the pair collisions,
+from the collision rate of equal disks, and from the force on the sides.  The compressibility factor
+is Z = P / (n kT).  If the kinetic energy is conserved, kT is exact; otherwise kT is a mean over
+time.  The parameter `skip` of many functions is the duration of the equilibration, in collisions
+per disk; samples from the equilibration are left out.  If `skip` is None, the duration is
 determined from the data.
 """
 
@@ -49,13 +50,13 @@ ALONG_WALLS = {
     "inelastic",
 }  # with these traits walls may change the momentum along them
 MANY = 1e8  # number of disks above which the effect of a fixed energy is negligible
-#: Traits that a run with an equation of state may have.  A run without traits has equal smooth
-#: disks with conserved energy in a periodic box.
+#: Traits (see `nature`) that a run may have if an equation of state applies to the run. A run
+#: without any trait has equal smooth disks with conserved energy in a periodic box.
 FLUID = ("walls", "thermal_walls", "thermostatted", "rough", "rotating", "mixture")
 
 
 class Steps(NamedTuple):
-    """Changes from one sample of the observables to the next, in equilibrium."""
+    """Changes of observables between successive samples in equilibrium."""
 
     time: np.ndarray  # (T,) duration
     kt: np.ndarray  # (T,) mean over the duration
@@ -66,14 +67,14 @@ class Steps(NamedTuple):
 
 
 def refuse_others(runs: Sequence[Run]) -> None:
-    """Raise an error for runs of different disks."""
+    """Raise an error unless all runs have the same species with the same numbers of disks."""
     for run in runs:
         if run.names != runs[0].names or not np.array_equal(run.species, runs[0].species):
             raise RunError(f"{run.path}: its disks are not those of {runs[0].path}")
 
 
 def all_settle(runs: Sequence[Run]) -> bool:
-    """Return whether the runs relax to equilibrium; raise an error if only some of them do."""
+    """Return whether the runs relax to equilibrium; raise an error if only some runs do so."""
     settled = [run.nature.in_equilibrium for run in runs]
     if any(settled) and not all(settled):
         one, other = runs[settled.index(False)], runs[settled.index(True)]
@@ -84,9 +85,10 @@ def all_settle(runs: Sequence[Run]) -> bool:
 
 
 def after_start(run: Run, skip: float | None = None) -> float:
-    """Return the time after `skip`, or by default `SPEEDS_FORGET`, collisions per disk.
+    """Return the time after which `skip` collisions per disk have occurred.
 
-    For a shorter run, the time is half of the duration of the run.
+    By default the number of collisions per disk is `SPEEDS_FORGET`, or half of the collisions of a
+    short run.  In a run without collisions, the result is half of the duration.
     """
     time = np.union1d(run.time, run.collisions_per_disk.time)
     tau = run.collisions_per_disk_at(time)
@@ -103,17 +105,18 @@ def after_start(run: Run, skip: float | None = None) -> float:
 def start_of_steady_state(run: Run, skip: float | None = None) -> float:
     """Return the time after which a run is in a steady state.
 
-    The collision rate and the energies of the species, if they can change, are tested for drifts.
-    The tests use the samples of the observables or, if there are only few samples, the frames.  The
-    result is at least `SPEEDS_FORGET` collisions per disk after the start, so that speed
-    distributions are steady; for a shorter run it is at most half of the time.
+    A run is regarded as steady after the time at which the collision rate and the energies of the
+    species stop drifting.  Drifts are found in the samples of the observables or, if there are few
+    samples, in the frames.  The result is at least `SPEEDS_FORGET` collisions per disk after the
+    start, because the distribution of speeds relaxes during this time.  If a run has
+    fewer than 2 `SPEEDS_FORGET` collisions per disk, this minimum is half of their number.
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     skip : float, optional
-        collisions per disk that are left out at the start [until no observable drifts]
+        duration of the equilibration, in collisions per disk [until no observable drifts]
 
     Returns
     -------
@@ -130,7 +133,7 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
 
 
 def explained_start(run: Run, skip: float | None = None) -> tuple[float, str]:
-    """Return the time after which a run is steady, and why earlier samples are left out."""
+    """Return the time after which a run is steady, and a text with the reason for this time."""
     forgets = f"{SPEEDS_FORGET:g} collisions per disk, the relaxation time of speeds"
     if skip is not None:
         return after_start(run, skip), f"--equilibration {skip:g}"
@@ -149,9 +152,9 @@ def explained_start(run: Run, skip: float | None = None) -> tuple[float, str]:
 
 
 def examined(run: Run) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return times (T,) and, by name, the series (T - 1,) that are tested for drifts.
+    """Return times (T,) and a dictionary with the series (T - 1,) that are tested for drifts.
 
-    If there are only few samples, no series are returned.
+    If there are too few samples for a test, the dictionary is empty.
     """
     few = has_few_observables(run)
     time = run.time if few else run.collisions_per_disk.time
@@ -180,10 +183,10 @@ def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     skip : float, optional
-        collisions per disk that are left out at the start [until no observable drifts]
+        duration of the equilibration, in collisions per disk [until no observable drifts]
 
     Returns
     -------
@@ -193,7 +196,7 @@ def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
     Raises
     ------
     Refused
-        if the run has no equilibrium
+        if the run does not reach equilibrium
 
     Examples
     --------
@@ -212,14 +215,14 @@ def frames_from(
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     start : float
         time of the first frame
     apart : float
-        collisions per disk between frames
+        smallest number of collisions per disk between two selected frames
     frames : list of int, optional
-        frames to choose from [all]
+        frames from which to select [all frames]
 
     Returns
     -------
@@ -242,10 +245,10 @@ def frames_from(
 
 
 def later(run: Run, skip: float | None = None) -> slice:
-    """Return the frames in the steady state or, for a cooling gas, after `after_start`.
+    """Return the frames in the steady state or, for a cooling gas, the frames after `after_start`.
 
-    The last frame is left out, because its interval from the previous frame may differ from the
-    other intervals.
+    The last frame is left out, because the last interval between frames may differ from the other
+    intervals.
     """
     first = int(np.searchsorted(run.time, start_of_steady_state(run, skip)))
     if run.n_frames - 1 - first < 2:
@@ -257,18 +260,18 @@ def later(run: Run, skip: float | None = None) -> slice:
 
 
 def motion_notes(runs: Sequence[Run]) -> list[str]:
-    """If noise moves the centre of mass, return a note that motion is relative to it."""
+    """Return a note if motion is measured relative to a centre of mass that noise moves."""
     walks = any("random_walk" in run.nature for run in runs)
     note = "noise moves the centre of mass (drive.keep_momentum): motion is measured relative to it"
     return [note] * walks
 
 
 def unforced(source: Run | Simulation) -> np.ndarray:
-    """Return the axes (2,) along which only noise changes the total momentum.
+    """Return a mask (2,) of the axes along which nothing except noise changes the total momentum.
 
-    Walls parallel to the axis are not considered; they conserve the momentum along them unless the
-    run has a trait of `ALONG_WALLS`.  An error is raised if noise moves the centre of mass and
-    walls with such a trait may stop this motion.
+    Forces of walls parallel to an axis are not considered.  Such walls conserve the momentum along
+    the axis unless the run has a trait in `ALONG_WALLS`.  If noise moves the centre of mass, and
+    walls of a run with such a trait may stop this motion, an error is raised.
     """
     box, nature = source.parameters.get("box", {}), source.nature
     if nature & (KICKED - {"noise_driven"}) or nature & {"obstacles", "changed"}:
@@ -282,9 +285,9 @@ def unforced(source: Run | Simulation) -> np.ndarray:
 
 
 def comoving(run: Run) -> np.ndarray:
-    """Return the axes (2,) along which motion is measured relative to the centre of mass.
+    """Return a mask (2,) of the axes along which motion is relative to the centre of mass.
 
-    Along these axes the total momentum is conserved, or changed by noise only.
+    Along these axes the total momentum is conserved, or only noise changes the total momentum.
     """
     kept = unforced(run)
     if run.nature & ALONG_WALLS and "random_walk" not in run.nature:
@@ -294,9 +297,11 @@ def comoving(run: Run) -> np.ndarray:
 
 
 def thermal_energy(run: Run, frames: Index, component: int | None = None) -> np.ndarray:
-    """Return m v^2 / 2 (F, N), with v relative to the flow and the mean along `comoving` axes.
+    """Return the energies m v^2 / 2 (F, N) of the thermal motion of disks in the given frames.
 
-    `component` is 0 to use the x component of v only, 1 for the y component.
+    The velocity v is relative to the shear flow and, along `comoving` axes, to the centre of mass.
+    If `component` is 0, only the x component of v is used.  If `component` is 1, only the y
+    component is used.
     """
     frames = chosen(run.n_frames, frames)
     velocity = run.velocity[frames]
@@ -309,17 +314,19 @@ def thermal_energy(run: Run, frames: Index, component: int | None = None) -> np.
 
 
 def free_disks(run: Run) -> float:
-    """Return N minus a half for each axis along which motion is relative to the centre of mass.
+    """Return the effective number of disks: the total kinetic energy divided by kT.
+
+    This number is N minus 1/2 for each axis along which motion is relative to the centre of mass.
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
 
     Returns
     -------
     float
-        the ratio of the kinetic energy to kT
+        the effective number of disks
 
     Examples
     --------
@@ -330,15 +337,15 @@ def free_disks(run: Run) -> float:
 
 
 def drift(run: Run) -> np.ndarray:
-    """Return the conserved velocity (2,) of the centre of mass; 0 if it is not conserved."""
+    """Return the velocity (2,) of the centre of mass, or 0 along axes where it is not conserved."""
     centre = np.average(run.velocity[0], axis=0, weights=run.mass)
     return np.where(comoving(run), centre, 0.0)
 
 
 def kt_of(run: Run, energy: np.ndarray) -> np.ndarray:
-    """Return kT from the total kinetic energy, an array of any shape.
+    """Return kT for total kinetic energies `energy`, an array of any shape.
 
-    docs/theory.md explains when to divide by N and when by N - 1.
+    The page docs/theory.md explains when to divide the energy by N and when by N - 1.
     """
     return (energy - 0.5 * run.mass.sum() * np.sum(drift(run) ** 2)) / free_disks(run)
 
@@ -348,8 +355,8 @@ def kt_at_start(run: Run) -> float:
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
 
     Returns
     -------
@@ -365,12 +372,15 @@ def kt_at_start(run: Run) -> float:
 
 
 def has_few_observables(run: Run) -> bool:
-    """Return whether the frames of a run are more frequent than samples of the observables."""
+    """Return whether a run has few samples of the observables, and more frames than samples."""
     return len(run.collisions_per_disk.time) < min(run.n_frames, 2 * FEWEST)
 
 
 def kt_in_time(run: Run) -> tuple[str, np.ndarray, np.ndarray]:
-    """Return times and kT from the observables, or from the frames if these resolve kT better."""
+    """Return the source of the data, "observables" or "frames", and times and kT from this source.
+
+    The frames are used if there are few samples of the observables and more frames.
+    """
     if not has_few_observables(run):
         time, energy = run.observable("all/kinetic_energy")
         return "observables", time, kt_of(run, run.n_disks * energy)
@@ -381,25 +391,26 @@ def kt_in_time(run: Run) -> tuple[str, np.ndarray, np.ndarray]:
 def temperature(run: Run, skip: float | None = None) -> SeriesMean:
     """Estimate kT in equilibrium.
 
-    Samples at equal numbers of collisions are more frequent while a gas is hot, because the
-    collision rate is proportional to sqrt(kT).  Each sample therefore has the weight 1 / sqrt(kT).
+    Samples that are taken after equal numbers of collisions are more frequent while a gas is hot,
+    because the collision rate is proportional to sqrt(kT).  Such samples therefore have the weight
+    1 / sqrt(kT).
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     skip : float, optional
-        collisions per disk that are left out at the start [until no observable drifts]
+        duration of the equilibration, in collisions per disk [until no observable drifts]
 
     Returns
     -------
     SeriesMean
-        kT; exact where the kinetic energy is conserved
+        kT, whose error is 0 if the kinetic energy is conserved
 
     Raises
     ------
     Refused
-        if the run has no equilibrium
+        if the run does not reach equilibrium
 
     Examples
     --------
@@ -424,21 +435,21 @@ def between(time: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray
 def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
     """Estimate the mean kinetic energy of a disk of a given mass in equilibrium.
 
-    The run must be without gravity.
+    The run must not have gravity.
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     mass : float
         mass of the disk
     skip : float, optional
-        collisions per disk that are left out at the start [until no observable drifts]
+        duration of the equilibration, in collisions per disk [until no observable drifts]
 
     Returns
     -------
     SeriesMean
-        <K>, which is smaller than kT if the total momentum is conserved
+        mean kinetic energy, which is smaller than kT if the total momentum is conserved
 
     Examples
     --------
@@ -459,8 +470,8 @@ def packing(run: Run) -> float:
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
 
     Returns
     -------
@@ -476,7 +487,7 @@ def packing(run: Run) -> float:
 
 
 def kinds_of_disks(run: Run) -> tuple[Species, ...]:
-    """Return the species; disks of a species must not differ in mass or radius."""
+    """Return the species; raise an error if disks of one species differ in mass or radius."""
     for kind in run.by_species:
         if not kind.alike:
             raise Refused(f"{run.path}: the disks of '{kind.name}' differ in mass or radius")
@@ -496,20 +507,20 @@ def mean_free_time(run: Run, start: float = 0.0) -> float:
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     start : float
         time after which collisions are counted
 
     Returns
     -------
     float
-        1 / w [time]
+        mean free time [time]
 
     Raises
     ------
     RunError
-        if no two disks collided after that time
+        if no two disks collided after `start`
 
     Examples
     --------
@@ -526,7 +537,7 @@ def mean_free_time(run: Run, start: float = 0.0) -> float:
 
 
 def steps(run: Run, skip: float | None = None) -> Steps:
-    """Return the changes of cumulative observables between samples in equilibrium."""
+    """Return the changes of cumulative observables between successive samples in equilibrium."""
     time = run.collisions_per_disk.time
     first = int(np.searchsorted(time, start_of_equilibrium(run, skip)))
     if len(time) - first <= FEWEST:
@@ -552,40 +563,40 @@ def steps(run: Run, skip: float | None = None) -> Steps:
 
 
 def over_kt(amount: np.ndarray, s: Steps, power: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return two series whose ratio of means is an amount per time divided by kT^power.
+    """Return two series; the ratio of their means is the amount per time, divided by kT^power.
 
-    The ratio is exact to first order, so that the error includes the correlation of the amount with
-    a varying kT.
+    The ratio is exact to first order in the deviations of kT from its mean.  The error of the ratio
+    therefore includes the correlation between the amount and kT.
     """
     kt = float(np.average(s.kt, weights=s.time))
     return amount * kt**-power, s.time * (1 + power * (s.kt / kt - 1))
 
 
 def virial_over_kt(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return two series whose ratio of means is Z - 1 from the virial."""
+    """Return two series; the ratio of their means is Z - 1, calculated from the virial."""
     s = steps(run, skip)
     return over_kt(s.virial / (2 * run.n_disks), s, 1)
 
 
 def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:
-    """Estimate the number of pair collisions per disk and time.
+    """Estimate the number of pair collisions of a disk per unit of time.
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     skip : float, optional
-        collisions per disk that are left out at the start [until no observable drifts]
+        duration of the equilibration, in collisions per disk [until no observable drifts]
 
     Returns
     -------
     SeriesMean
-        w [1/time]
+        collision rate [1/time]
 
     Raises
     ------
     Refused
-        if the run has no equilibrium
+        if the run does not reach equilibrium
 
     Examples
     --------
@@ -602,10 +613,10 @@ def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     skip : float, optional
-        collisions per disk that are left out at the start [until no observable drifts]
+        duration of the equilibration, in collisions per disk [until no observable drifts]
 
     Returns
     -------
@@ -615,7 +626,7 @@ def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
     Raises
     ------
     Refused
-        if the run has no equilibrium
+        if the run does not reach equilibrium
 
     Examples
     --------
@@ -627,14 +638,14 @@ def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
 
 
 def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
-    """Estimate Z = P / (n kT) from the collision rate of disks of equal mass.
+    """Estimate Z = P / (n kT) from the collision rate of equal disks.
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     skip : float, optional
-        collisions per disk that are left out at the start [until no observable drifts]
+        duration of the equilibration, in collisions per disk [until no observable drifts]
 
     Returns
     -------
@@ -644,7 +655,7 @@ def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
     Raises
     ------
     Refused
-        if the run has no equilibrium
+        if the run does not reach equilibrium
 
     Examples
     --------
@@ -664,20 +675,20 @@ def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     skip : float, optional
-        collisions per disk that are left out at the start [until no observable drifts]
+        duration of the equilibration, in collisions per disk [until no observable drifts]
 
     Returns
     -------
     SeriesMean
-        Z, which refers to the area accessible to the centres of the disks
+        Z = P A / (N kT), where A is the area accessible to the centres of the disks
 
     Raises
     ------
     Refused
-        if the run has no equilibrium
+        if the run does not reach equilibrium
 
     Examples
     --------
@@ -696,20 +707,21 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     skip : float, optional
-        collisions per disk that are left out at the start [until no observable drifts]
+        duration of the equilibration, in collisions per disk [until no observable drifts]
 
     Returns
     -------
     dict of str to SeriesMean
-        "virial"; "rate" except for mixtures; "walls" for boxes with four walls
+        Z by name of the method: "virial", for equal disks also "rate", and "walls" if the box has
+        four walls
 
     Raises
     ------
     Refused
-        if the run has no equation of state
+        if no equation of state applies to the run
 
     Examples
     --------
@@ -728,20 +740,20 @@ def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     skip : float, optional
-        collisions per disk that are left out at the start [until no observable drifts]
+        duration of the equilibration, in collisions per disk [until no observable drifts]
 
     Returns
     -------
     dict of str to SeriesMean
-        "pressure_virial", "pressure_left", ... [energy/length^2]
+        pressures by name: "pressure_virial", "pressure_left", ... [energy/length^2]
 
     Raises
     ------
     Refused
-        if the run has no equilibrium
+        if the run does not reach equilibrium
 
     Examples
     --------
@@ -759,7 +771,7 @@ def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
 
 def has_log(run: Run) -> bool:
-    """Return whether the file contains an event log."""
+    """Return whether the output file of a run contains an event log."""
     return bool(run.parameter("output", "event_log", False))
 
 
@@ -768,15 +780,15 @@ def pair_rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     skip : float, optional
-        collisions per disk that are left out at the start [until no observable drifts]
+        duration of the equilibration, in collisions per disk [until no observable drifts]
 
     Returns
     -------
     dict of str to SeriesMean
-        "w_A_B": rate of the collisions of a disk of A with disks of B
+        "w_A_B": collision rate of a disk of species A with disks of species B [1/time]
 
     Raises
     ------
@@ -803,14 +815,14 @@ def pair_rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
 
 def rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
-    """Estimate temperature, pressures and collision rates.
+    """Estimate temperature, pressures and collision rates of a run in equilibrium.
 
     Parameters
     ----------
-    run : Run
-        the simulation to analyse
+    run : ricochet.Run
+        the run to analyse
     skip : float, optional
-        collisions per disk that are left out at the start [until no observable drifts]
+        duration of the equilibration, in collisions per disk [until no observable drifts]
 
     Returns
     -------
@@ -820,7 +832,7 @@ def rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     Raises
     ------
     Refused
-        if the run has no equilibrium
+        if the run does not reach equilibrium
 
     Examples
     --------

@@ -1,25 +1,28 @@
 """Transport coefficients: viscosities, thermal conductivity and diffusion coefficients.
 
-Diffusion: lags are numbers of frames, which must be equally spaced; `frames` are the frames in
-equilibrium.  The integral of <v(0) v(t)> requires no sum over frames, because the integral of v is
-the displacement x(t) - x(0), which is exact for any interval between frames (`correlations`).
+The functions for diffusion require equally spaced frames; a lag is a number of frames.  The
+argument `frames` of these functions contains the frames in equilibrium.  The integral of <v(0)
+v(t)> requires no sum over frames, because the integral of v is the displacement x(t) - x(0), which
+is exact for any interval between frames (see `correlations`).
 
 Viscosities and conductivity follow from Einstein-Helfand relations.  A Helfand moment is the time
-integral of the total flux of momentum or energy: free flights contribute m v_a v_b and (m v^2 / 2)
-v, and a collision transfers dP_a and dE over the distance r = x_i - x_j.  The mean square of a
-Helfand moment grows linearly in time, as the mean square displacement does.  Half of the slope,
-times 1 / (A kT) for viscosities or 1 / (A kT^2) for the conductivity, is the transport coefficient,
-where A is the area.  See Helfand, Phys. Rev. 119, 1 (1960); Alder, Gass and Wainwright, J. Chem.
-Phys. 53, 3813 (1970).  With `output.helfand` the program accumulates the moments exactly and writes
-them as observables.
+integral of the total flux of momentum or energy.  In free flight, a disk contributes m v_a v_b to
+the flux of momentum and (m v^2 / 2) v to the flux of energy.  A collision transfers the momentum
+dP_a and the energy dE over the distance r = x_i - x_j.  Like a mean square displacement, the mean
+square of a Helfand moment grows linearly in time.  A viscosity is half the slope of the mean square
+divided by A kT, and the conductivity is half the slope divided by A kT^2, where A is the area of
+the box.  See Helfand, Physical Review 119, 1 (1960), and Alder, Gass and Wainwright, Journal of
+Chemical Physics 53, 3813 (1970).  If `output.helfand` is true, the program accumulates the moments
+exactly and writes the moments as observables.
 
-In a mixture the stress, and therefore the viscosities, refer to all disks.  The conductivity of a
+The viscosities of a mixture follow from the stress of all disks together.  The conductivity of a
 mixture does not follow from the energy moment alone, because diffusing species transport their
-enthalpy.  If energy is dissipated or supplied by noise, the fluctuations do not determine transport
-coefficients: in the theory of a cooling gas the moments are correlated with other quantities that
-depend on the unknown distribution of its states (Baskaran, Dufty and Brey, Phys. Rev. E 77, 031311
-(2008)), and noise violates the fluctuation-dissipation theorem.  Rough disks are refused, because
-the moments do not include the rotational energy that rough disks transport.
+enthalpy.  If disks dissipate energy, or if noise supplies energy, fluctuations do not determine the
+transport coefficients.  In the theory of a cooling gas, the moments are correlated with other
+quantities that depend on the unknown distribution of states of the gas (Baskaran, Dufty and Brey,
+Physical Review E 77, 031311 (2008)).  Noise violates the fluctuation-dissipation theorem.  Rough
+disks are refused, because the moments do not include the rotational energy that rough disks
+transport.
 """
 
 from typing import NamedTuple
@@ -42,9 +45,9 @@ __all__ = [
 
 PER_FREE_TIME = 4  # sufficient number of samples of the moments
 SUMS = ("helfand_stress", "virial_tensor", "helfand_heat", "heat_virial")
-#: In mean free times: the decay time of the heat flux, which is longest in a dilute gas of equal
-#: disks; and the lag t of the result.  The mean slope between t / 2 and t is less than 0.2 % below
-#: the conductivity.
+#: HEAT is the decay time of the heat flux, in mean free times, in a dilute gas of equal disks,
+#: where this time is longest. MEMORY is the lag t of the result, in mean free times. The mean slope
+#: between the lags t / 2 and t is less than 0.2 % below the slope at infinite lag.
 HEAT, MEMORY = 2.06, 20.0
 CLOSE = 1e-6  # relative difference of steps that are regarded as equal
 UNLIKE = 0.05  # largest relative difference of Enskog's viscosity between runs of one group
@@ -65,16 +68,17 @@ def in_step(times: np.ndarray) -> bool:
 
 
 def lags(frames: int, per_decade: int = 12) -> np.ndarray:
-    """Return lags as numbers of frames in logarithmic steps, up to half of the run."""
+    """Return logarithmically spaced lags, in numbers of frames, up to half of the run."""
     last = max(1, frames // 2)
     count = 1 + int(per_decade * np.log10(last))
     return np.unique(np.geomspace(1, last, count).round().astype(int))
 
 
 def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions (T, N, 2), continuous in time, and velocities.
+    """Return positions (T, N, 2), which are not wrapped into the box, and velocities (T, N, 2).
 
-    Both are relative to the centre of mass along axes where its velocity is conserved.
+    Along axes where the velocity of the centre of mass is conserved, positions and velocities are
+    relative to the centre of mass.
     """
     kept = td.comoving(run)
     place, velocity = (
@@ -85,9 +89,10 @@ def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
 
 
 def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
-    """Return the lag, in frames, in which sound crosses the box, so that its size matters.
+    """Return the lag, in numbers of frames, in which sound crosses the box.
 
-    The lag is at most an eighth of the shortest run.
+    At longer lags, the size of the box influences diffusion.  The returned lag is at most an eighth
+    of the shortest run.
     """
     run, shortest = runs[0], min(f.stop - f.start for f in frames)
     kt = td.temperature(run).mean
@@ -97,13 +102,14 @@ def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
 
 
 def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean]:
-    """Estimate D between the lags `lag` / 2 and `lag` from displacements and from velocities.
+    """Estimate the diffusion coefficient D from displacements and from velocities.
 
-    The first estimate is the mean of d<r^2>/dt / 4 over these lags, and the second is the mean of
-    half the integral of <v(0) v(t)>. Each origin in time contributes one value, so that the error
-    includes all correlations. Between frames the integral is a cubic curve with the known slopes
-    <v(0) v(t)>: its error is at most 0.2 % of D for an exponential correlation, and far less once
-    D(t) is constant.
+    The first estimate is the mean of d<r^2>/dt / 4 over the lags from `lag` / 2 to `lag`.  The
+    second estimate is the mean of half the integral of <v(0) v(t)> over these lags.  Each origin in
+    time contributes one value, so that the error includes all correlations.  Between frames, the
+    integral is interpolated by a cubic curve with the known slopes <v(0) v(t)>. If the correlation
+    decays exponentially, the error of the interpolation is at most 0.2 % of D, and the error is far
+    smaller at lags where D(t) is constant.
     """
     step, half = float(run.time[1] - run.time[0]), lag // 2
     x, v = motion(run, frames)
@@ -122,10 +128,10 @@ def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean
 def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     """Return the sampling interval and the Helfand moments after a given time.
 
-    For each coefficient the result contains the moments (T, C) without their mean growth: for the
-    viscosity the momentum moments xy and (xx - yy) / 2, for the bulk viscosity (xx + yy) / 2, for
-    the conductivity the energy moments x and y; all are relative to the centre of mass.  Raises
-    RunError if the run contains no moments at equal intervals.
+    The mean growth of each moment is subtracted.  The moments (T, C) for the viscosity are the
+    momentum moments xy and (xx - yy) / 2, the moment for the bulk viscosity is (xx + yy) / 2, and
+    the moments for the conductivity are the energy moments x and y.  All moments are relative to
+    the centre of mass.  If the run contains no moments at equal intervals, RunError is raised.
     """
     allow(run, TAKES, "mixture")
     if "helfand_heat" not in run.observables:
@@ -140,8 +146,8 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
         )
     flown, handed, heat, heat_handed = (part.value[first:-1] for part in parts)
     momentum = (flown + handed).reshape(-1, 2, 2)
-    # Moments in the frame of the centre of mass; all other terms of the change of frame grow
-    # linearly.
+    # The energy moments are converted to the frame of the centre of mass. All other terms of this
+    # conversion grow linearly in time and are subtracted with the mean growth.
     heat = heat + heat_handed - np.einsum("a,tab->tb", td.drift(run), momentum)
     xx, xy, yy = momentum[:, 0, 0], momentum[:, 0, 1], momentum[:, 1, 1]
     groups = (xy, (xx - yy) / 2), ((xx + yy) / 2,), heat.T
@@ -156,21 +162,22 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
 def squares(moment: np.ndarray, lag: int) -> np.ndarray:
     """Return squares (T - lag,) of the increments of a moment (T, C) over `lag` samples.
 
-    The squares are averaged over components and corrected for the mean growth, which was estimated
-    from the same series and reduces them by the fraction lag / (T - 1).
+    The squares are averaged over the C components.  Subtracting the mean growth, which was
+    estimated from the same series, reduced the squares by the fraction lag / (T - 1); the result is
+    corrected for this reduction.
     """
     gain = moment[lag:] - moment[: len(moment) - lag]
     return np.mean(gain**2, axis=1) / (1 - lag / (len(moment) - 1))
 
 
 def running(moment: np.ndarray, step: float, at: np.ndarray) -> np.ndarray:
-    """Return half the slope of the mean square between successive lags (in samples)."""
+    """Return half the slope of the mean square of a moment between successive lags (in samples)."""
     mean = np.array([squares(moment, lag).mean() for lag in at])
     return np.diff(mean, prepend=0) / np.diff(at, prepend=0) / (2 * step)
 
 
 def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
-    """Estimate half the slope of the mean square between the lags `lag` / 2 and `lag`.
+    """Estimate half the slope of the mean square of a moment between `lag` / 2 and `lag`.
 
     Each origin in time contributes one value, as in `diffusion`.
     """
@@ -183,7 +190,7 @@ def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
 
 
 class Found(NamedTuple):
-    """A transport coefficient at one packing fraction, divided by that of Enskog's theory."""
+    """A transport coefficient at one packing fraction, divided by the value in Enskog's theory."""
 
     members: list[SeriesMean]  # values of the runs
     curve: Curve  # against the lag, in mean free times
@@ -195,19 +202,21 @@ class Found(NamedTuple):
 def enskog_of(run: Run, reduced: bool = False) -> dict[str, float]:
     """Return the transport coefficients of Enskog's theory for the disks of a run.
 
-    Disks that differ by less than a hundredth are treated as one species.
+    Disks whose diameters and masses differ by less than 1 % are treated as one species.
 
     Parameters
     ----------
-    run : Run
-        a simulation that conserves its kinetic energy
+    run : ricochet.Run
+        a run that conserves its kinetic energy
     reduced : bool
-        whether the units are the mean mass, the mean diameter and kT, instead of those of the run
+        whether the units are the mean mass, the mean diameter and kT, instead of the units of the
+        run
 
     Returns
     -------
     dict of str to float
-        by name, as returned by `hard_disks.enskog` or, for a mixture, `hard_disks.enskog_mixture`
+        coefficients by name, as returned by `hard_disks.enskog` or, for a mixture, by
+        `hard_disks.enskog_mixture`
 
     Examples
     --------
@@ -229,7 +238,7 @@ def enskog_of(run: Run, reduced: bool = False) -> dict[str, float]:
 
 
 def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
-    """Return the viscosities and, for identical disks, also the thermal conductivity."""
+    """Measure viscosities and, for identical disks, the conductivity from Helfand moments."""
     each = [moments(run, start) for run, start in zip(runs, starts, strict=True)]
     theories = [enskog_of(run, reduced=True) for run in runs]
     units = [enskog_of(run) for run in runs]
@@ -279,7 +288,7 @@ def frames_in_step(run: Run, start: float) -> slice:
 
 
 def of_displacements(runs: list[Run], starts: list[float]) -> Found:
-    """Return the diffusion coefficient from displacements."""
+    """Measure the diffusion coefficient from displacements."""
     frames = [frames_in_step(run, start) for run, start in zip(runs, starts, strict=True)]
     lag = diffusion_lag(runs, frames)
     at, pairs = lags(4 * lag), list(zip(runs, frames, strict=True))
@@ -296,20 +305,20 @@ def of_displacements(runs: list[Run], starts: list[float]) -> Found:
 
 
 def coefficients(runs: list[Run], skip: float | None = None) -> dict[str, Found]:
-    """Measure the transport coefficients of runs at one packing fraction relative to Enskog's.
+    """Measure the transport coefficients of runs, divided by the values in Enskog's theory.
 
     Parameters
     ----------
     runs : list of Run
         (R,) runs of one system, with `output.helfand`
     skip : float, optional
-        collisions per disk that are left out at the start [until no observable drifts]
+        duration of the equilibration, in collisions per disk [until no observable drifts]
 
     Returns
     -------
     dict of str to Found
-        "viscosity", "bulk_viscosity"; for equal disks also "conductivity", and "D" if the runs
-        contain frames
+        coefficients by name: "viscosity" and "bulk_viscosity", for equal disks also "conductivity",
+        and "D" if the runs contain frames
 
     Raises
     ------
