@@ -1,8 +1,8 @@
-!> The part of the event queue for later times. Time is divided into windows of equal length. Each of the next windows has a bucket:
-!> an array that occupies one cache line and to which entries are only appended. Times after these windows are divided into spans of
-!> many windows each, and each span has an unordered list. Appending an entry accesses few cache lines, and single entries are never
-!> searched or removed. All lists share one array, which is divided into chunks. The chunks of a list are reused when its span has
-!> been processed.
+!> Calendar: the part of the event queue that contains events of later times. Time is divided into windows of equal length. Each of
+!> the next windows has a bucket: an array that occupies one cache line. Later times are divided into spans of many windows, and
+!> each span has an unordered list of events. An entry is appended to a bucket or a list, which accesses few cache lines. Single
+!> entries are never searched for or removed. All lists share one array, which is divided into chunks. The chunks of a list are
+!> reused after the span of the list has been processed.
 module calendar
   use kinds, only: int32, real64
   use disks, only: tag_t
@@ -11,11 +11,11 @@ module calendar
   public :: bucket_capacity, bucket_t, calendar_t, events_per_window, filed_t, most_coming, stages, window_none
 
   integer(int32), parameter :: bucket_capacity = 15
-  !> Intended mean number of events in a window. With fewer events per window, more of the windows that are processed contain no
-  !> event. With more events per window, buckets are full more often and further events are stored in the heap.
+  !> Intended mean number of events in a window. With fewer events per window, more windows are processed that contain no event.
+  !> With more events per window, more buckets are full, and events that do not fit into a bucket are stored in the heap.
   real(real64), parameter :: events_per_window = 4.0_real64
   integer(int32), parameter :: few_disks = 5000    !! number of disks up to which nearly all events fit into buckets
-  !> For each stage of prefetching, the number of windows by which it looks ahead of the current window.
+  !> For each stage of prefetching, the number of windows between the current window and the last prefetched window.
   integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]
   integer(int32), parameter :: stages = size(windows_ahead)
   integer(int32), parameter :: most_coming = windows_ahead(1)*bucket_capacity
@@ -28,32 +28,32 @@ module calendar
   end type bucket_t
 
   integer(int32), parameter :: log_chunk = 7
-  !> Number of entries in a chunk. A chunk is a part of a list and occupies 1 KiB. Its first entry is a link to another chunk of the
-  !> list.
+  !> Number of entries in a chunk. A chunk is a part of a list and occupies 1 KiB. The first entry of a chunk is a link to another
+  !> chunk of the same list.
   integer(int32), parameter :: chunk = shiftl(1_int32, log_chunk)
   integer(int32), parameter :: none = -1
 
-  !> A disk and the window of its event. In the first entry of a chunk, `disk` is the number of the next chunk of the list.
+  !> An entry: a disk and the window of its event. In the first entry of a chunk, `disk` is the number of another chunk instead.
   type :: filed_t
     integer(int32) :: disk
     integer(int32) :: window
   end type filed_t
 
   type :: calendar_t
-    type(bucket_t), allocatable :: bucket(:)       !! (0:last_bucket) buckets of windows, a circular buffer
-    !> (0:last_span) position in `filed` after the last entry in the list of each span, 0 if the list is empty. Like `bucket`, this
-    !> array is a circular buffer. A span contains half as many windows as there are buckets. A list may also contain events of
+    type(bucket_t), allocatable :: bucket(:)       !! (0:last_bucket) circular buffer of the buckets of the next windows
+    !> (0:last_span) position in `filed` after the last entry in the list of each span, 0 if the list is empty. `list_end` is a
+    !> circular buffer, like `bucket`. A span contains half as many windows as there are buckets. A list may also contain events of
     !> later spans with the same index in the circular buffer.
     integer(int32), allocatable :: list_end(:)
     !> (0:) the chunks of all lists. Each chunk contains a link to the previous chunk of the same list.
     type(filed_t), allocatable :: filed(:)
     integer(int32) :: n_chunks = 0                 !! number of chunks that have been used
-    integer(int32) :: vacant = none                !! head of the list of free chunks
-    integer(int32) :: last_bucket = 0              !! largest index: a power of two minus 1, used as a bit mask for window numbers
+    integer(int32) :: vacant = none                !! number of the first chunk in the list of free chunks
+    integer(int32) :: last_bucket = 0              !! largest index of a bucket, which is also the bit mask for window numbers
     integer(int32) :: last_span = 0                !! largest index of a span, which is also the bit mask for span numbers
     integer(int32) :: log_span = 0                 !! binary logarithm of the number of windows in a span
     integer(int32) :: ring_end = 0                 !! first window that has no bucket yet
-    integer(int32) :: announced(stages) = 0        !! last window of which each stage has listed the disks
+    integer(int32) :: announced(stages) = 0        !! for each stage of prefetching, the last window whose disks have been listed
   contains
     procedure :: empty
     procedure :: begin
@@ -62,15 +62,15 @@ module calendar
     procedure :: span_begins
     procedure :: open_span
     procedure :: list_coming
-    procedure, private :: add_chunk                ! bound to the type, so that it is not inlined into the hot path
+    procedure, private :: add_chunk  ! type-bound, so that the compiler does not inline the procedure into the hot path
   end type calendar_t
 
 contains
 
-  !> Empties the buckets and the lists of spans, and chooses their numbers. With the intended mean number of events per window,
-  !> buckets and spans together cover 2n events, so that most events of n disks fit into them. For many disks the number of buckets
-  !> is limited, so that the cache can also contain the disks. Equal numbers of buckets and spans minimise the number of cache lines
-  !> that are written.
+  !> Empties the calendar, and chooses the numbers of buckets and spans. With the intended mean number of events per window, buckets
+  !> and spans together cover 2n events, so that most events of n disks fit into the calendar. For many disks the number of buckets
+  !> is limited, so that buckets and disks fit into the cache together. The number of cache lines that are written is smallest if
+  !> the numbers of buckets and spans are equal.
   subroutine empty(self, n)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: n                !! number of disks
@@ -140,7 +140,7 @@ contains
     self%list_end(s) = place + 1
   end subroutine put_far
 
-  !> Appends a chunk to the list that ends before `place`.
+  !> Appends a chunk to the list whose last entry precedes the position `place`.
   subroutine add_chunk(self, place)
     class(calendar_t), intent(inout) :: self
     !> in: position after the last entry of the list; out: position of the first entry in the new chunk.
@@ -173,13 +173,14 @@ contains
     yes = iand(window, shiftl(1_int32, self%log_span) - 1) == 0
   end function span_begins
 
-  !> Moves the events of the next span into their buckets. Events of later spans with the same index stay in the list if they are
-  !> still valid. Events whose bucket is full are returned in `surplus`.
+  !> Moves the events of the next span into their buckets. The list can also contain events of later spans with the same index.
+  !> These events stay in the list if they are still valid. Disks whose events do not fit into a full bucket are returned in
+  !> `surplus`.
   subroutine open_span(self, tag, n_surplus, surplus)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(out) :: n_surplus
-    integer(int32), allocatable, intent(inout) :: surplus(:)     !! (n_surplus) disks whose bucket is full; enlarged if necessary
+    integer(int32), allocatable, intent(inout) :: surplus(:)     !! (n_surplus) disks whose events do not fit into a bucket
     type(filed_t) :: filed
     integer(int32) :: s, c, k, list_end, before
     logical :: full
@@ -211,8 +212,8 @@ contains
   end subroutine open_span
 
   !> Lists disks that probably have events in the next windows, for one stage of prefetching. Each stage lists the disks of each
-  !> window once. The first stage looks ahead by the largest number of windows, and later stages look ahead by fewer windows. All
-  !> stages except the first omit disks whose entry has become invalid.
+  !> window once. The first stage looks ahead by the largest number of windows, and later stages look ahead by fewer windows. The
+  !> later stages omit disks whose entries have become invalid.
   subroutine list_coming(self, tag, window, stage, n, disks)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)

@@ -1,5 +1,5 @@
-!> Changes a running simulation: forces, contact laws, motions of sides, positions and velocities. A change takes effect at the
-!> present time and for all disks at once. The energy change that it causes is counted as work.
+!> Changes a running simulation: forces, contact laws, motions of sides, positions and velocities. Each change takes effect at the
+!> present time, for all disks at once. The resulting change of the energy is counted as work.
 module changes
   use box_sides, only: bounds
   use disks, only: advance_disk
@@ -17,14 +17,16 @@ module changes
 
 contains
 
-  !> Replaces the box, the contact law and the drive of a simulation by those of an input with the same disks. The new box, contact
-  !> law and drive apply from the present time on. The positions of moving sides must be continuous.
+  !> Replaces the box, the contact law and the drive of a simulation by those of another input with the same disks. The new box,
+  !> contact law and drive take effect at the present time. A side must not jump: its old and new positions at the present time must
+  !> be equal.
   subroutine change_system(sim, system, problem)
     type(simulation_t), intent(inout) :: sim
     type(system_t), intent(in) :: system
-    character(len=:), allocatable, intent(out) :: problem    !! reason why the replacement is impossible; empty if it succeeded
+    !> Reason why the replacement is impossible; empty if the replacement succeeded.
+    character(len=:), allocatable, intent(out) :: problem
     type(simulation_t) :: other
-    ! Energy [energy], lower and upper sides [length], velocity of a side [length/time]
+    ! Energy before the change [energy], old and new positions of the sides [length], velocity of a side [length/time]
     real(real64) :: before, here(2, 2), there(2, 2), v
     integer :: k
 
@@ -33,7 +35,7 @@ contains
     other%system_t = system
     other%features%own_sizes = sim%features%own_sizes
     other%box%epoch = sim%box%epoch
-    do k = 1, n_sides                                        ! a piston starts at the position and with the velocity of the side
+    do k = 1, n_sides                                        ! a piston starts with the position and velocity of the old side
       if (other%box%surface(k)%motion%kind /= piston) cycle
       v = 0
       if (sim%box%surface(k)%motion%moves()) v = sim%box%side_velocity(k, sim%now)
@@ -58,7 +60,7 @@ contains
     call book(sim, before)
   contains
 
-    !> Sets the number of kicks to the value that it would have if the new driving had acted since the start of the run. This number
+    !> Sets `kicks` to the number of kicks that the new driving would have applied since the start of the run. This number of kicks
     !> determines the time and the random numbers of the next kick.
     subroutine count_kicks()
       if (.not. sim%drive%is_on()) return
@@ -76,7 +78,7 @@ contains
   subroutine change_velocities(sim, v)
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: v(:, :)                      !! (2,n) new velocities in the order of ids [length/time]
-    real(real64) :: before, old(2)                           ! energy [energy], velocity [length/time]
+    real(real64) :: before, old(2)                           ! energy before the change [energy], old velocity [length/time]
     integer(int32) :: i
 
     before = total_energy(sim)
@@ -91,12 +93,13 @@ contains
     call book(sim, before)
   end subroutine change_velocities
 
-  !> Sets the positions of all disks, without a test for overlaps. A position beyond a periodic side is the position of a periodic
-  !> image of the disk.
+  !> Sets the positions of all disks, without a test for overlaps. A new position beyond a periodic side is interpreted as the
+  !> position of a periodic image of the disk.
   subroutine change_positions(sim, x)
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: x(:, :)                      !! (2,n) new positions in the order of ids [length]
-    real(real64) :: before, old(2), v(2), image(2)           ! energy [energy], position [length], velocity [length/time]
+    ! Energy before the change [energy], old position [length], velocity [length/time]
+    real(real64) :: before, old(2), v(2), image(2)
     integer(int32) :: i
 
     before = total_energy(sim)
@@ -106,7 +109,7 @@ contains
       if (any(sim%box%periodic)) image = sim%extra(i)%image
       old = sim%disk(i)%x
       v = sim%disk(i)%v
-      call wrap(sim, old, v, image)                          ! position of the image that a frame would contain
+      call wrap(sim, old, v, image)                          ! moves the old position into the box, as for a frame
       sim%disk(i)%x = x(:, sim%tag(i)%id)
       call wrap(sim, sim%disk(i)%x, v, image)
       if (any(sim%box%periodic)) sim%extra(i)%image = image
@@ -115,9 +118,9 @@ contains
     call book(sim, before)
   end subroutine change_positions
 
-  !> Advances all disks to the present time with the previous forces. Afterwards the clocks of all disks are equal. The last
-  !> partners are erased: after a change, as after a kick, a disk may collide with its last partner again immediately, and this
-  !> collision must not be mistaken for a rounding error of the previous collision.
+  !> Advances all disks to the present time with the previous forces. The clocks of all disks are then equal. The procedure also
+  !> erases the last partner of each disk. After a change, as after a kick, a disk may collide with its last partner again
+  !> immediately. Without this erasure, such a collision would be mistaken for a rounding error of the previous collision.
   subroutine advance_all(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i
@@ -129,7 +132,8 @@ contains
     end do
   end subroutine advance_all
 
-  !> Adds the energy change to the work. The exact sums use the same unit as in a run that starts with the new system.
+  !> Adds the energy change that results from a change of the simulation to the work. The units of the exact sums are chosen as in a
+  !> run that starts with the new system.
   subroutine book(sim, before)
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: before                       !! total energy before the change [energy]

@@ -1,5 +1,5 @@
-!> Divides the run into epochs. At the end of an epoch the origin of time is moved and the state is tested for a collapse. The end
-!> and the test depend on the state alone, so that they are the same for all searches, queues and numbers of threads.
+!> Divides a run into epochs. At the end of each epoch the time origin moves, and the state is tested for an inelastic collapse. The
+!> end of an epoch and the result of the test depend on the state alone, and not on the search, the queue or the number of threads.
 module epochs
   use box_sides, only: separate_from_sides
   use kinds, only: int32, int64, never, pi, real64
@@ -12,17 +12,17 @@ module epochs
   private
   public :: are_crushed, restart_epoch, begin_first_epoch, is_at_rest, last_time, most_events, move_epoch, stands_still
 
-  !> Number of collisions per disk in an epoch. The origin of time moves at the end of the epoch, so that times keep their
+  !> Intended number of collisions per disk in an epoch. The time origin moves at the end of each epoch, so that times keep their
   !> precision.
   integer(int64), parameter :: epoch_length = 24
-  !> Significant bits of the length of an epoch; with so few bits, sums of lengths are exact.
+  !> Number of significant bits in a shift of the time origin. With so few bits, sums of shifts are exact.
   integer, parameter :: significant_bits = 20
-  !> Numbers of events without an advance of the time, in total and per disk, at which a collapse is reported. Both numbers must be
-  !> reached.
+  !> A collapse is reported if the time does not advance during `collapse_length` events in total and during
+  !> `collapse_length_per_disk` events per disk.
   integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
   real(real64), parameter :: shortest = 2.0_real64**(-20)  !! shortest epoch in units of `negligible_time`
   real(real64), parameter :: last_time = 0.5_real64*never
-  real(real64), parameter :: crushing = 1.0e6_real64 !! factor of energy growth at which disks are considered crushed
+  real(real64), parameter :: crushing = 1.0e6_real64 !! disks are crushed if their energy grows by this factor
   real(real64), parameter :: densest = 0.9_real64  !! largest packing fraction used in the estimate of the event rate
 
 contains
@@ -49,8 +49,8 @@ contains
     sim%events_then = sim%tally%events
   contains
 
-    !> Number of events of a disk per length of its path in a gas: collisions with other disks, from the equation of state of
-    !> Henderson (Mol. Phys. 30, 971 (1975)), and with walls.
+    !> Mean number of events of a disk per length of its path. The events are collisions with walls, and collisions with other disks
+    !> according to the equation of state of Henderson (Molecular Physics 30, 971 (1975)).
     pure function events_per_path() result(rate)
       real(real64) :: rate                           !! [1/length]
       real(real64) :: packing
@@ -61,7 +61,7 @@ contains
     end function events_per_path
   end subroutine begin_first_epoch
 
-  !> Number of events intended for an epoch.
+  !> Intended number of events in an epoch.
   pure function events_per_epoch(sim) result(n)
     type(simulation_t), intent(in) :: sim
     integer(int64) :: n
@@ -79,9 +79,9 @@ contains
     sim%epoch_events = sim%tally%events
   end subroutine begin_epoch
 
-  !> Ends the epoch and moves the origin of time to about the present time, so that times stay small and keep their precision. As
-  !> all events have to be predicted again in any case, the disks are also sorted by cells. The end of the next epoch is defined by
-  !> a time and not by a number of events, so that it is the same in domains that run independently of each other.
+  !> Ends the epoch and moves the time origin to about the present time, so that times stay small and keep their precision. Because
+  !> all events have to be predicted again in any case, the disks are also sorted by cells. The next epoch ends at a fixed time and
+  !> not after a fixed number of events. Domains that run independently of each other therefore end the epoch at the same time.
   subroutine move_epoch(sim)
     type(simulation_t), intent(inout) :: sim
     real(real64) :: shift, length
@@ -98,9 +98,9 @@ contains
     call begin_epoch(sim, length)
   end subroutine move_epoch
 
-  !> Ends the epoch because the disks, the forces or the contact laws have been changed. After the change disks may be faster than
-  !> before by any factor. The origin of time therefore moves exactly to the present time, and the length of the epoch is determined
-  !> again when the evolution starts. Time-stepped dynamics has no epochs; the origin of its times is the start of the run.
+  !> Ends the epoch because the disks, the forces or the contact laws have been changed. Disks may be much faster after the change.
+  !> The time origin therefore moves exactly to the present time, and the length of the next epoch is determined when the evolution
+  !> starts. In time-stepped dynamics, which has no epochs, the procedure does nothing.
   subroutine restart_epoch(sim)
     type(simulation_t), intent(inout) :: sim
 
@@ -110,7 +110,7 @@ contains
     sim%epoch_end = 0
   end subroutine restart_epoch
 
-  !> Moves the origin of all times of this epoch. All predicted events become stale.
+  !> Moves the time origin `box%epoch` by `shift`. All predicted events become invalid and have to be predicted again.
   subroutine move_origin(sim, shift)
     type(simulation_t), intent(inout) :: sim
     real(real64), value :: shift                    !! [time]
@@ -125,14 +125,14 @@ contains
     sim%last_advance = sim%last_advance - shift
     sim%box%epoch = sim%box%epoch + shift
     sim%box%side%clock = sim%box%side%clock - shift
-    if (.not. any(sim%box%surface(:n_sides)%motion%moves())) return      ! only moving sides can compress the disks
+    if (.not. any(sim%box%surface(:n_sides)%motion%moves())) return      ! disks are separated only from moving sides
     do i = 1, sim%n_disks()
       call separate_from_sides(sim%box, sim%disk(i), sim%now)
     end do
   end subroutine move_origin
 
-  !> Number of events in an epoch at which the epoch ends earlier than planned. This number is reached only if the event rate is far
-  !> higher than expected, as before a collapse.
+  !> Number of events since the start of the run at which the epoch ends early. This number is reached only if the event rate is far
+  !> higher than expected, for example before an inelastic collapse.
   pure function most_events(sim) result(n)
     type(simulation_t), intent(in) :: sim
     integer(int64) :: n
@@ -141,8 +141,7 @@ contains
   end function most_events
 
   !> Whether moving sides compress the disks beyond close packing, so that their energy grows without limit. The test does not apply
-  !> to simulations with another source of energy, such as driving, hot walls or gravity. The function is called at the end of an
-  !> epoch.
+  !> to simulations with another source of energy, such as driving or thermal walls.
   pure function are_crushed(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -155,7 +154,7 @@ contains
     end associate
   end function are_crushed
 
-  !> Whether a long series of events has not advanced the time, as in a collapse. The function is called at the end of an epoch.
+  !> Whether a long series of events has not advanced the time, as in an inelastic collapse.
   pure function stands_still(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes

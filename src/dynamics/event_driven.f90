@@ -1,9 +1,9 @@
 !> Event-driven dynamics: exact trajectories from event to event. Each disk stores one event, the earliest of its predicted events.
 !> When this event is due, the disks involved collide, and their next events are predicted.
 !>
-!> The event of a disk becomes stale when its partner collides with a third disk before the event. Stale events are not searched
-!> for. A stale event is recognised by the collision counter of the partner when the event is due. A stale event is not executed;
-!> instead the next event of the disk is predicted.
+!> The event of a disk becomes stale when its partner collides with a third disk before the event. The queue is not searched for
+!> stale events. A stale event is recognised by the collision counter of the partner when the event is due. A stale event is not
+!> executed; instead the next event of the disk is predicted.
 module event_driven
   use kinds, only: int32, int64, never, real64
   use box_sides, only: side_time
@@ -27,21 +27,22 @@ module event_driven
   private
   public :: event_driven_t
 
-  !> Number of events between two checks of the number of collisions against its limit.
+  !> Largest number of events between two checks of the limits.
   integer(int64), parameter :: events_to_look = 20000
-  !> Largest number of disks that fit into a second-level cache. Prefetching saves time if there are more disks.
+  !> Largest number of disks that fit into a second-level cache. With more disks, prefetching saves time.
   integer(int32), parameter :: disks_in_cache = 20000
   integer(int64), parameter :: events_ahead = 8    !! number of events between two prefetches
 
   type, extends(evolution_t) :: event_driven_t
-    !> The search. The component is polymorphic, so that rarely used procedures of the search are not inlined into the hot path.
+    !> The search for disks that can collide. The component is polymorphic, so that the compiler does not inline rarely used
+    !> procedures of the search into the hot path.
     class(cell_grid_t), allocatable :: search
     type(event_queue_t) :: queue
-    logical :: windowed = .true.                   !! the queue uses its calendar, not only the heap
-    logical :: general = .false.                   !! collisions need the general procedure
-    logical :: is_part = .false.  !! this engine advances one domain and counts only the collisions that belong to this domain
-    class(histories_t), allocatable :: histories   !! histories of the disks of the domain
-    integer(int64) :: last_count = 0               !! number of events at which `run_events` returns
+    logical :: windowed = .true.                   !! whether the queue uses the calendar in addition to the heap
+    logical :: general = .false.                   !! whether collisions need the general procedure `collide`
+    logical :: is_part = .false.  !! whether this engine advances a single domain of a parallel run
+    class(histories_t), allocatable :: histories   !! records of the motion of disks in the domain
+    integer(int64) :: last_count = 0               !! total number of events at which `run_events` returns
   contains
     procedure :: start
     procedure :: advance
@@ -52,7 +53,8 @@ module event_driven
 
 contains
 
-  !> Sets up search and queue from a state: a new state, a restored state, or the state at the start of an epoch.
+  !> Sets up the search and the event queue for the state `sim`. The state can be new, restored from a checkpoint, or the state at
+  !> the start of an epoch.
   subroutine start(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -64,12 +66,13 @@ contains
     call self%search%build(sim)
     do i = 1, sim%n_disks()
       if (stop_requested()) return                 ! see `advance`
-      if (sim%tag(i)%id > 0) call self%search%predict(sim, i)    ! an id of 0 marks an index without a disk
+      if (sim%tag(i)%id > 0) call self%search%predict(sim, i)    ! the id 0 marks an array element without a disk
     end do
     call self%queue%fill(sim%disk, sim%tag, sim%now, self%windowed)
   end subroutine start
 
-  !> Predicts the events of disks that have been changed. Events that other disks predicted with these disks are now stale.
+  !> Predicts the events of the changed disks again. If another disk stores an event with a changed disk, this event has become
+  !> stale.
   subroutine renew(self, sim, changed)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -87,12 +90,13 @@ contains
     end do
   end subroutine renew
 
-  !> Predicts the events of all disks, whose clocks are equal. If the next kick changes all velocities, events after that kick will
-  !> never occur and are not entered into the queue. The earliest event is always entered, because the queue must not be empty.
+  !> Predicts the events of all disks. The clocks of all disks must be equal. If the next kick changes all velocities, events after
+  !> that kick will never occur and are not entered into the queue. The earliest event is always entered, because the queue must not
+  !> be empty.
   subroutine renew_all(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64) :: last                           ! since the epoch [time]
+    real(real64) :: last                           ! time of the last event that enters the queue [time]
     integer(int32) :: i, n
 
     n = sim%n_disks()
@@ -113,8 +117,8 @@ contains
     end do
   end subroutine renew_all
 
-  !> Executes events until a limit is reached. If a stop has been requested, the procedure returns early. Some predictions may then
-  !> be missing, but the state itself is complete.
+  !> Executes events until a limit is reached. After a stop request the procedure returns early. Some predictions may then be
+  !> missing, but the state of the simulation is complete.
   subroutine advance(self, sim, limits, error, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -139,7 +143,7 @@ contains
       call self%run_events(sim, t_limit, iterations, event, log)
       self%iterations_left = iterations
       self%last_event = [event%disk, event%partner]
-      ! A sample at this time is possible only after all events at this time have been executed.
+      ! All events at the time limit are executed before the procedure returns, because a sample may be due at the time limit.
       if (iterations == 0 .and. .not. sim%now < limits%time) iterations = 1
       if (self%search%everyone .and. sim%tally%events > events) call self%predict_all(sim)
       if (event%time <= t_limit) cycle
@@ -149,7 +153,7 @@ contains
         call follow_piston(self, sim)
         cycle
       end if
-      ! A stale event depends on the order of predictions. The returned event must not depend on this order.
+      ! The returned event must not be stale, because a stale event depends on the order of the predictions.
       if (is_stale()) then
         call predict(self, sim, event%disk)
         cycle
@@ -158,14 +162,14 @@ contains
         call fail(error, exit_broken, "a time became NaN: "//encounter_text(sim, event%disk, event%partner))
         return
       end if
-      self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! in a sheared box images move forever
+      self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! the images of a sheared box never stop
       if (limits%time < last_time) sim%now = max(sim%now, limits%time)
       self%arrived = .true.
       return
     end do
   contains
 
-    !> Whether the partner of an event has collided since the prediction.
+    !> Whether the partner of the event has collided since the event was predicted.
     pure function is_stale() result(yes)
       logical :: yes
 
@@ -173,7 +177,7 @@ contains
       if (yes) yes = sim%disk(event%partner)%collision_counter /= sim%tag(event%disk)%partner_counter
     end function is_stale
 
-    !> The number of executed events at which the next check is due.
+    !> The total number of executed events at which the next check of the limits is due.
     pure function next_pause() result(events)
       integer(int64) :: events
 
@@ -195,11 +199,12 @@ contains
   end subroutine advance
 
   !> Hot path: executes one event after another. The loop ends when the number of events reaches `last_count`, when the next event
-  !> is later than the time limit, or when all allowed iterations have been used. The caller does all work that is rarely needed.
+  !> is later than the time limit, or when all allowed iterations have been used. Rarely needed operations are in the caller and not
+  !> in this loop.
   subroutine run_events(self, sim, t_limit, iterations, event, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: t_limit            !! time since the epoch [time]
+    real(real64), intent(in) :: t_limit            !! time relative to the time origin `box%epoch` [time]
     integer(int64), intent(inout) :: iterations    !! number of iterations left
     type(event_t), intent(out) :: event            !! the last event; not executed if it is later than the time limit
     type(event_log_t), intent(inout), optional :: log
@@ -220,11 +225,11 @@ contains
     event = event_t(t, i, code)
   end subroutine run_events
 
-  !> Executes the event of disk i and predicts the next events of the disks involved.
+  !> Executes the event of disk i, and predicts the next events of disk i and its partner.
   subroutine execute(self, sim, i, code, t, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i, code          !! the disk and the code of its partner: see `partners`
+    integer(int32), intent(in) :: i, code          !! index of the disk, and code of its partner: see `partners`
     real(real64), intent(in) :: t
     type(event_log_t), intent(inout), optional :: log
     logical :: counts
@@ -233,8 +238,8 @@ contains
     if (self%is_part) counts = self%histories%counts(sim%tag, i, code)
     if (code > 0) then
       if (sim%disk(code)%collision_counter == sim%tag(i)%partner_counter) then
-        ! Equal clocks are rare. Two disks have equal clocks if they are still in contact, or if both have collided at exactly this
-        ! time.
+        ! The clocks of two disks are equal only if the disks are still in contact, or if both disks have collided at exactly this
+        ! time. Both cases are rare and need the general procedure.
         if (self%general .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0) then
           call collide(sim, i, code, t, counts, log)
         else
@@ -264,9 +269,9 @@ contains
     call predict(self, sim, i)
   end subroutine execute
 
-  !> Updates predictions after the motion of a piston has changed: predicts again the events of disks whose next event was with this
-  !> piston, and of disks that now collide with the piston before their next event. Makes the event loop return, because the piston
-  !> may now leave its strip earlier.
+  !> Updates predicted events after a collision has changed the motion of a piston. Events are predicted again for disks whose next
+  !> event was a collision with the piston, and for disks that now reach the piston before their next event. The event loop then
+  !> returns, because the piston may leave its strip (see `piston_strips`) earlier.
   subroutine follow_side(self, sim, side)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -284,8 +289,8 @@ contains
     end associate
   end subroutine follow_side
 
-  !> Predicts the events of the disks in the strip that a piston leaves and of the disks in the strip that the piston enters. A
-  !> strip consists of the cells that a piston can reach soon: see `piston_strips`.
+  !> Predicts the events of the disks in the old strip and in the new strip of a piston that leaves its strip. A strip consists of
+  !> the cells that a piston can reach soon: see `piston_strips`.
   subroutine follow_piston(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -308,8 +313,8 @@ contains
     call self%queue%schedule(sim%disk, sim%tag, i)
   end subroutine predict
 
-  !> Predicts the events of all disks, and not only of the disks involved in an event. The prediction of all disks after each event
-  !> is the simplest algorithm in textbooks.
+  !> Predicts the events of all disks, and not only of the disks that have collided. A prediction for all disks after each event is
+  !> the simplest algorithm in textbooks.
   subroutine predict_all(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -1,6 +1,6 @@
 !> A priority queue of events: a min-heap in an array, with four children per node. The queue contains at most one event per disk,
-!> and this event can be found by the index of the disk. Simultaneous events have a fixed order that depends neither on which disk
-!> stores the event nor on the order of insertion.
+!> and this event can be found by the index of the disk. The order of simultaneous events depends neither on the order of insertion
+!> nor on which of the two disks stores an event.
 module event_heap
   use kinds, only: int32
   use disks, only: tag_t
@@ -9,14 +9,14 @@ module event_heap
   private
   public :: event_heap_t, need_order, precedes
 
-  !> Number of children of a node. Compared with a binary heap, the depth of the heap is halved, and the number of cache lines that
-  !> are accessed per level is the same.
+  !> Number of children of a node. A heap with four children per node has half the depth of a binary heap, and the number of cache
+  !> lines that are accessed per level is equal.
   integer(int32), parameter :: arity = 4
 
   type :: event_heap_t
     integer(int32) :: n = 0                      !! number of events
     type(event_t), allocatable, private :: entry(:)        !! (n) events in heap order
-    !> (disks) position in `entry` of the event of each disk; 0 if it has no event in the heap.
+    !> (disks) position in `entry` of the event of each disk; 0 if the heap contains no event of the disk.
     integer(int32), allocatable, private :: slot(:)
   contains
     procedure :: initialise
@@ -27,8 +27,8 @@ module event_heap
 
 contains
 
-  !> Order of events: by time, then by `wins`. Both disks of a pair may store the same collision; the position of the collision in
-  !> the order is the same for both disks.
+  !> Whether event a precedes event b. Events are ordered by time, and simultaneous events are ordered by `neighbour_search: wins`.
+  !> If both disks of a pair store their collision, the two stored events have the same position in the order.
   pure function precedes(a, b, tag) result(yes)
     type(event_t), intent(in) :: a, b
     type(tag_t), intent(in) :: tag(*)
@@ -38,8 +38,8 @@ contains
     if (.not. (yes .or. a%time > b%time)) yes = wins(a, b, tag)
   end function precedes
 
-  !> Nonzero if two simultaneous events need an order. Most pairs of simultaneous events are one collision that both disks store,
-  !> and need no order.
+  !> Nonzero if a and b are different events at the same time, so that `precedes` has to determine their order. Event a must not be
+  !> earlier than event b. Two simultaneous events are usually one collision that both disks store; such events need no order.
   elemental function need_order(a, b) result(bits)
     type(event_t), intent(in) :: a, b
     integer(int32) :: bits
@@ -96,7 +96,8 @@ contains
     if (self%n > 0) call sift_down(self, 1_int32, last, tag)
   end subroutine drop_first
 
-  !> Moves the vacant position `start` up to the position of `event`, and stores the event there.
+  !> Inserts `event` at the position `start`, and moves the event towards the root of the heap until the parent node precedes the
+  !> event.
   pure subroutine sift_up(self, start, event, tag)
     class(event_heap_t), intent(inout) :: self
     integer(int32), intent(in) :: start
@@ -116,7 +117,8 @@ contains
     self%slot(event%disk) = k
   end subroutine sift_up
 
-  !> Moves the vacant position `start` down to the position of `event`, and stores the event there.
+  !> Inserts `event` at the position `start`, and moves the event away from the root of the heap until the event precedes all child
+  !> nodes.
   pure subroutine sift_down(self, start, event, tag)
     class(event_heap_t), intent(inout) :: self
     integer(int32), intent(in) :: start

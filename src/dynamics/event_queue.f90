@@ -1,9 +1,9 @@
-!> The event queue: a calendar combined with a heap (G. Paul, J. Comput. Phys. 221, 615 (2007)).
+!> The event queue: a calendar combined with a heap (Paul, Journal of Computational Physics 221, 615 (2007)).
 !>
 !> Events of the current time window are in a short sorted list. If this list becomes full, its events are moved to the heap, and
 !> the heap is used until the end of the window. Events of later windows are in the calendar, or in the heap if their bucket is
-!> full. Single entries are never searched or removed. An entry is valid only if it still equals the event that its disk stores.
-!> Without the calendar all events are in the heap.
+!> full. Single entries are never searched for or removed. An entry is valid only if the entry still equals the event that its disk
+!> stores. Without the calendar all events are in the heap.
 module event_queue
   use kinds, only: int32, int64, never, real64
   use calendar, only: bucket_capacity, bucket_t, calendar_t, events_per_window, most_coming, window_none
@@ -25,16 +25,16 @@ module event_queue
     !> (0:n_near) sorted list of events, the latest first; element 0 is a sentinel that is never due.
     type(event_t) :: near(0:near_capacity)
     integer(int32) :: n_near = 0
-    !> .true.: new events of the current window are added to the sorted list; .false.: they are added to the heap.
+    !> Whether new events of the current window are added to the sorted list (.true.) or to the heap (.false.).
     logical :: near_is_open = .false.
-    logical :: windowed = .true.                   !! the calendar is in use, not only the heap
-    integer(int32) :: window = 0                   !! index of the current window since the epoch
+    logical :: windowed = .true.                   !! whether the calendar is used in addition to the heap
+    integer(int32) :: window = 0                   !! index of the current window, counted from the time origin `box%epoch`
     integer(int32) :: n_disks = 0
     real(real64) :: width = never                  !! width of a window [time]
-    real(real64) :: per_time = 0.0_real64          !! number of windows per time, 1/width
+    real(real64) :: per_time = 0.0_real64          !! number of windows per unit of time, 1/width [1/time]
     real(real64) :: next_window = 1.0_real64       !! window + 1
-    integer(int64) :: n_taken = 0                  !! number of events removed from the queue since all events were last entered
-    real(real64) :: filled_at = 0.0_real64         !! time when all events were last entered [time]
+    integer(int64) :: n_taken = 0                  !! number of events removed from the queue since the last call of `fill`
+    real(real64) :: filled_at = 0.0_real64         !! time of the last call of `fill` [time]
   contains
     procedure :: fill
     procedure :: schedule
@@ -43,7 +43,8 @@ module event_queue
     procedure :: drop_first
     procedure :: drop_if_next
     procedure :: list_coming
-    ! Rarely called procedures are bound to the type, so that they are not inlined into frequently called procedures.
+    ! Rarely called procedures are type-bound, so that the compiler does not inline these procedures into frequently called
+    ! procedures.
     procedure, private :: insert_near
     procedure, private :: insert_into_heap
     procedure, private :: first_in_heap
@@ -59,8 +60,8 @@ contains
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
     type(tag_t), intent(inout) :: tag(:)
-    real(real64), intent(in) :: now                !! time since the epoch [time]
-    logical, intent(in) :: windowed                !! .false.: all events are entered into the heap
+    real(real64), intent(in) :: now                !! time relative to the time origin `box%epoch` [time]
+    logical, intent(in) :: windowed                !! whether the calendar is used; .false.: all events are in the heap
     integer(int32) :: i
 
     self%n_disks = size(disk, kind=int32)
@@ -74,7 +75,7 @@ contains
     self%near_is_open = self%windowed
     self%n_taken = 0
     self%filled_at = now
-    self%per_time = 0                              ! a single window without end
+    self%per_time = 0                              ! a single window of infinite length
     if (self%windowed) then
       self%per_time = 1/self%width
       call self%calendar%empty(self%n_disks)
@@ -87,8 +88,8 @@ contains
     end do
   contains
 
-    !> Width of a window that contains a few events, from the event rate since all events were last entered. The first estimate uses
-    !> the median waiting time of a sample of disks. The result is `never` if there are no events.
+    !> Width of a window that contains `events_per_window` events on average, from the event rate since the last call of `fill`. The
+    !> first estimate of the width uses the median waiting time of a sample of disks. The width is `never` if there are no events.
     pure function window_width() result(width)
       real(real64) :: width, waits(sample_size), swap
       integer :: i, k, n_waits
@@ -113,8 +114,8 @@ contains
     end function window_width
   end subroutine fill
 
-  !> Enters the event of disk i into the queue. A previous entry of the disk becomes invalid, because it no longer equals the event
-  !> of the disk.
+  !> Enters the event of disk i into the queue. A previous entry of the disk becomes invalid, because the entry no longer equals the
+  !> event of the disk.
   subroutine schedule(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -125,7 +126,7 @@ contains
     logical :: full
 
     number = disk(i)%event_time*self%per_time
-    if (.not. number >= self%next_window) then     ! also true if the time is NaN, so that this error is detected immediately
+    if (.not. number >= self%next_window) then     ! also true for a time of NaN, so that this error is detected immediately
       tag(i)%window = window_none
       call self%insert_near(disk, tag, i)
       return
@@ -143,8 +144,8 @@ contains
     end if
   end subroutine schedule
 
-  !> Removes the entry of a disk from the queue. Only the window of the disk is erased: the entry itself becomes invalid when the
-  !> event of the disk changes.
+  !> Removes the entry of a disk from the queue. The procedure only erases the window number of the disk. The entry itself becomes
+  !> invalid when the event of the disk changes.
   pure subroutine remove_entry(self, tag)
     class(event_queue_t), intent(in) :: self
     type(tag_t), intent(inout) :: tag
@@ -152,7 +153,7 @@ contains
     tag%window = window_none
   end subroutine remove_entry
 
-  !> Adds an event to the current window: to the sorted list, or to the heap once the list has overflowed.
+  !> Adds an event of the current window to the sorted list, or to the heap if the list has become full.
   subroutine insert_near(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -192,8 +193,8 @@ contains
     call self%heap%update(event_of(disk, i), tag)
   end subroutine insert_into_heap
 
-  !> Inserts an event into a sorted list of n events. The comparison of the times nearly always suffices to order two events. Most
-  !> pairs of simultaneous events are one collision that both disks store, and need no order.
+  !> Inserts an event into a sorted list of n events. The comparison of the times nearly always suffices to order two events. Two
+  !> simultaneous events are usually one collision that both disks store; such events need no order.
   pure subroutine insert(list, n, event, tag)
     type(event_t), intent(inout) :: list(0:*)
     integer(int32), intent(in) :: n
@@ -215,7 +216,7 @@ contains
     list(k + 1) = event
   end subroutine insert
 
-  !> Finds the disk with the earliest event, which stays in the queue.
+  !> Finds the disk with the earliest event. The event stays in the queue.
   subroutine first(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -236,7 +237,7 @@ contains
     end do
   end subroutine first
 
-  !> The disk with the earliest event in the heap; 0 if no event in the heap is due in this window.
+  !> The disk with the earliest event in the heap; 0 if no event in the heap is due in the current window.
   subroutine first_in_heap(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -269,8 +270,8 @@ contains
     self%n_taken = self%n_taken + 1
   end subroutine drop_first
 
-  !> Removes the entry of disk i if it is the next entry. This removal only saves time: if both disks of a collision have stored the
-  !> collision, the second entry directly follows the first entry.
+  !> Removes the next entry of the queue if this entry belongs to disk i. If both disks of a collision have stored the collision,
+  !> the two entries are adjacent. The removal of the second entry saves time but is not necessary.
   subroutine drop_if_next(self, i)
     class(event_queue_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -290,7 +291,7 @@ contains
     if (self%windowed) call self%calendar%list_coming(tag, self%window, stage, n, disks)
   end subroutine list_coming
 
-  !> Whether an entry is valid: it equals the event that its disk stores.
+  !> Whether an entry is valid, which means that the entry equals the event that its disk stores.
   pure function is_valid(disk, event) result(yes)
     type(disk_t), intent(in) :: disk(*)
     type(event_t), intent(in) :: event
@@ -316,8 +317,9 @@ contains
     if (self%calendar%span_begins(self%window)) call self%open_next_span(disk, tag)
   end subroutine open_next_window
 
-  !> Empties a bucket into a sorted list. Only events before the next window are valid. Because the number of these events is small,
-  !> the position of each event is found by counting the later events, without branches that depend on times.
+  !> Moves the valid events in a bucket to a sorted list. Events that are not before the next window are invalid. The position of
+  !> each event is found by counting the later events. Because a bucket contains few events, this counting is fast, and its branches
+  !> do not depend on times.
   pure subroutine take_bucket(bucket, disk, tag, per_time, next_window, list, n)
     type(bucket_t), intent(inout) :: bucket
     type(disk_t), intent(in) :: disk(*)
@@ -357,8 +359,8 @@ contains
     end do
   end subroutine take_bucket
 
-  !> Moves the events due in this window from the heap to the sorted list. If the list overflows, all its events are moved back into
-  !> the heap.
+  !> Moves the events that are due in the current window from the heap to the sorted list. If the list overflows, all its events are
+  !> moved back into the heap.
   subroutine take_from_heap(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -396,7 +398,7 @@ contains
   contains
 
     !> Whether all events should be entered again with another width of the windows: the present width has proved far too small or
-    !> too large, and enough windows have passed since all events were last entered.
+    !> too large, and enough windows have passed since the last call of `fill`.
     pure function ill_fitting() result(yes)
       logical :: yes
       real(real64) :: per_window

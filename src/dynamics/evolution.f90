@@ -1,4 +1,4 @@
-!> Interface between the timeline and the kinds of dynamics.
+!> Abstract type of the kinds of dynamics (event-driven, time-stepped, parallel), which the timeline calls.
 module evolution
   use kinds, only: int32, int64, never, real64
   use errors, only: error_t
@@ -9,16 +9,18 @@ module evolution
   private
   public :: evolution_t, limits_t
 
-  !> Limits of the dynamics, which stops when the first of them is reached. The default values are never reached.
+  !> Limits of the dynamics. The dynamics returns to the caller when the first limit is reached. A default value is a limit that is
+  !> never reached.
   type :: limits_t
-    real(real64) :: time = never  !! limit of time, since the start of the run; since the epoch in calls of evolutions [time]
+    !> Limit of the time, relative to the start of the run; relative to `box%epoch` in calls of `evolution_t` [time]
+    real(real64) :: time = never
     integer(int64) :: collisions = huge(0_int64)
     integer(int64) :: events = huge(0_int64)
     real(real64) :: dissipated = huge(0.0_real64)        !! dissipated energy [energy]
-    logical :: at_rest = .false.                         !! all disks are at rest
-    !> Number of iterations of the event loop after which the caller can make other checks.
+    logical :: at_rest = .false.                         !! whether the dynamics returns when all disks are at rest
+    !> Number of iterations of the event loop after which the dynamics returns, so that the caller can make other checks.
     integer(int64) :: iterations = huge(0_int64)
-    real(real64) :: sampled = 0.0_real64                 !! time of the latest sample, before which the run does not end
+    real(real64) :: sampled = 0.0_real64                 !! time of the latest sample; the run does not end before this time
   contains
     procedure :: reached
     procedure :: outgrown
@@ -26,9 +28,9 @@ module evolution
   end type limits_t
 
   type, abstract :: evolution_t
-    logical :: idle = .false.     !! no event will ever occur again
-    logical :: arrived = .false.  !! the last advance reached its time limit, and all events up to it have been executed
-    integer(int64) :: iterations_left = 0  !! number of iterations that the last advance was allowed but did not use
+    logical :: idle = .false.     !! whether no event will ever occur again
+    logical :: arrived = .false.  !! whether `advance` has reached its time limit and executed all events up to this limit
+    integer(int64) :: iterations_left = 0  !! number of allowed iterations that the last call of `advance` did not use
     integer(int64) :: serial_events = 0    !! number of events executed by the serial engine of a parallel run
     integer(int32) :: last_event(2) = 0    !! disk and partner of the last event, or of the first event after the time limit
   contains
@@ -40,16 +42,16 @@ module evolution
   end type evolution_t
 
   abstract interface
-    !> Prepares to continue from the state `sim`, which is new or restored. This procedure derives all data that are not part of the
-    !> state from the state.
+    !> Prepares the dynamics to continue from the state `sim`, which is new or restored. All data of the dynamics that are not part
+    !> of the state are derived from the state.
     subroutine start_evolution(self, sim)
       import :: evolution_t, simulation_t
       class(evolution_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: sim
     end subroutine start_evolution
 
-    !> Advances until a limit is reached or the log is full. The trajectory does not depend on the times at which the procedure
-    !> returns.
+    !> Advances the simulation until a limit is reached or the log is full. The trajectory does not depend on the times at which the
+    !> procedure returns.
     subroutine advance_evolution(self, sim, limits, error, log)
       import :: error_t, event_log_t, evolution_t, limits_t, simulation_t
       class(evolution_t), intent(inout) :: self
@@ -62,7 +64,8 @@ module evolution
 
 contains
 
-  !> Whether a limit other than the time limit is reached. (Events at exactly the time limit are still executed.)
+  !> Whether a limit other than the time limit is reached. The time limit is not tested here, because events at exactly the time
+  !> limit are still executed.
   pure function reached(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally
@@ -71,9 +74,9 @@ contains
     yes = tally%events >= self%events .or. tally%collisions >= self%collisions .or. self%outgrown(tally)
   end function reached
 
-  !> Whether a limit on a quantity that any collision may change is reached. Such a quantity must never decrease. A parallel run
-  !> detects only at the end of a time window that the limit was exceeded. The parallel run then repeats the window to find the
-  !> collision at which the limit was reached.
+  !> Whether a limit on a quantity that any collision may change is reached. The quantity must never decrease. A parallel run
+  !> detects only at the end of a time window that the quantity has exceeded its limit. The parallel run then repeats the window to
+  !> find the collision at which the limit was reached.
   pure function outgrown(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally
@@ -108,11 +111,11 @@ contains
     t = time
   end function pause_at
 
-  !> Continues after the state of some disks has been changed from outside at the present time.
+  !> Continues after the caller has changed the state of some disks at the present time.
   subroutine renew(self, sim, changed)
     class(evolution_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: changed(:)      !! indices of these disks
+    integer(int32), intent(in) :: changed(:)      !! indices of the changed disks
 
     call self%start(sim)
   end subroutine renew

@@ -1,4 +1,4 @@
-!> Records the motion of disks in one domain during the present time window, in a parallel run. The record of a disk, called its
+!> Records the motion of disks in one domain during the present time window of a parallel run. The record of a disk, called its
 !> history, consists of the range of cells in which the disk was and a digest (hash) of its collisions. After the window, the
 !> histories show whether each copy of a disk has moved in the same way as the original disk in the domain that owns this disk. The
 !> module also determines which collisions a domain counts.
@@ -12,12 +12,12 @@ module histories
   private
   public :: history_t, histories_t
 
-  !> The history of a disk in the present window. A disk has no history if it is owned by the domain and no other domain can have a
-  !> copy of it.
+  !> The history of a disk in the present window. A disk has no history if the domain owns the disk and no other domain can have a
+  !> copy of the disk.
   type :: history_t
     integer(int64) :: digest = 0                   !! digest of the times of the collisions of this disk with other disks
     integer(int32) :: slot = 0
-    logical :: own = .false.                       !! .true.: the disk is owned by this domain; .false.: it is a copy
+    logical :: own = .false.                       !! whether this domain owns the disk; .false. for a copy of a disk
     integer(int16) :: low(2) = 0_int16             !! lowest column and lowest row in which the disk was
     integer(int16) :: high(2) = 0_int16            !! highest column and highest row in which the disk was
   end type history_t
@@ -25,16 +25,16 @@ module histories
   type :: histories_t
     type(patch_t) :: patch                         !! cells of the domain and its halo
     integer(int32) :: n_histories = 0
-    type(history_t), allocatable :: history(:)     !! (at least n_histories) the histories
-    integer(int32), allocatable :: history_of(:)   !! (slots) index of the history of each disk; 0 if it has no history
+    type(history_t), allocatable :: history(:)     !! (at least n_histories) histories of disks
+    integer(int32), allocatable :: history_of(:)   !! (slots) index of the history of each disk; 0 for a disk without a history
     integer(int32) :: own_low(2) = 0, own_high(2) = 0      !! first and last column and row of the domain
-    integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! range of columns and rows that are not in the patch of another domain
+    integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! range of columns and rows outside of all other patches
     !> Range of columns and rows of the cells whose eight neighbours are all in the patch.
     integer(int32) :: safe_low(2) = 0, safe_high(2) = 0
-    !> (0:,0:) 1 if a disk that is owned by the domain but has left it was in this cell or in one of the eight cells around this
+    !> (0:,0:) 1 if, outside of the domain, a disk that the domain owns was in this cell or in one of the eight cells around this
     !> cell.
     integer(int8), allocatable :: reached(:, :)
-    logical :: left_patch = .false.                !! a disk that the domain owns has reached the edge of the patch
+    logical :: left_patch = .false.                !! whether a disk that the domain owns has reached the edge of the patch
   contains
     procedure :: record_collision
     procedure :: record_cell
@@ -52,7 +52,7 @@ module histories
 
 contains
 
-  !> Starts a new window, in which no disk that the domain owns has left the domain yet.
+  !> Starts a new window. At its start no disk that the domain owns has left the domain.
   subroutine begin_window(self)
     class(histories_t), intent(inout) :: self
 
@@ -60,8 +60,8 @@ contains
     self%left_patch = .false.
   end subroutine begin_window
 
-  !> Starts a new history of disk i, if a disk in its present cell needs a history. The cell also determines whether the domain owns
-  !> the disk.
+  !> Starts a new history of disk i if another domain can have a copy of a disk in the present cell. The present cell also
+  !> determines whether the domain owns disk i.
   subroutine begin_history(self, cell, i)
     class(histories_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -85,7 +85,7 @@ contains
     self%history_of(i) = self%n_histories
   end subroutine add_history
 
-  !> Deletes the history of disk i, if it exists. The last history in the array takes the index of the deleted history.
+  !> Deletes the history of disk i if disk i has a history. The last history in the array moves to the index of the deleted history.
   subroutine drop_history(self, i)
     class(histories_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -130,7 +130,7 @@ contains
     call self%record_cell(tag(j)%cell, j)
   end subroutine record_collision
 
-  !> Adds a collision to a digest.
+  !> Adds the time of a collision to a digest of collision times.
   elemental subroutine add_moment(digest, time)
     integer(int64), intent(inout) :: digest
     real(real64), intent(in) :: time
@@ -159,7 +159,7 @@ contains
 
     if (self%history_of(i) == 0) then
       if (within(cell, self%deep_low, self%deep_high)) return
-      call self%add_history(i)                     ! from this cell on the disk can be in the patches of other domains
+      call self%add_history(i)                     ! a disk in this cell can be in the patches of other domains
       self%history(self%history_of(i)) = history_t(0_int64, i, .true., cell, cell)
     end if
     associate (history => self%history(self%history_of(i)))
@@ -169,8 +169,8 @@ contains
     end associate
   end subroutine record_cell
 
-  !> Records that a disk owned by the domain is in this cell, outside of the domain. The disk may touch any disk in this cell and
-  !> the eight cells around it.
+  !> Records that a disk that the domain owns is in a cell outside of the domain. The disk may touch any disk in this cell and in
+  !> the eight neighbouring cells.
   subroutine reach(self, cell)
     class(histories_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -225,7 +225,8 @@ contains
     n = count(.not. self%history(:self%n_histories)%own, kind=int32)
   end function n_copies
 
-  !> Whether a disk that was in these columns and rows during the window could have touched a disk that the domain owns.
+  !> Whether a disk that was in the given range of columns and rows during the window could have touched a disk that the domain
+  !> owns.
   pure function could_have_met(self, low, high) result(yes)
     class(histories_t), intent(in) :: self
     integer(int32), intent(in) :: low(2), high(2)

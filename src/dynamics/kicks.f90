@@ -1,5 +1,6 @@
-!> The velocity changes of a kick. The random numbers of a kick are functions of the seed, the disk and the number of the kick
-!> alone, so that they depend neither on the order of the disks nor on the history of the run.
+!> Applies kicks: changes of the velocities of disks at regular times. The random numbers of a kick are functions of the seed, the
+!> disk and the number of the kick alone. The random numbers therefore depend neither on the order of the disks nor on the history
+!> of the run.
 module kicks
   use kinds, only: int32, pi, real64
   use disks, only: advance_disk
@@ -18,7 +19,7 @@ contains
   subroutine kick(sim, kicked)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable, intent(out) :: kicked(:)
-    real(real64), allocatable :: draws(:, :)     ! (2,n) random numbers of the affected disks, stored if they are needed again
+    real(real64), allocatable :: draws(:, :)     ! (2,n) random numbers of the affected disks, stored to restore the momentum
     real(real64) :: z(2)
     integer(int32) :: i, n
     logical :: is_hit
@@ -39,8 +40,8 @@ contains
     if (sim%drive%keep_momentum) call restore_momentum()
   contains
 
-    !> Subtracts the mean velocity that noise has added to the disks. The sums are exact and do not depend on the order of the
-    !> disks.
+    !> Subtracts the mean velocity that noise has added to the disks. The sums over the disks are exact and do not depend on the
+    !> order of the disks.
     subroutine restore_momentum()
       type(exact_sum_t) :: momentum(2), mass
       real(real64) :: scale, heaviest
@@ -62,8 +63,8 @@ contains
     end subroutine restore_momentum
   end subroutine kick
 
-  !> Sets a new velocity of disk i; in a sheared box the velocity is relative to the velocity profile. Erases the last partner of
-  !> the disk, because the disk and this partner may now collide again immediately. A kick does not count as a collision.
+  !> Applies a kick to disk i. In a sheared box the random velocity is relative to the velocity profile. The procedure erases the
+  !> last partner of disk i, because the two disks may now collide again immediately. A kick does not count as a collision.
   subroutine kick_disk(sim, i, is_hit, z)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -127,7 +128,7 @@ contains
     end do
   end subroutine draw_orientations
 
-  !> Sets the velocity of disk i and adds the energy change to the sum.
+  !> Sets the velocity of disk i and adds the change of its energy to the sum `drive_energy`.
   subroutine change_velocity(sim, i, v)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -140,7 +141,7 @@ contains
     call sim%record_velocity_change(i, before, sim%now)
   end subroutine change_velocity
 
-  !> Sets the angular velocity of disk i and adds the energy change to the sum.
+  !> Sets the angular velocity of disk i and adds the change of its energy to the sum `drive_energy`.
   subroutine change_spin(sim, i, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

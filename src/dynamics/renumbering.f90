@@ -8,13 +8,13 @@ module renumbering
   private
   public :: renumber
 
-  integer(int32), parameter :: tile = 8           !! edge of a tile in cells; the disks of a tile fill a memory page
+  integer(int32), parameter :: tile = 8  !! number of cells along the edge of a tile; the disks of a tile fill a memory page
 
 contains
 
-  !> Sorts the disks by the cells of a grid with about one disk per cell, and the cells by square tiles, so that the disks of a
-  !> region of space occupy few memory pages. Disks of one cell keep their order. The order depends on the state alone, and not on
-  !> the search or the queue. `tag%id` is the position of a disk in the input.
+  !> Sorts the disks by the cells of a grid with about one disk per cell. The cells are sorted by square tiles, so that the disks in
+  !> a region of space occupy few memory pages. Disks in the same cell keep their order. The new order depends on the state alone,
+  !> and not on the search or the queue. The id of a disk (`tag%id`) does not change.
   subroutine renumber(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable :: first(:), place(:), cell(:), order(:)
@@ -34,7 +34,7 @@ contains
     call move_in_order(sim, order)
   end subroutine renumber
 
-  !> Permutes the disks in place, without a second copy of them. Most disks are already near their new position.
+  !> Permutes the disks in place, without a second copy of all disks. Most disks are already near their new position in memory.
   subroutine move_in_order(sim, order)
     type(simulation_t), intent(inout) :: sim
     !> in: index of the disk that belongs at each position; out: the identity permutation.

@@ -1,9 +1,8 @@
 !> Determines when a run ends: when one of the stop rules in the input is met, or when rounding errors dominate.
 !>
-!> In a periodic box inelastic disks cool until only a common velocity that results from rounding errors remains. Long before this
-!> state is reached, rounding errors dominate the temperature, and the run then ends. The test is made at the start of each epoch,
-!> so that the end of the run depends on the trajectory alone. The energy is compared with the energy at the time when the
-!> velocities were last set, because that energy determines the magnitude of the rounding errors.
+!> Inelastic disks in a periodic box cool without end. The run ends when rounding errors dominate the temperature. This test is made
+!> at the start of each epoch, so that the end of the run depends on the trajectory alone. The test compares the energy with the
+!> energy at the time when the velocities were last set, because that energy determines the magnitude of the rounding errors.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use epochs, only: is_at_rest, stands_still
@@ -15,24 +14,24 @@ module stop_rules
   private
   public :: coldness, stop_rule_t, stop_settings_t, whole_collisions
 
-  real(real64), parameter :: coldest = 1.0e-25_real64        !! temperature at which a run ends, relative to the initial one
+  real(real64), parameter :: coldest = 1.0e-25_real64        !! temperature at which a run ends, divided by the initial temperature
   character(len=*), parameter :: coldness = "cooled to 1e-25 of the initial temperature"
 
-  !> Stop rules. The default values are never reached.
+  !> Stop rules in the input. A default value is a limit that is never reached.
   type :: stop_settings_t
     real(real64) :: time = never
     integer(int64) :: collisions = huge(0_int64)
     real(real64) :: collisions_per_disk = never
     integer(int64) :: events = huge(0_int64)
     real(real64) :: energy_fraction = 0.0_real64
-    logical :: at_rest = .false.                      !! all disks are at rest
+    logical :: at_rest = .false.                      !! whether the run ends when all disks are at rest
     real(real64) :: wall_clock = never                !! [s]
   end type stop_settings_t
 
   type :: stop_rule_t
     type(limits_t) :: limits
     real(real64) :: wall_clock = never       !! [s]
-    logical :: cools = .false.               !! inelastic disks in a periodic box, which cool without end
+    logical :: cools = .false.               !! whether the disks cool without end: inelastic disks in a periodic box
   contains
     procedure :: is_met
     procedure :: rests
@@ -64,7 +63,7 @@ contains
       .and. .not. sim%is_driven()
   end function new_stop_rule
 
-  !> The smallest integer that is not less than a real number of collisions, apart from rounding errors. The result is huge if the
+  !> A real number of collisions, rounded up to an integer. Rounding errors of the number are ignored. The result is huge(n) if the
   !> number exceeds the range of 64-bit integers.
   pure function whole_collisions(number) result(n)
     real(real64), intent(in) :: number
@@ -84,8 +83,8 @@ contains
     if (.not. yes .and. self%limits%at_rest) yes = stands_still(sim) .and. is_at_rest(sim)
   end function is_met
 
-  !> Whether all disks are at rest and the input contains the rule that ends the run in this case. The test is needed in simulations
-  !> without gravity, in which disks at rest have no events, so that the test at the end of an epoch is never made.
+  !> Whether the disks are at rest and the input contains the stop rule `at_rest`. This test is needed in simulations without
+  !> gravity. Disks at rest then have no events, so that the test at the end of an epoch is never made.
   pure function rests(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -95,7 +94,7 @@ contains
     if (yes) yes = is_at_rest(sim)
   end function rests
 
-  !> Whether the motion relative to the mean velocity had practically ceased at the beginning of the epoch.
+  !> Whether the kinetic energy relative to the mean velocity was negligible at the beginning of the epoch.
   pure function too_cold(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -107,7 +106,7 @@ contains
   end function too_cold
 
   !> Whether a run is finished. A run is finished when a stop rule is met, when rounding errors dominate, or, if the run has no time
-  !> limit, when no event will occur any more. Failures are not tested here, because `timeline` and the evolution report them.
+  !> limit, when no event will occur any more. Failures are not tested here, because `timeline` and the evolution report failures.
   pure function is_over(self, sim, evolution) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -119,8 +118,8 @@ contains
       yes = self%rests(sim) .or. .not. min(self%limits%time, next_kick(evolution, sim)) < never
   end function is_over
 
-  !> Kinetic energy relative to the mean velocity. The computation has two passes, because a difference of two large sums would lose
-  !> precision.
+  !> Kinetic energy of the motion relative to the mean velocity. The computation has two passes, because a difference of two large
+  !> sums would lose precision.
   pure function relative_energy(sim) result(energy)
     type(simulation_t), intent(in) :: sim
     real(real64) :: energy                          !! [energy]
@@ -146,7 +145,7 @@ contains
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: elapsed      !! wall-clock time [s]
     real(real64) :: done
-    real(real64), parameter :: least = 1/never     ! avoids division by 0
+    real(real64), parameter :: least = 1/never     ! avoids a division by 0
 
     done = max(sim%time()/max(self%limits%time, least), &
       real(sim%tally%collisions, real64)/max(self%limits%collisions, 1_int64), &

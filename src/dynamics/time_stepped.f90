@@ -1,6 +1,7 @@
-!> Time-stepped dynamics. In each step of fixed length all disks first move in exact free flight. Then each disk beyond a wall is
-!> reflected, and each pair of disks that overlap and approach each other collides once. A contact is detected up to one step late,
-!> and a contact that begins and ends within a step is not detected. The method serves for comparisons with event-driven dynamics.
+!> Time-stepped dynamics. In each step of fixed length all disks first move in exact free flight. After this flight each disk beyond
+!> a wall is reflected, and each pair of disks that overlap and approach each other collides once. A contact is detected up to one
+!> step late, and a contact that begins and ends within a step is not detected. The method serves for comparisons with event-driven
+!> dynamics.
 !>
 !> As in event-driven dynamics, the stored state of a disk changes only when this disk collides, so that rounding errors do not
 !> accumulate from step to step.
@@ -25,11 +26,11 @@ module time_stepped
 
   !> Largest recommended displacement in a step, relative to the smallest radius.
   real(real64), parameter :: longest_way = 0.5_real64
-  integer(int64), parameter :: steps_per_look = 1024  !! number of steps between two tests whether any disk moves
+  integer(int64), parameter :: steps_per_look = 1024  !! number of steps between two tests of whether any disk moves
 
   type, extends(evolution_t) :: time_stepped_t
     real(real64) :: dt = 0.0_real64                 !! [time]
-    !> All pairs are tested in every step, and not only the pairs in the Verlet lists.
+    !> Whether all pairs are tested in every step, and not only the pairs in the Verlet lists.
     logical :: every_pair = .false.
     type(verlet_list_t), private :: near
     ! The coordinates are stored separately from the disks, so that loops can be vectorised.
@@ -60,7 +61,7 @@ contains
     self%idle = .false.
   end subroutine start
 
-  !> The time at which the step that contains a given time ends.
+  !> The end of the time step that contains a given time.
   pure function pause_at(self, time) result(t)
     class(time_stepped_t), intent(in) :: self
     real(real64), intent(in) :: time               !! time since the start of the run
@@ -72,7 +73,8 @@ contains
     if (t < time) t = (steps_taken(time, self%dt) + 1)*self%dt
   end function pause_at
 
-  !> Continues after disks have been changed. Only the test for rest is reset, because Verlet lists do not depend on velocities.
+  !> Continues after the velocities of disks have been changed. Only the test for rest is reset, because Verlet lists do not depend
+  !> on velocities.
   subroutine renew(self, sim, changed)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -110,7 +112,8 @@ contains
     end do
   end subroutine advance
 
-  !> Number of steps before the present time: the largest integer k with k*dt <= now. The result depends on the state alone.
+  !> Number of steps before the present time: the largest integer k with k*dt <= now. The number depends on the present time and the
+  !> length of a step alone.
   pure function steps_taken(now, dt) result(k)
     real(real64), intent(in) :: now, dt             !! [time]
     integer(int64) :: k
@@ -134,8 +137,9 @@ contains
     end do
   end function at_rest
 
-  !> Executes all collisions at time t: first sides, then obstacles, then pairs of disks, each in ascending order, so that the
-  !> result does not depend on the search. A stop request ends a long search before the state has changed.
+  !> Advances all disks to the time t and executes all collisions at this time. Collisions with sides come first, then collisions
+  !> with obstacles, then collisions of two disks. Each kind is in ascending order of the indices, so that the result does not
+  !> depend on the search for pairs. A stop request ends a long search before the state has changed.
   subroutine take_step(self, sim, t, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -217,7 +221,7 @@ contains
         call collide(sim, i, code, sim%now, .true., log)
     end subroutine meet_wall
 
-    !> Executes the collision of disks i < j, which overlap, if they approach each other.
+    !> Executes the collision of the overlapping disks i and j (i < j), if the disks approach each other.
     subroutine meet_disk(i, j)
       integer(int32), intent(in) :: i, j
       type(images_t) :: images
@@ -230,7 +234,7 @@ contains
     end subroutine meet_disk
   end subroutine take_step
 
-  !> The next position at which the array contains 1; 0 if there is none.
+  !> The first position after `after` at which the array contains 1; 0 if there is no such position.
   pure function next_marked(mark, after) result(k)
     integer(int32), contiguous, intent(in) :: mark(:)
     integer(int32), intent(in) :: after
@@ -260,7 +264,7 @@ contains
     end associate
   end subroutine mark_outside
 
-  !> 1 if x is between two limits; otherwise, or if x is NaN, 0.
+  !> 1 if x is between two limits; 0 if x is outside of the limits or NaN.
   elemental function between(x, low, high) result(inside)
     real(real64), intent(in) :: x, low, high
     integer(int32) :: inside

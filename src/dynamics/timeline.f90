@@ -1,5 +1,5 @@
 !> Executes the actions that affect all disks at once, in a fixed order. At equal times collisions are executed first, then kicks,
-!> then the actions of the caller (samples, end of the run). The origin of time is moved between these actions.
+!> then the actions of the caller (samples, end of the run). The time origin moves between these actions.
 module timeline
   use encounters, only: encounter_text
   use box_geometry, only: wall_normal
@@ -22,7 +22,7 @@ module timeline
 
 contains
 
-  !> Advances until a limit is reached, or until no event will occur any more.
+  !> Advances the simulation until a limit is reached, or until no event will occur any more.
   subroutine advance(evolution, sim, limits, error, log)
     class(evolution_t), intent(inout) :: evolution
     type(simulation_t), intent(inout) :: sim
@@ -37,8 +37,8 @@ contains
     end do
   end subroutine advance
 
-  !> Advances until a limit is reached, a kick is due, or the epoch ends. Then executes the kick or starts the next epoch. The
-  !> trajectory does not depend on the times at which the procedure returns.
+  !> Advances the simulation until a limit is reached, a kick is due, or the epoch ends. The procedure then executes the kick or
+  !> starts the next epoch. The trajectory does not depend on the times at which the procedure returns.
   subroutine advance_once(evolution, sim, limits, error, log)
     class(evolution_t), intent(inout) :: evolution
     type(simulation_t), intent(inout) :: sim
@@ -57,7 +57,7 @@ contains
     due = min(limits%time, kick_time)
     goal = limits
     until = due - sim%box%epoch
-    if (sim%box%epoch + until < due) until = nearest(until, 1.0_real64)   ! rounded down, it would never be reached
+    if (sim%box%epoch + until < due) until = nearest(until, 1.0_real64)   ! a time that is rounded down would never be reached
     goal%time = until
     if (sim%epoch_end > 0) then                    ! time-stepped dynamics has no epochs
       goal%time = min(goal%time, sim%epoch_end)
@@ -82,8 +82,8 @@ contains
     sim%events_done = arrived .or. (sim%events_done .and. sim%tally%events == events .and. .not. sim%time() > before)
   contains
 
-    !> Advances the time to the next action that is due, if no event occurs any more. If no action is due, the time becomes the time
-    !> of the last collision.
+    !> Advances the time to the next action, if no event will occur any more. If no further action is due either, the time becomes
+    !> the time of the last collision or sample.
     subroutine wait()
       if (due < last_time) then
         sim%now = max(sim%now, until)
@@ -109,9 +109,9 @@ contains
     end subroutine end_epoch
   end subroutine advance_once
 
-  !> Number of iterations that take about `pause_interval`. The number grows only if all iterations were used. If the number grew in
-  !> all other cases as well, it would become arbitrarily large in a run with many samples, and signals would not be checked for
-  !> hours after the last sample.
+  !> Number of iterations that take about `pause_interval`. The number of iterations increases only if all iterations were used.
+  !> Otherwise the number would become arbitrarily large in a run with many samples, and signals would not be checked for hours
+  !> after the last sample.
   pure function adapted_iterations(iterations, elapsed, cut_short) result(n)
     integer(int64), intent(in) :: iterations
     real(real64), intent(in) :: elapsed               !! wall-clock time of the iterations that were used [s]
@@ -127,12 +127,12 @@ contains
   pure function next_kick(evolution, sim) result(t)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
-    real(real64) :: t                              !! time since the start of the run; `never` without kicks
+    real(real64) :: t                              !! time since the start of the run, or `never` without kicks
 
     t = evolution%pause_at(sim%drive%time_of(sim%kicks + 1))
   end function next_kick
 
-  !> The reason why events of disk i with its partner no longer advance the time, and a remedy.
+  !> Text of a message: the reason why events of disk i with its partner no longer advance the time, and a remedy.
   pure function standstill(sim, i, code) result(text)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code            !! as in `partners`
@@ -176,7 +176,7 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code
     logical :: yes
-    real(real64), parameter :: grazing = 1.0e-6_real64     ! ratio of normal velocity to speed
+    real(real64), parameter :: grazing = 1.0e-6_real64     ! largest ratio of the normal velocity to the speed
     real(real64) :: x(2), v(2), normal(2)
 
     yes = .false.
@@ -188,7 +188,7 @@ contains
       .and. dot_product(sim%box%obstacle(obstacle_number(code))%shape%middle - x, normal) > 0
   end function slides
 
-  !> The report of the collapses in a run; empty if no collapse occurred.
+  !> Report of the inelastic collapses in a run; empty if no collapse occurred.
   pure function collapse_note(sim) result(text)
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text
@@ -205,7 +205,7 @@ contains
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text
     real(real64), parameter :: share = 0.01_real64, negligible_times = 1.0e5_real64
-    integer(int64) :: contacts                     ! number of contacts of all disks
+    integer(int64) :: contacts                     ! number of collisions, summed over all disks
     real(real64) :: proposal                       ! [time]
 
     contacts = sim%tally%events + sim%tally%collisions - 2*sim%tally%simultaneous

@@ -1,7 +1,7 @@
-!> Lists of the pairs whose members are close to each other in a time step. A pair consists of two disks, or of a disk and an
-!> obstacle. The members of other pairs cannot touch before a disk has moved by half the `skin`, so that a list is valid for many
-!> steps (Verlet, Phys. Rev. 159, 98 (1967)). Loops that run in every step have no branches and are vectorised, as requested by
-!> directives.
+!> Verlet lists: lists of the pairs whose members are close to each other. A pair consists of two disks, or of a disk and an
+!> obstacle. Disks that are not listed as a pair cannot touch before a disk has moved by half the `skin`. A list is therefore valid
+!> for many steps (Verlet, Physical Review 159, 98 (1967)). Loops that run in every step have no branches, so that the compiler can
+!> vectorise these loops.
 module verlet_list
   use kinds, only: int32, pi, real64
   use box_geometry, only: box_t, obstacle_gap
@@ -20,8 +20,8 @@ module verlet_list
   real(real64), parameter :: least_skin = 0.2_real64       !! smallest skin [mean diameter]
   real(real64), parameter :: cells_per_disk = 4.0_real64   !! largest number of bins per disk
 
-  !> Pairs that may touch. Pairs with obstacles come first, in the order of obstacles and then of disks. Pairs of disks follow, in
-  !> the order of i and then of the partner.
+  !> Pairs that may touch. Pairs of a disk and an obstacle come first, sorted by the obstacle and then by the disk. Pairs of two
+  !> disks follow, sorted by the first disk and then by the second disk.
   type :: verlet_list_t
     integer(int32) :: n = 0
     integer(int32), allocatable :: i(:)        !! (at least n) index of the first disk of the pair
@@ -48,8 +48,8 @@ contains
     if (self%known) self%from(i, :) = self%from(i, :) + dx
   end subroutine shift
 
-  !> Makes a new list, unless all disks have moved by less than half the skin since the last list was made. With `all_pairs` a list
-  !> is made in every step and without bins. A stop request ends this procedure early, and the list is then incomplete.
+  !> Makes a new list, unless all disks have moved by less than half the skin since the last list was made. With `all_pairs` a new
+  !> list is made in every step, by a test of all pairs. A stop request ends this procedure early, and the list is then incomplete.
   subroutine update(self, sim, x, step, all_pairs)
     class(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -90,8 +90,8 @@ contains
     call list_disks(self, sim, x, bins)
   contains
 
-    !> A skin that is wide enough for many steps but does not include too many distant pairs. The choice affects only the speed of
-    !> the program.
+    !> Width of a skin with which a list is valid for many steps but does not contain too many distant pairs. The choice of the
+    !> width affects only the speed of the program.
     pure function wanted_skin() result(skin)
       real(real64) :: skin, diameter, reach, fastest
       integer(int32) :: i
@@ -127,9 +127,10 @@ contains
     end associate
   end subroutine mark_overlaps
 
-  !> Adds pairs of disks. The search for each disk finds smaller disks, and disks of equal size with higher indices. The search for
-  !> a small disk therefore covers only few bins, however large the largest disk is. All axes of the grid of bins are treated as
-  !> periodic. At walls this has no effect, because disks near opposite walls are too far apart to form a pair.
+  !> Adds the pairs of disks that are close to each other. The search for each disk finds smaller disks, and disks of equal size
+  !> with higher indices. The search for a small disk therefore covers only few bins, however large the largest disk is. The grid of
+  !> bins is treated as periodic along both axes. Near walls this periodicity has no effect, because disks near opposite walls are
+  !> too far apart to form a pair.
   subroutine list_disks(self, sim, x, bins)
     type(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -157,15 +158,15 @@ contains
       do iy = low(2), high(2)
         row = bins(1)*modulo(iy, bins(2))
         call add_run(row + from, row + min(to, bins(1)))
-        call add_run(row + 1, row + to - bins(1))           ! the part of the range that continues beyond the last column
+        call add_run(row + 1, row + to - bins(1))           ! part of the range of bins beyond the last column
       end do
     end do
     call sort_pairs(self%i(first_pair:self%n), self%partner(first_pair:self%n), size(x, 1, kind=int32))
 
   contains
 
-    !> The periodic image of a point that lies inside the box. The image is computed with real numbers, because a disk may have
-    !> moved by more periods than an integer can represent.
+    !> The periodic image of a point inside the box. The position of the image is computed with real numbers, because a disk may
+    !> have moved by more periods than an integer can represent.
     pure function in_box(point) result(image)
       real(real64), intent(in) :: point(2)
       real(real64) :: image(2)
