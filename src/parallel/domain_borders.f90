@@ -1,7 +1,7 @@
-!> The exchange between domains. After each time window a domain compares its copies of disks with the original disks, which other
-!> domains own. If no disk of the domain can have touched a copy whose history (record of its motion in the window) was wrong, the
-!> copies are corrected. If a disk can have touched such a copy, the window is invalid. docs/theory.md states this criterion and
-!> proves that it is sufficient.
+!> Compares and corrects copies of disks after each time window. A domain compares its copies of disks with the original disks,
+!> which other domains own. A copy is wrong if the copy has not moved in the same way as the original disk. If a disk that the
+!> domain owns can have touched a wrong copy, the window is invalid. If not, the wrong copies are corrected. The page docs/theory.md
+!> proves that this criterion is sufficient.
 module domain_borders
   use kinds, only: int16, int32, int64
   use domains, only: correction_t, domain_t, forever, list_copies, slot_of_copy
@@ -13,8 +13,8 @@ module domain_borders
 
 contains
 
-  !> Determines whether a disk that the k-th domain owns can have touched a disk whose history in this domain is wrong or missing.
-  !> Also lists the corrections for the copies in this domain. The procedure reads the states of the neighbouring domains.
+  !> Determines whether a disk that the k-th domain owns can have touched a disk whose copy in this domain was wrong or missing. The
+  !> procedure also lists the corrections for the copies in this domain. The procedure reads the states of the neighbouring domains.
   subroutine compare_copies(domain, k)
     type(domain_t), intent(inout) :: domain(:)
     integer(int32), intent(in) :: k
@@ -31,7 +31,7 @@ contains
     end associate
   end subroutine compare_copies
 
-  !> Compares the copies with the disks that one neighbouring domain owns.
+  !> Compares the copies in a domain with the original disks that one neighbouring domain owns.
   subroutine compare(self, other, found)
     type(domain_t), intent(inout) :: self
     type(domain_t), intent(in) :: other
@@ -50,7 +50,7 @@ contains
           found = found + 1
           associate (history => mine%history(mine%history_of(s)))
             same = history%digest == theirs%history(r)%digest .and. same_state() &
-              .and. self%patch%holds(self%sim%tag(s)%cell)  ! a copy that has left the patch is not corrected
+              .and. self%patch%holds(self%sim%tag(s)%cell)  ! a copy outside of the patch needs a correction
             if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
             near = came_near(theirs%history(r), met)
             if (.not. met) met = mine%could_have_met(int(history%low, int32), int(history%high, int32))
@@ -67,8 +67,8 @@ contains
     end associate
   contains
 
-    !> Whether a disk of the neighbour was inside the patch during the window, in any periodic image. `met` becomes .true. if the
-    !> disk of the neighbour could have touched a disk that this domain owns.
+    !> Whether a disk of the neighbouring domain, in any periodic image, was inside the patch during the window. `met` becomes
+    !> .true. if the disk could have touched a disk that this domain owns.
     function came_near(history, met) result(near)
       type(history_t), intent(in) :: history
       logical, intent(out) :: met
@@ -101,11 +101,11 @@ contains
           .and. self%sim%tag(s)%last_partner == other%sim%tag(t)%last_partner
       end associate
       if (.not. yes .or. .not. allocated(self%sim%extra)) return
-      ! Compares all components bitwise.
+      ! All components of the optional data are compared bitwise.
       yes = all(transfer(self%sim%extra(s), [0_int64]) == transfer(other%sim%extra(t), [0_int64]))
     end function same_state
 
-    !> Adds the true state of a disk, which has the index t in the neighbouring domain, to the list of corrections.
+    !> Adds the true state of a disk to the list of corrections. The disk has the index t in the neighbouring domain.
     subroutine add_correction()
       if (.not. allocated(self%corrections)) allocate (self%corrections(256))
       if (self%n_corrections == size(self%corrections)) self%corrections = [self%corrections, self%corrections]
@@ -177,7 +177,7 @@ contains
       waiting(n_waiting) = s
     end subroutine apply_correction
 
-    !> Removes the copy with the index s, because its disk has left the patch.
+    !> Removes the copy with the index s, because the original disk has left the patch.
     subroutine leave(s)
       integer(int32), intent(in) :: s
 

@@ -23,14 +23,14 @@ module domain_cuts
 
 contains
 
-  !> Divides the box into at most `wanted` domains for some threads. No domain is narrower than two halos.
+  !> Divides the box into at most `wanted` domains for a given number of threads. Each domain is wider than two halos.
   subroutine cut(self, whole, periodic, cell, wanted, threads, halo)
     class(domain_cuts_t), intent(inout) :: self
     type(patch_t), intent(in) :: whole
     logical, intent(in) :: periodic(2)
     integer(int16), intent(in) :: cell(:, :)       !! (2,disks) cell of each disk
     integer(int32), intent(in) :: wanted, threads, halo
-    integer(int32), allocatable :: slab(:), piece(:)       ! first cell of each piece; the last element is one past the end
+    integer(int32), allocatable :: slab(:), piece(:)       ! first cell of each piece; last element: number of cells plus 1
     integer(int32), allocatable :: weight(:), weights(:, :)
     integer(int32) :: n(2), i, s, k, r
 
@@ -63,8 +63,8 @@ contains
     end do
   contains
 
-    !> Chooses the number of slabs and the number of domains in each slab. The choice minimises the estimated work, under the
-    !> conditions that the product of the numbers is not much smaller than `wanted` and that no domain is too narrow.
+    !> Chooses the number of slabs and the number of domains in each slab. The choice minimises the estimated work, under two
+    !> conditions: the total number of domains is not much smaller than `wanted`, and no domain is too narrow.
     pure function numbers() result(n)
       integer(int32) :: n(2), most(2), columns, rows
 
@@ -77,8 +77,8 @@ contains
       end do
     end function numbers
 
-    !> Estimated work of one thread: the number of domains per thread times the number of cells in the largest patch, if all domains
-    !> have equal sizes.
+    !> Estimated work of one thread: the number of domains per thread times the number of cells in the largest patch. The estimate
+    !> assumes that all domains have equal sizes.
     pure function work(n)
       integer(int32), intent(in) :: n(2)
       real(real64) :: work
@@ -88,8 +88,8 @@ contains
     end function work
   end subroutine cut
 
-  !> First cells of the n pieces into which a line of cells is divided; the last element is one past the end. The pieces have
-  !> about equal weight and are at least `least` cells long.
+  !> First cells of the n pieces into which a line of cells is divided; the last element is the number of cells plus 1. The pieces
+  !> have about equal weight and are at least `least` cells long.
   pure function pieces(weight, n, least) result(first)
     integer(int32), intent(in) :: weight(:), n, least
     integer(int32) :: first(n + 1), k, place
@@ -129,7 +129,7 @@ contains
     call patch%find_sides(periodic)
   end function patch_of
 
-  !> The domains that own disks in the patch of the k-th domain.
+  !> Indices of the domains that own disks in the patch of the k-th domain.
   pure function neighbours_of(self, k, patch) result(list)
     class(domain_cuts_t), intent(in) :: self
     integer(int32), intent(in) :: k

@@ -1,8 +1,8 @@
 !> One domain of a simulation that is divided among threads. A domain owns the disks in a rectangle of cells. The domain also
-!> contains copies of the disks in the halo, the cells around this rectangle. The rectangle and the halo form the patch of the
-!> domain. Each domain has its own event-driven engine. Disks that would enter the patch during a time window are missing in the
-!> domain. Errors in the motion of copies therefore spread inwards from the edge of the patch during the window, until
-!> `domain_borders` corrects the copies.
+!> contains copies of the disks in the halo, which consists of the cells around this rectangle. The rectangle and the halo form the
+!> patch of the domain. Each domain has its own event-driven engine. Disks that would enter the patch during a time window are
+!> missing in the domain. Errors in the motion of copies therefore spread inwards from the edge of the patch during the window,
+!> until `domain_borders` corrects the copies.
 module domains
   use kinds, only: int32, int64, real64
   use cell_faces, only: patch_t
@@ -20,43 +20,43 @@ module domains
   public :: advance_domain, correction_t, domain_t, forever, list_copies, load, merge_logs, next_time, slot_of_copy, write_back
 
   real(real64), parameter :: forever = 2.0e150_real64      !! a time later than the time of any event
-  !> Longest wall time for a window of one domain, after which the window is given up [s]
+  !> Largest wall-clock time in which a domain tries to complete a window [s]
   real(real64), parameter :: longest_window = 5.0_real64
   !> Number of iterations between two checks of signals and of the clock.
   integer(int64), parameter :: iterations_between_checks = 100000
-  !> Number of vacant slots (array elements without a disk) for disks that enter: a fraction 1/spare of the disks, plus
-  !> spare_at_least.
+  !> A domain with n disks has n/spare + spare_at_least vacant slots (array elements without a disk) for disks that enter the patch.
   integer(int32), parameter :: spare = 32, spare_at_least = 200
 
   !> The true state of a disk, with which a domain updates a wrong copy of the disk or adds a missing copy. If the disk has left the
   !> patch, the domain removes its copy.
   type, extends(whole_disk_t) :: correction_t
     integer(int32) :: global_index = 0             !! index of the disk in the whole simulation
-    !> Column and row relative to the patch of this domain; the cell may be outside the patch.
+    !> Column and row of the disk relative to the patch of this domain; the disk may be outside the patch.
     integer(int32) :: cell(2) = 0
     integer(int32) :: slot = 0                     !! index of the copy in this domain; 0 if there is no copy
   end type correction_t
 
   type :: domain_t
-    integer(int32) :: low(2) = 0, high(2) = 0      !! columns and rows of the whole grid that the domain owns
+    integer(int32) :: low(2) = 0, high(2) = 0      !! first and last column and row of the domain in the whole grid
     integer(int32) :: halo = 0                     !! width of the halo in cells
-    integer(int32), allocatable :: neighbour(:)    !! domains that own disks in this domain's patch
+    integer(int32), allocatable :: neighbour(:)    !! indices of the domains that own disks in the patch of this domain
     type(patch_t) :: patch
-    !> The disks that the domain owns, and copies; some array elements (slots) are vacant. The origin of time is that of the whole
-    !> simulation.
+    !> The disks that the domain owns, and copies of other disks. Some array elements (slots) are vacant. The time origin equals the
+    !> time origin of the whole simulation.
     type(simulation_t) :: sim
     type(event_driven_t) :: engine
-    !> (slots) Index of each disk in the whole simulation. The elements of vacant slots form a linked list of these slots.
+    !> (slots) Index of each disk in the whole simulation. The elements of `global_index` at vacant slots form a linked list of the
+    !> vacant slots.
     integer(int32), allocatable :: global_index(:)
     integer(int32) :: vacant = 0                   !! first vacant slot; 0: none
     type(event_log_t), allocatable :: log          !! log of the collisions that this domain counts
     integer(int64) :: iterations = 0               !! number of iterations of the engine in this window
-    logical :: done = .false.                      !! the engine has reached the end of the window
-    logical :: valid = .false.                     !! no disk that the domain owns can have touched a wrong copy
+    logical :: done = .false.                      !! whether the engine has reached the end of the window
+    logical :: valid = .false.                     !! whether no disk that the domain owns can have touched a wrong copy
     integer(int32) :: n_corrections = 0
     type(correction_t), allocatable :: corrections(:)  !! (at least n_corrections) corrections to be applied
-    integer(int32), allocatable, private :: key(:), slot(:)  !! (0:last_key) ids and slots of the copies: a hash table
-    integer(int32), private :: last_key = 0        !! a power of two minus 1
+    integer(int32), allocatable, private :: key(:), slot(:)  !! (0:last_key) hash table of the ids and slots of the copies
+    integer(int32), private :: last_key = 0        !! largest index of the hash table: a power of two minus 1
   end type domain_t
 
 contains
@@ -171,7 +171,7 @@ contains
     end do
   end subroutine list_copies
 
-  !> Position of an id in the hash table, or the free position where it would be stored.
+  !> Position of an id in the hash table, or the free position where the id would be stored.
   pure function place_of(self, id) result(place)
     type(domain_t), intent(in) :: self
     integer(int32), intent(in) :: id
@@ -183,7 +183,7 @@ contains
     end do
   end function place_of
 
-  !> The slot of the copy with the given id; 0 if there is none.
+  !> The slot of the copy with the given id; 0 if the domain has no such copy.
   pure function slot_of_copy(self, id) result(slot)
     type(domain_t), intent(in) :: self
     integer(int32), intent(in) :: id
@@ -194,11 +194,11 @@ contains
     if (self%key(place) == id) slot = self%slot(place)
   end function slot_of_copy
 
-  !> Advances the domain with its copies to the end of a window. Gives up after the given number of iterations of the engine, or
-  !> after `longest_window`.
+  !> Advances the domain with its copies to the end of a window. The domain gives up the window after the given number of iterations
+  !> of the engine, or after `longest_window`.
   subroutine advance_domain(self, t_end, iterations)
     type(domain_t), intent(inout) :: self
-    real(real64), intent(in) :: t_end              !! end of the window, since the epoch [time]
+    real(real64), intent(in) :: t_end              !! end of the window, relative to the time origin `box%epoch` [time]
     integer(int64), intent(in) :: iterations
     type(limits_t) :: limits
     type(error_t), allocatable :: error
@@ -226,7 +226,7 @@ contains
   !> Time of the next event in the domain.
   function next_time(self) result(t)
     type(domain_t), intent(inout) :: self
-    real(real64) :: t                              !! time since the epoch [time]
+    real(real64) :: t                              !! time relative to the time origin `box%epoch` [time]
     integer(int32) :: i
 
     call self%engine%queue%first(self%sim%disk, self%sim%tag, i)
@@ -246,7 +246,7 @@ contains
   end subroutine write_back
 
   !> Moves the log entries of all domains to the log of the whole simulation, sorted by time. The order of simultaneous collisions
-  !> in different domains is unknown; `good` is .false. if such collisions exist.
+  !> in different domains is unknown. If such collisions exist, `good` is .false.
   subroutine merge_logs(domain, log, good)
     type(domain_t), intent(inout) :: domain(:)
     type(event_log_t), intent(inout) :: log

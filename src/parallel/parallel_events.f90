@@ -1,8 +1,8 @@
-!> Parallel event-driven dynamics, which uses several cores, or one core with domains that fit into its cache. The results are
-!> bit-identical to those of the serial engine. The box is divided into domains, each of which has its own engine. The domains
-!> advance by time windows, and after each window they are compared (see `partition` and `domains`). If a window is invalid, the
-!> simulation returns to its state before the present series of windows. The serial engine is used in rare and difficult situations:
-!> small or inactive systems, a stop within simultaneous collisions, and inelastic collapse.
+!> Parallel event-driven dynamics, which uses several cores, or one core with domains that fit into the cache. The results are
+!> bit-identical to the results of the serial engine. The box is divided into domains, each of which has its own engine. The domains
+!> advance by time windows, and the domains are compared after each window (see `partition` and `domains`). If a window is invalid,
+!> the simulation returns to its state before the present series of windows. The serial engine is used for small or inactive
+!> systems, for a stop within simultaneous collisions, and in an inelastic collapse.
 module parallel_events
   use kinds, only: int32, int64, real64
   use domains, only: merge_logs
@@ -19,22 +19,23 @@ module parallel_events
 
   integer, parameter :: most_windows = 24                      !! largest number of windows in one call of `run_domains`
   real(real64), parameter :: shortest = 0.1_real64             !! shortest window that is tried, relative to the usual length
-  !> If a count will reach its limit after fewer events per disk than these numbers, the serial engine is used. The first number
-  !> applies while domains are in use, and the second number applies before domains are started.
+  !> Numbers of events per disk that must remain before a limit is reached; with fewer remaining events the serial engine is used.
+  !> `least_left` applies while domains are in use, and `least_left_to_begin` applies before domains are started.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
-  ! Shortest and longest periods of the serial engine [events per disk]:
+  ! Shortest and longest periods for which the serial engine is used [events per disk]
   integer(int64), parameter :: brief(2) = 5                         !! after a situation in which domains cannot be used
   integer(int64), parameter :: after_failures(2) = [5, 5*2**20]     !! after invalid windows
-  integer(int64), parameter :: while_busy(2) = [50, 1600]           !! while the cores are busy with other programs
+  integer(int64), parameter :: while_busy(2) = [50, 1600]           !! while other programs use the cores
 
-  !> The engine that has predicted the events.
+  !> Values of `predicted_by`: the engine that has predicted the events.
   integer, parameter :: no_engine = 0, serial_engine = 1, all_domains = 2
 
   type, extends(evolution_t) :: parallel_events_t
-    !> Initial state of the serial engine. A copy of this state is used when the serial engine is needed.
+    !> Template of the serial engine, which is copied when the serial engine is needed.
     type(event_driven_t) :: serial
     type(partition_t) :: parts
-    !> Smallest number of disks in a domain; it is doubled in a periodic box, in which each slab is bounded by twice as many cuts.
+    !> Smallest number of disks in a domain. The number is doubled in a periodic box, because domains in a periodic box have
+    !> neighbouring domains on all sides.
     integer(int32) :: least_disks = 1250
     integer(int32) :: most_disks = 62000           !! largest number of disks in a domain that fits into the cache
     !> Average number of active cores below which the serial engine is faster than several threads.
@@ -43,7 +44,7 @@ module parallel_events
     ! The serial engine exists only while there are no domains, to save memory.
     type(event_driven_t), allocatable, private :: engine   !! the serial engine in use
     integer, private :: predicted_by = no_engine   !! engine that holds the predicted events
-    integer(int64), private :: serial_period = 0   !! last period of the serial engine [events per disk]
+    integer(int64), private :: serial_period = 0   !! length of the last period of the serial engine [events per disk]
     integer(int64), private :: serial_until = -1   !! number of events up to which the serial engine is used
   contains
     procedure :: start
@@ -54,7 +55,7 @@ module parallel_events
 
 contains
 
-  !> Prepares a run. Events are not predicted here, because it is not known yet which engine will execute them.
+  !> Prepares a run. Events are not predicted here, because the engine that will execute the events is not known yet.
   subroutine start(self, sim)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -71,8 +72,8 @@ contains
     if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
   end subroutine start
 
-  !> Updates the predicted events after disks have been changed. The serial engine predicts them again. Domains cannot be updated
-  !> and are loaded again.
+  !> Updates the predicted events after disks have been changed. The serial engine predicts the events of the changed disks again.
+  !> Domains cannot be updated and are loaded again.
   subroutine renew(self, sim, changed)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -97,14 +98,14 @@ contains
     n = n_disks/(self%least_disks*merge(2, 1, all(periodic)))
   end function most_domains
 
-  !> Advances the simulation up to a limit, or for about the time that a caller can wait.
+  !> Advances the simulation until a limit is reached, or until the caller has to check signals again.
   subroutine advance(self, sim, limits, error, log)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
     type(event_log_t), intent(inout), optional :: log
-    logical :: serially                            ! the serial engine is used
+    logical :: serially                            ! whether the serial engine is used
 
     self%arrived = .false.
     if (limits%reached(sim%tally) .or. is_full(log)) return
@@ -150,7 +151,7 @@ contains
         listed = log%n
         if (good) call merge_logs(self%parts%domain, log, good)
       end if
-      ! The serial engine finds the exact event at which a count reaches its limit or a collapse occurs.
+      ! The serial engine, unlike the domains, finds the exact event at which a limit is reached or a collapse occurs.
       too_far = good
       if (good) too_far = limits%outgrown(self%parts%total_tally(sim)) .or. t - sim%last_advance < sim%negligible_time
       if (good .and. .not. too_far) then
@@ -168,23 +169,23 @@ contains
         call use_serial_engine(while_busy)
         self%parts%cores = self%parts%threads
       end if
-      ! The serial engine determines whether no event will occur any more.
+      ! The serial engine determines whether any further event will occur.
       if (all(self%parts%domain%engine%idle)) call use_serial_engine(brief)
     end subroutine run_domains
 
-    !> Number of windows in a call. The number decreases with the number of recent failures, because an invalid window invalidates
-    !> all windows of the call.
+    !> Largest number of windows in a call of `run_domains`. This number is smaller after recent failures, because an invalid window
+    !> invalidates all windows of the call.
     pure function most_windows_now() result(n)
       integer :: n
 
       n = max(1, int(most_windows*self%parts%shortening**4))
     end function most_windows_now
 
-    !> Makes windows longer after a call in which all windows were valid. Within a call their length is constant. If the length
-    !> increased after each window, it could grow within a call as much as it was reduced after the last failure, although the
-    !> windows of the call may be discarded later; the run would then make no progress.
+    !> Makes windows longer after a call in which all windows were valid. The length of windows is constant within a call. If the
+    !> length increased after each window, a single call could undo the reduction after the last failure. An invalid window would
+    !> then discard the whole call again, and the run would make no progress.
     subroutine lengthen_windows(windows)
-      integer, intent(in) :: windows               !! number of windows in the call
+      integer, intent(in) :: windows               !! number of windows in the last call
 
       associate (shortening => self%parts%shortening)
         shortening = min(1.0_real64, 1.1_real64**windows*shortening)
@@ -203,9 +204,9 @@ contains
       call use_serial_engine(after_failures)
     end subroutine shorten_windows
 
-    !> Selects the serial engine for a period. The period is twice as long as the last one, unless domains have worked for longer
-    !> than the last period in the meantime. A run for which domains are unsuitable therefore costs hardly more than with the serial
-    !> engine alone.
+    !> Selects the serial engine for a period. The period is twice as long as the last period, unless the domains have worked for
+    !> longer than the last period in the meantime. A run that is unsuitable for domains therefore takes hardly longer than with the
+    !> serial engine alone.
     subroutine use_serial_engine(periods)
       integer(int64), intent(in) :: periods(2)      !! shortest and longest period [events per disk]
 

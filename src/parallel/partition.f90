@@ -1,5 +1,5 @@
 !> A simulation that is divided into domains, which advance together by time windows. The domains contain the predicted events. The
-!> simulation itself keeps its old state until the states of the domains are copied back. After an invalid window the states in the
+!> whole simulation keeps its old state until the states of the domains are copied back. After an invalid window the states in the
 !> domains are wrong, and the domains have to be loaded again.
 module partition
   use kinds, only: int16, int32, int64, real64
@@ -18,24 +18,24 @@ module partition
   private
   public :: partition_t
 
-  !> Wall-clock time after which the caller can check signals and clocks [s]
+  !> Wall-clock time after which `run_windows` returns, so that the caller can check signals [s]
   real(real64), parameter :: longest_call = 1.0_real64
   real(real64), parameter :: averaging_time = 0.1_real64       !! averaging time for the number of active cores [s]
   !> If fewer events than this number remain before a limit is reached, the domains advance one event at a time.
   real(real64), parameter :: few_events = 20.0_real64
 
-  !> The next step of all threads. One thread determines this step while the other threads wait.
+  !> The next step of all threads, which one thread determines while the other threads wait.
   type :: plan_t
     logical :: continues = .true.
     integer :: windows = 0                         !! number of windows started
     real(real64) :: until = 0.0_real64             !! wall-clock time after which no further window is started [s]
-    real(real64) :: t_begin = 0.0_real64, t_end = 0.0_real64   !! beginning and end of the window, since the epoch [time]
+    real(real64) :: t_begin = 0.0_real64, t_end = 0.0_real64   !! beginning and end of the window, relative to `box%epoch` [time]
     integer(int64) :: events = 0                   !! number of events in the domains at the start of the window
-    logical :: corrects = .false.                  !! domains apply the corrections of the previous window first
-    real(real64) :: t = 0.0_real64                 !! time up to which domains advance, since the epoch [time]
+    logical :: corrects = .false.                  !! whether domains first apply the corrections of the previous window
+    real(real64) :: t = 0.0_real64                 !! time up to which domains advance, relative to `box%epoch` [time]
     integer(int64) :: iterations = 0               !! largest number of iterations of an engine in this step
-    logical :: compares = .false.                  !! domains are compared, because the window has ended
-    logical :: valid = .true.                      !! the window is valid
+    logical :: compares = .false.                  !! whether domains are compared, because the window has ended
+    logical :: valid = .true.                      !! whether the window is valid
   end type plan_t
 
   type :: partition_t
@@ -48,11 +48,11 @@ module partition
     type(patch_t) :: whole                         !! all cells of the box, which are constant during a run
     type(domain_cuts_t) :: cuts
     type(domain_t), allocatable :: domain(:)
-    real(real64) :: event_rate = 0.0_real64        !! event rate; 0 if it is not known yet [1/time]
+    real(real64) :: event_rate = 0.0_real64        !! number of events per unit of time; 0 if not known yet [1/time]
     real(real64) :: iterations_per_event = 10.0_real64  !! number of iterations of an engine per event
     real(real64) :: shortening = 1.0_real64        !! factor by which windows are shortened after failures
     integer(int32) :: widening = 0                 !! increase of the width of the halo after failures [cells]
-    real(real64) :: cores = 0.0_real64             !! recent average of the number of active cores; 0 if it is not known yet
+    real(real64) :: cores = 0.0_real64             !! recent average of the number of active cores; 0 if not known yet
   contains
     procedure :: fill
     procedure :: run_windows
@@ -67,7 +67,7 @@ contains
   subroutine fill(self, sim, listing, cut)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    logical, intent(in) :: listing                 !! collisions are logged
+    logical, intent(in) :: listing                 !! whether collisions are logged
     logical, intent(out) :: cut
     integer(int16), allocatable :: cell(:, :)
     integer(int32) :: i, k
@@ -103,7 +103,8 @@ contains
     !$omp end parallel do
   end subroutine fill
 
-  !> Updates, from a measurement, the event rate and the number of iterations per event. Both determine the length of windows.
+  !> Updates the event rate and the number of iterations per event from a measurement. The event rate determines the length of
+  !> windows, and both values determine the limit of iterations.
   pure subroutine update_rates(self, events, iterations, time)
     class(partition_t), intent(inout) :: self
     integer(int64), intent(in) :: events, iterations
@@ -114,7 +115,7 @@ contains
     self%iterations_per_event = max(iterations/real(events, real64), 1.0_real64)
   end subroutine update_rates
 
-  !> The sums and counters of all collisions, including those in the domains since they were loaded.
+  !> Counters and sums of the whole simulation, including the collisions in the domains since the domains were loaded.
   pure function total_tally(self, sim) result(so_far)
     class(partition_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -127,8 +128,8 @@ contains
     end do
   end function total_tally
 
-  !> Executes successive windows in all domains, until a window is invalid, a limit is reached, or the caller has waited long
-  !> enough. A window ends early when a count reaches its limit. `good` is .true. if all windows are valid.
+  !> Executes successive windows in all domains, until a window is invalid, a limit is reached, or `longest_call` has passed. A
+  !> window ends early when a count reaches its limit. `good` is .true. if all windows are valid.
   !>
   !> The threads synchronise twice in each window: before the domains are compared, and before the states that the comparison uses
   !> are changed.
@@ -137,7 +138,7 @@ contains
     type(simulation_t), intent(in) :: sim
     type(limits_t), intent(in) :: limits
     integer, intent(in) :: most                    !! largest number of windows
-    real(real64), intent(out) :: t                 !! end of the last window, since the epoch [time]
+    real(real64), intent(out) :: t                 !! end of the last window, relative to the time origin `box%epoch` [time]
     integer, intent(out) :: windows                !! number of windows started
     logical, intent(out) :: good
     type(plan_t) :: plan
@@ -196,7 +197,7 @@ contains
       real(real64) :: length
 
       length = self%window*self%shortening*sim%n_disks()/(2*self%event_rate)
-      ! Longer windows, because each window loads each domain into the cache once.
+      ! With more domains than threads, windows are longer, because each window loads each domain into the cache once.
       if (self%wanted > self%threads) length = 2*length
       plan%windows = plan%windows + 1
       plan%t_begin = plan%t
@@ -209,8 +210,8 @@ contains
     end subroutine begin_window
 
     !> Chooses the time up to which all domains advance next. This time is the end of the window, unless a count would exceed its
-    !> limit in the window. In that case the domains first advance through most of the remaining events, and finally one event at a
-    !> time. The number of iterations of each engine is bounded, even if the estimated event rate is wrong.
+    !> limit in the window. If a limit is near, the domains first advance through most of the remaining events, and finally one
+    !> event at a time. The limit of iterations bounds the work of each engine if the estimated event rate is wrong.
     subroutine choose_target()
       real(real64) :: expected, sure, next
       integer(int32) :: k
@@ -246,7 +247,7 @@ contains
       if (plan%continues) call begin_window()
     end subroutine end_window
 
-    !> Number of remaining events before a count reaches its limit.
+    !> Number of events that remain before a count reaches its limit.
     pure function events_left() result(events)
       real(real64) :: events
 
@@ -255,11 +256,11 @@ contains
     end function events_left
   end subroutine run_windows
 
-  !> Copies the present states of the domains to the whole simulation. The domains can be continued afterwards.
+  !> Copies the present states of the domains to the whole simulation. The domains can advance further afterwards.
   subroutine write_back_all(self, sim, now)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: now                !! time since the epoch [time]
+    real(real64), intent(in) :: now                !! time relative to the time origin `box%epoch` [time]
     integer(int32) :: k
     logical :: shared
 
