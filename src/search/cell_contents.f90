@@ -1,6 +1,6 @@
-!> Stores which disks are in each cell. A cell has three slots (elements of a small array, each for the index of one disk) and a
-!> count, together 16 bytes that are copied as a unit. A cell with more than three disks is called crowded: its further disks form a
-!> linked list that starts in the last slot.
+!> Stores the disks in each cell. A cell has three slots (array elements, each for the index of one disk) and a count. The slots and
+!> the count occupy 16 bytes, which are copied as a unit. A cell with more than three disks is called crowded: its additional disks
+!> form a linked list that starts in the last slot.
 module cell_contents
   use kinds, only: int16, int32, int64
   use disks, only: disk_t, tag_t
@@ -12,13 +12,13 @@ module cell_contents
 
   integer(int32), parameter :: cell_capacity = 3
   integer(int32), parameter :: count_slot = cell_capacity + 1
-  integer(int32), parameter :: counted = 65535               !! bit mask of the number of disks
-  integer(int32), parameter :: crowd = counted + 1           !! increment of the number of crowded cells
-  integer(int32), parameter :: marked = shiftl(crowd, 8)     !! bit of the mark; the lower bits suffice to count nine crowded cells
+  integer(int32), parameter :: counted = 65535               !! bit mask of the number of disks in the slots
+  integer(int32), parameter :: crowd = counted + 1           !! increment that counts one crowded cell
+  integer(int32), parameter :: marked = shiftl(crowd, 8)     !! bit of the mark, above the bits that count crowded cells
 
-  !> The slots of a cell. Indices of disks start at 0 here, as in the kernel. The last element of the array consists of bit fields.
-  !> The lower 16 bits contain the number of disks in the slots. The next 8 bits contain the number of crowded cells among the cell
-  !> and its eight neighbours. The bit above these is the mark of the cell.
+  !> The slots of a cell, and a last element that consists of bit fields. A slot contains the index of a disk, counted from 0. In
+  !> the last element, bits 0 to 15 contain the number of disks in the slots. Bits 16 to 23 contain the number of crowded cells
+  !> among the cell and its eight neighbours. Bit 24 is the mark of the cell: see `cell_grid: mark`.
   type :: cell_t
     integer(int32) :: slot(count_slot)
   contains
@@ -27,7 +27,7 @@ module cell_contents
   end type cell_t
 
   type :: cell_contents_t
-    integer(int32) :: stride = 0                 !! difference between the numbers of cells in adjacent rows
+    integer(int32) :: stride = 0                 !! difference between the numbers of two cells in adjacent rows
     type(cell_t), allocatable :: cell(:)         !! (0:) cells, row by row
     integer(int32), allocatable :: next(:)       !! (disks) next disk in the linked list of a crowded cell; 0 at the end of the list
   contains
@@ -45,7 +45,7 @@ module cell_contents
 
 contains
 
-  !> Number of the cell in column cell(1) and row cell(2). The first column and the first row have the number 1.
+  !> Number of the cell in column cell(1) and row cell(2). Columns and rows are counted from 1.
   pure function number(self, cell) result(c)
     class(cell_contents_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -151,7 +151,8 @@ contains
     if (self%chain(c) == 0) call self%count_crowd(c, -1)
   end subroutine remove
 
-  !> Updates the counts of the nine cells around c when c becomes crowded (1) or is no longer crowded (-1).
+  !> Updates the counts of crowded cells in cell c and its eight neighbours. `change` is 1 if cell c becomes crowded, and -1 if cell
+  !> c is no longer crowded.
   pure subroutine count_crowd(self, c, change)
     class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c, change
@@ -164,7 +165,7 @@ contains
     end do
   end subroutine count_crowd
 
-  !> Number of disks in the slots.
+  !> Number of disks in the slots of a cell.
   elemental function in_slots(self) result(n)
     class(cell_t), intent(in) :: self
     integer(int32) :: n
@@ -180,7 +181,7 @@ contains
     yes = self%slot(count_slot) >= crowd
   end function needs_care
 
-  !> Whether any of the nine cells around c is crowded.
+  !> Whether cell c or any of its eight neighbours is crowded.
   pure function is_crowded_around(self, c) result(yes)
     class(cell_contents_t), intent(in) :: self
     integer(int32), intent(in) :: c
@@ -189,7 +190,8 @@ contains
     yes = iand(self%cell(c)%slot(count_slot), marked - crowd) > 0
   end function is_crowded_around
 
-  !> First disk in the list of cell c, which also occupies the last slot; 0 if the cell is not crowded.
+  !> First disk in the linked list of cell c; 0 if the cell is not crowded. The first disk of the linked list also occupies the last
+  !> slot of the cell.
   pure function chain(self, c) result(i)
     class(cell_contents_t), intent(in) :: self
     integer(int32), intent(in) :: c
@@ -201,7 +203,7 @@ contains
     if (self%next(i) == 0) i = 0
   end function chain
 
-  !> Number of slots that precede the slot of disk i, which is in this cell; 2 if the disk is in the linked list.
+  !> Number of slots before the slot of disk i in its cell; 2 if disk i is in the linked list of the cell.
   elemental function slots_before(self, i) result(n)
     type(cell_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -211,15 +213,15 @@ contains
     n = first + iand(first, merge(0, 1, self%slot(2) == i - 1))
   end function slots_before
 
-  !> Lists the disks in the slots of cell c and its eight neighbours, except disk i, which is in cell c. All slots of a cell are
-  !> copied, whether they are occupied or not, so that no branch depends on the numbers of disks. If disk i is in the linked list of
-  !> a crowded cell and not in a slot, the head of that list is omitted instead.
+  !> Lists the disks in the slots of cell c and its eight neighbours, except disk i, which is in cell c. Occupied and vacant slots
+  !> of a cell are copied, so that no branch depends on the numbers of disks. If disk i is in the linked list of a crowded cell and
+  !> not in a slot, the procedure omits the head of the linked list instead of disk i.
   subroutine gather(cell, c, stride, i, list, n)
     type(cell_t), intent(in) :: cell(0:*)
     integer(int32), intent(in) :: c, stride, i
     integer(int32), intent(out) :: list(list_capacity)
     integer(int32), intent(out) :: n               !! number of disks in `list`
-    integer(int64) :: below, here, above, m, own   ! 64 bits, like addresses, so that no conversion is needed
+    integer(int64) :: below, here, above, m, own   ! 64-bit indices need no conversion to addresses
 
     here = c
     below = here - stride
@@ -250,9 +252,9 @@ contains
     n = n + cell%in_slots()
   end subroutine append
 
-  !> Prefetches the data that are needed to predict the events of some disks. The first stage prefetches the records of the disks,
-  !> the second stage their cells, and the third stage the disks in these cells. For the collision partner of each disk the same
-  !> data are prefetched one stage later.
+  !> Prefetches the data that are needed to predict the events of some disks. The first stage prefetches the records of these disks,
+  !> the second stage prefetches their cells, and the third stage prefetches the disks in the cells. The data for the collision
+  !> partner of a disk are prefetched one stage later than the data for the disk.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(cell_contents_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)

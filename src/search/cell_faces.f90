@@ -1,8 +1,8 @@
-!> The faces of the cells of a grid, and the times when disks leave their cells. The sides of the box are faces as well.
+!> The faces of the cells, and the times when disks leave their cells. The sides of the box are also faces of cells.
 !>
-!> Neighbouring cells overlap as far as possible. The overlap is limited by the condition that disks two cells apart cannot touch.
-!> A disk in the overlap may be assigned to either cell, and it is assigned to the cell that it leaves last. With wide cells this
-!> halves the number of crossings of faces.
+!> Neighbouring cells overlap. The overlap is as wide as possible under the condition that disks in cells that are not adjacent
+!> cannot touch. A disk in the overlap of two cells is assigned to the cell that the disk leaves last. If the cells are wide, the
+!> overlap halves the number of crossings of faces.
 module cell_faces
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t
@@ -17,19 +17,19 @@ module cell_faces
   private
   public :: all_cells, cell_faces_t, line_t, patch_t
 
-  !> A patch: the rectangular block of cells that a grid contains. A patch usually consists of all cells into which the box is
-  !> divided. In a parallel run the patch of a domain is a part of these cells, which may extend across a periodic side. Outer faces
-  !> of a patch that are not sides of the box are open: a disk that crosses an open face leaves the grid.
+  !> A patch: a rectangular block of cells. A patch usually consists of all cells into which the box is divided. In a parallel run
+  !> the patch of a domain consists of a part of these cells, and may extend across a periodic side. An outer face of a patch that
+  !> is not a side of the box is open: a disk that crosses an open face leaves the patch.
   type :: patch_t
     integer(int32) :: whole(2) = 0                 !! numbers of columns and rows in the box
     integer(int32) :: first(2) = 1                 !! first column and row of the patch; less than 1 beyond a periodic side
     integer(int32) :: n(2) = 0                     !! numbers of columns and rows in the patch
     real(real64) :: small = 0.0_real64             !! radius of the largest disks for which the cells are wide enough [length]
-    real(real64) :: reach = 0.0_real64             !! largest distance between the centres of two such disks in contact [length]
+    real(real64) :: reach = 0.0_real64             !! largest distance between the centres of two disks in contact [length]
     real(real64) :: lower(2) = 0.0_real64          !! lower left corner of the box [length]
     real(real64) :: width(2) = 0.0_real64          !! distance between the centres of adjacent cells [length]
-    ! Along each axis, if the patch extends across a periodic side: the last cell before that side and the first cell behind it;
-    ! otherwise 0.
+    ! Columns and rows at a periodic side inside the patch: `last` is before the side, and `next` is behind the side. Both
+    ! components are 0 along an axis without a periodic side inside the patch.
     integer(int32) :: last(2) = 0
     integer(int32) :: next(2) = 0
   contains
@@ -43,25 +43,26 @@ module cell_faces
     procedure :: equals
   end type patch_t
 
-  !> A line that limits a cell and is parallel to an axis: a face of a column or row of cells, or a side of the box.
+  !> A line that limits a cell, parallel to an axis: a face of a column or row of cells, or a side of the box.
   type :: line_t
     real(real64) :: place = 0.0_real64             !! position of the face or side [length]
-    !> Distance from the line at which the event of a disk occurs, in radii: 0 for a face, 1 for a side.
+    !> Distance between the line and the centre of a disk at the event, in radii of the disk. The distance is 0 for a face or a
+    !> periodic side, 1 for a lower wall, and -1 for an upper wall.
     real(real64) :: inset = 0.0_real64
-    integer(int32) :: code = 0                     !! code of the event: a side, or a crossing
-    logical :: struck = .false.                    !! a moving side may touch disks of this cell
+    integer(int32) :: code = 0                     !! code of the event: contact with a side, or crossing of a face
+    logical :: struck = .false.                    !! whether a moving side may touch disks in this cell
   end type line_t
 
   type :: cell_faces_t
     real(real64) :: width(2) = 0.0_real64          !! distance between the centres of adjacent cells [length]
     real(real64) :: overlap(2) = 0.0_real64        !! width of the overlap of neighbouring cells [length]
-    logical :: moving = .false.                    !! there are moving sides
-    logical :: falling = .false.                   !! gravity or moving sides: more than one face has to be considered along an axis
+    logical :: moving = .false.                    !! whether the box has moving sides
+    logical :: falling = .false.                   !! whether gravity acts or sides move, so that two faces are tested along an axis
     logical :: periodic(2) = .false.               !! periodic boundary along each axis
-    ! A piston can reach any part of the box. Until it has moved by the width of a cell, however, it can touch only the disks in a
-    ! strip, which consists of adjacent columns or rows of cells.
-    real(real64) :: due = never                    !! time when the first piston leaves its strip, since the epoch [time]
-    !> Centre of the strip of each piston, as displacement inwards from the side [length]
+    ! A piston can reach any part of the box in the course of time. Before the piston has moved by the width of a cell, the piston
+    ! can touch only disks in a strip of adjacent columns or rows of cells.
+    real(real64) :: due = never                    !! time when the first piston leaves its strip, relative to `box%epoch` [time]
+    !> Centre of the strip of each piston, as an inward displacement from the mean position of the side [length]
     real(real64) :: centre(n_sides) = 0.0_real64
     real(real64) :: beyond(2, 2) = 0.0_real64      !! (axis, lower or upper) largest distance of disks beyond the sides [length]
     type(line_t), allocatable :: column(:, :)      !! (0:1,columns) left and right faces
@@ -83,7 +84,7 @@ contains
   pure function all_cells(box, n, reach) result(patch)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: n(2)
-    real(real64), intent(in) :: reach              !! largest distance at which disks touch [length]
+    real(real64), intent(in) :: reach              !! largest distance between the centres of disks in contact [length]
     type(patch_t) :: patch
 
     patch%whole = n
@@ -95,7 +96,7 @@ contains
     call patch%find_sides(box%periodic)
   end function all_cells
 
-  !> Finds the periodic sides in the patch.
+  !> Finds the cells at periodic sides inside the patch.
   pure subroutine find_sides(self, periodic)
     class(patch_t), intent(inout) :: self
     logical, intent(in) :: periodic(2)
@@ -108,7 +109,8 @@ contains
     end where
   end subroutine find_sides
 
-  !> The cell of the patch that contains a point of the box. If the point is outside the patch, the result exceeds `n`.
+  !> The column and row of the cell in the patch that contains a point of the box. If the point is outside the patch, the result
+  !> exceeds `n`.
   pure function cell_at(self, x) result(cell)
     class(patch_t), intent(in) :: self
     real(real64), intent(in) :: x(2)               !! [length]
@@ -118,7 +120,7 @@ contains
     if (self%first(1) /= 1 .or. self%first(2) /= 1) cell = modulo(cell - self%first, self%whole) + 1
   end function cell_at
 
-  !> Column or row in the whole grid of a column or row of the patch.
+  !> Converts a column or row of the patch to a column or row of the whole grid.
   elemental function place_of(self, cell, axis) result(place)
     class(patch_t), intent(in) :: self
     integer(int32), intent(in) :: cell
@@ -137,7 +139,7 @@ contains
     yes = all(cell >= 1 .and. cell <= self%n)
   end function holds
 
-  !> Selects the cells that are in the patch from a list of cells of the whole grid.
+  !> Whether each cell in a list of cells of the whole grid is inside the patch.
   pure function covers(self, cell) result(yes)
     class(patch_t), intent(in) :: self
     integer(int16), intent(in) :: cell(:, :)       !! (2,n)
@@ -147,7 +149,7 @@ contains
       .and. modulo(cell(2, :) - self%first(2), self%whole(2)) < self%n(2)
   end function covers
 
-  !> Whether some of the eight neighbours of a cell are images beyond a periodic side.
+  !> Whether any of the eight neighbours of a cell is beyond a periodic side.
   pure function at_seam(self, cell) result(yes)
     class(patch_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -156,7 +158,8 @@ contains
     yes = any(cell == self%last .or. cell == self%next)
   end function at_seam
 
-  !> The column or row that is `ahead` steps from a given column or row, and the number of periods between the two.
+  !> Finds the column or row that is `ahead` steps away from a given column or row, and the number of periodic sides that these
+  !> steps cross.
   pure subroutine step(self, axis, cell, ahead, there, periods)
     class(patch_t), intent(in) :: self
     integer, intent(in) :: axis
@@ -180,7 +183,7 @@ contains
     end associate
   end subroutine step
 
-  !> Whether two patches consist of the same cells for the same disks.
+  !> Whether two patches consist of equal cells for disks of equal size.
   pure function equals(self, other) result(yes)
     class(patch_t), intent(in) :: self
     type(patch_t), intent(in) :: other
@@ -248,7 +251,7 @@ contains
   end subroutine set
 
   !> Finds the columns and rows in which a piston may touch disks before it has moved by the width of a cell. The outermost cells
-  !> also contain the disks that are beyond all cells. A piston beyond all cells can therefore touch the disks in the outermost
+  !> also contain the disks outside of all cells. A piston outside of all cells can therefore touch the disks in the outermost
   !> cells.
   pure subroutine find_strips(self, box, small, now)
     class(cell_faces_t), intent(inout) :: self
@@ -280,7 +283,7 @@ contains
     end subroutine mark
   end subroutine find_strips
 
-  !> Finds the earliest time at which a piston leaves its strip. The time holds as long as no disk collides with a piston.
+  !> Finds the earliest time at which a piston leaves its strip. The result is valid until a disk collides with a piston.
   pure subroutine watch_pistons(self, box, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -301,8 +304,8 @@ contains
     end do
   end subroutine watch_pistons
 
-  !> The rectangle that contains the centres of the disks in a cell. An outermost cell extends as far as its side moves, and without
-  !> limit if the side is a piston.
+  !> The rectangle that contains the centres of the disks in a cell. An outermost cell extends as far as its side can move. If this
+  !> side is a piston, the cell is unbounded.
   pure subroutine rectangle(self, cell, n, low, high)
     class(cell_faces_t), intent(in) :: self
     integer(int32), intent(in) :: cell(2)          !! column and row in the box
@@ -313,7 +316,7 @@ contains
     high = self%width*cell + 0.5_real64*self%overlap + merge(self%beyond(:, 2), 0.0_real64, cell == n)
   end subroutine rectangle
 
-  !> Chooses the cell that the disk leaves last, among the overlapping cells that contain the disk.
+  !> Among the overlapping cells that contain the disk, chooses the cell that the disk leaves last.
   pure subroutine choose_cell(self, gravity, disk, now, cell)
     class(cell_faces_t), intent(in) :: self
     real(real64), intent(in) :: gravity(2)         !! [length/time**2]
@@ -327,7 +330,8 @@ contains
     cell(2) = cell(2) + ahead(self%row, self%overlap(2), disk%x(2), disk%v(2), gravity(2), s, cell(2))
   end subroutine choose_cell
 
-  !> Along one axis: 1 or -1 if the disk is also in the next cell in its direction of motion, otherwise 0.
+  !> Step to the next cell along one axis, in the direction of motion of a disk: 1 or -1 if the disk is also in the next cell,
+  !> otherwise 0.
   pure function ahead(line, overlap, x, v, g, s, cell) result(step)
     type(line_t), intent(in) :: line(0:1, *)
     real(real64), intent(in) :: overlap, x, v, g, s
@@ -341,7 +345,8 @@ contains
     step = int(chosen(0_int32, 2*up - 1, left < overlap .and. .not. is_wall(line(up, cell)%code)), int16)
   end function ahead
 
-  !> `second` if the condition holds, otherwise `first`. Written without a branch, because the condition is unpredictable.
+  !> `second` if the condition holds, otherwise `first`. The function has no branch, because a processor cannot predict the
+  !> condition.
   elemental function chosen(first, second, condition) result(n)
     integer(int32), intent(in) :: first, second
     logical, intent(in) :: condition
@@ -358,7 +363,7 @@ contains
     integer(int16), intent(in) :: cell(2)
     real(real64), intent(in) :: now
     logical, intent(in) :: falling
-    type(prospect_t), intent(inout) :: near        !! the procedure sets its time and partner
+    type(prospect_t), intent(inout) :: near        !! the procedure sets the time and partner of the earliest event
 
     if (falling) then
       call self%next_falling(box, self%column(:, cell(1)), self%row(:, cell(2)), disk, now, near)
@@ -367,15 +372,15 @@ contains
     end if
   end subroutine next
 
-  !> Finds the earliest event at which the disk reaches one of four given lines around its position. These lines may be closer than
-  !> the faces of its cell.
+  !> Finds the earliest event at which the disk reaches one of four given lines around its position. The given lines may be closer
+  !> to the disk than the faces of its cell.
   pure subroutine next_within(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: column(0:1), row(0:1)
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
-    type(prospect_t), intent(inout) :: near        !! the procedure sets its time and partner
+    type(prospect_t), intent(inout) :: near        !! the procedure sets the time and partner of the earliest event
 
     if (self%falling) then
       call self%next_falling(box, column, row, disk, now, near)
@@ -385,7 +390,7 @@ contains
   end subroutine next_within
 
   !> Like `next_within`, for a straight path. The axis and the direction are selected without branches, because a processor cannot
-  !> predict them.
+  !> predict such branches.
   pure subroutine next_straight(column, row, disk, cell, t, code)
     type(line_t), intent(in) :: column(0:1, *), row(0:1, *)
     type(disk_t), intent(in) :: disk
@@ -403,8 +408,8 @@ contains
     t = merge(t_y, t_x, t_y < t_x)
   end subroutine next_straight
 
-  !> Time when a disk on a straight path reaches a line that it approaches along an axis. For a side the result is bit-identical
-  !> to that of `side_time`, because the event must not depend on the procedure that predicts it.
+  !> Time when a disk on a straight path reaches a line that the disk approaches along an axis. For a side the result is
+  !> bit-identical to the result of `side_time`, because the event must not depend on the procedure that predicts it.
   pure function line_time(line, disk, axis) result(t)
     type(line_t), intent(in) :: line
     type(disk_t), intent(in) :: disk
@@ -425,7 +430,7 @@ contains
     type(line_t), intent(in) :: column(0:1), row(0:1)
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
-    type(prospect_t), intent(inout) :: near        !! the procedure sets its time and partner
+    type(prospect_t), intent(inout) :: near        !! the procedure sets the time and partner of the earliest event
     real(real64) :: t_x, t_y
     integer(int32) :: code_x, code_y
 
@@ -465,9 +470,9 @@ contains
       x = flight(disk%x(axis), disk%v(axis), g, now - disk%clock)
       v = flight_velocity(disk%v(axis), g, now - disk%clock)
       up = merge(1, 0, v > -g*resolution(now))
-      sense = 2*up - 1                             ! the same roots as in `time_to_line`, simplified for this case
+      sense = 2*up - 1                             ! the roots from `time_to_line`, in a simplified form
       gap = max(sense*(line(up)%place - x), 0.0_real64)
-      disc = (v*v + tiny(v)) + 2*sense*g*gap       ! also positive if the disk is at rest on the face
+      disc = (v*v + tiny(v)) + 2*sense*g*gap       ! positive even if the disk is at rest on the face
       if (disc >= 0) then
         t = now + 2*gap/(abs(v) + sqrt(disc))
       else
@@ -479,7 +484,7 @@ contains
     code = line(up)%code
   end subroutine next_along
 
-  !> Like `next_falling`, along one axis, with moving sides that may enter the cell.
+  !> Like `next_falling`, along one axis, for a box with moving sides.
   pure subroutine next_beside(box, line, axis, disk, now, t, code)
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
@@ -543,8 +548,8 @@ contains
     t = max(now, disk%clock + time_to_line(sense*(line%place - disk%x(axis)), sense*disk%v(axis), sense*g))
   end function falling_time
 
-  !> Smallest resolvable time step at `now`. Without this lower bound a disk that reverses its motion at a face could cross that
-  !> face back and forth without end.
+  !> Smallest resolvable time step at `now`. Without this lower bound a disk that reverses its motion at a face could cross this
+  !> face infinitely often.
   elemental function resolution(now)
     real(real64), intent(in) :: now
     real(real64) :: resolution

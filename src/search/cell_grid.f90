@@ -1,5 +1,5 @@
-!> Cell search (linked-cell method). The box is divided into cells at least one diameter wide. A disk can only touch disks in its
-!> cell and the eight neighbouring cells until it leaves its cell, which is an event. Wide cells overlap (see `cell_faces`).
+!> Cell search (linked-cell method) with cells at least one diameter wide. A disk can touch only disks in its cell and in the eight
+!> neighbouring cells before the disk leaves its cell, which is an event. Wide cells overlap (see `cell_faces`).
 module cell_grid
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t, next_obstacle
@@ -24,18 +24,18 @@ module cell_grid
 
   type :: cell_grid_t
     private
-    type(patch_t), public :: patch                 !! the cells; `build` chooses them, except in a domain
+    type(patch_t), public :: patch                 !! block of cells; `build` chooses the block, except in a domain
     logical, public :: is_part = .false.
-    logical, public :: undivided = .false.         !! a single cell: all disks are candidates
-    logical, public :: everyone = .false.          !! predict all disks after each event, not only those involved
+    logical, public :: undivided = .false.         !! whether the box is a single cell, so that all pairs are tested
+    logical, public :: everyone = .false.          !! whether all disks are predicted after each event
     type(cell_faces_t), public :: faces                    !! faces of the cells, and sides
-    logical, public :: roomy = .false.             !! cells overlap: the cell of a disk is chosen again after a collision
-    type(cell_contents_t), public :: cells                 !! numbered row by row, surrounded by a ring of empty cells
+    logical, public :: roomy = .false.             !! whether cells overlap, so that a disk can change its cell in a collision
+    type(cell_contents_t), public :: cells                 !! disks in each cell; a ring of empty cells surrounds the patch
     type(reach_lists_t), public :: reach           !! obstacles, and disks that are too large for the width of the cells
-    type(images_t) :: images                       !! images of the box in this epoch
+    type(images_t) :: images                       !! periodic images of the box
     integer(int32) :: n_listed = 0                 !! number of disks inserted into cells
-    type(neighbour_lists_t), public :: lists       !! neighbour lists of the small disks, where cells contain many of them
-    real(real64) :: plain_radius = 0.0_real64      !! largest radius of disks whose crossings change no list; -1: none [length]
+    type(neighbour_lists_t), public :: lists       !! neighbour lists of the small disks, used if cells contain many disks
+    real(real64) :: plain_radius = 0.0_real64  !! largest radius of disks whose crossings change no list; -1: no such disks [length]
   contains
     procedure :: build
     procedure :: predict
@@ -43,7 +43,7 @@ module cell_grid
     procedure :: cross
     procedure :: insert
     procedure :: take_out
-    procedure :: predict_with_care                 ! bound to the type, so that it is not inlined
+    procedure :: predict_with_care                 ! type-bound, so that the compiler does not inline the procedure
     procedure :: read_ahead
     procedure, private :: cross_with_care
     procedure, private :: follow_big
@@ -53,13 +53,13 @@ module cell_grid
 
 contains
 
-  !> Chooses the cells, inserts the disks, and finds the objects that reach into each cell. If there are obstacles and the cells
-  !> have not changed, only the disks are inserted again, because epochs are short for few disks among many obstacles.
+  !> Chooses the cells, inserts the disks, and lists the obstacles and big disks that reach into each cell. The lists of obstacles
+  !> are kept if the cells have not changed, which saves time for few disks among many obstacles.
   subroutine build(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(place_t), allocatable :: rims(:)
-    logical :: kept                                ! the lists of obstacles remain valid
+    logical :: kept                                ! whether the lists of obstacles remain valid
     integer(int32) :: i
     integer(int16) :: ix, iy
 
@@ -96,7 +96,7 @@ contains
     end associate
   end subroutine build
 
-  !> Removes all disks from the cells stored in their tags. `all_found`: all cells are empty now.
+  !> Removes all disks from the cells that are stored in the tags of the disks. `all_found` is .true. if all cells are then empty.
   subroutine clear_cells(self, sim, all_found)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -124,7 +124,7 @@ contains
     associate (patch => self%patch)
       do i = 1, sim%n_disks()
         if (sim%disk(i)%radius > patch%small) then
-          sim%tag(i)%cell = 1                      ! a cell that is always marked
+          sim%tag(i)%cell = 1                      ! this cell is always marked
         else if (sim%tag(i)%id > 0) then
           cell = int(patch%cell_at(sim%position(i)), int16)
           call put(self, sim%tag(i), i, cell)
@@ -190,7 +190,7 @@ contains
     call self%cells%remove(self%cells%number(tag%cell), i)
   end subroutine take
 
-  !> Sets up the neighbour list of disk i at its present position, unless it has left the patch.
+  !> Sets up the neighbour list of disk i at its present position, unless disk i has left the patch.
   subroutine list(self, sim, i)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -202,6 +202,7 @@ contains
   end subroutine list
 
   !> Marks a cell if disks in the cell may touch obstacles, big disks or periodic images, or if the cell contains big disks.
+  !> Predictions for disks in a marked cell need the general procedure.
   subroutine mark(self, cell)
     class(cell_grid_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -258,7 +259,7 @@ contains
     end if
   end subroutine cross_with_care
 
-  !> Moves disk i into the cell beyond a face; for a periodic side this is the first cell behind it.
+  !> Moves disk i into the cell beyond a face. If the face is a periodic side, this cell is the first cell behind the side.
   subroutine change_cell(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -273,7 +274,7 @@ contains
     cell = sim%tag(i)%cell
     cell(axis) = cell(axis) + int(sense_of(side), int16)
     if (is_wall(code) .and. self%patch%last(axis) > 0) then
-      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%patch%cell_at(sim%position(i)), int16)   ! cells shifted by shear
+      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%patch%cell_at(sim%position(i)), int16)   ! shear shifts the cells
       cell(axis) = int(merge(self%patch%next(axis), self%patch%last(axis), sense_of(side) > 0), int16)
     end if
     inside = .true.
@@ -282,7 +283,7 @@ contains
     call move(self, sim%tag(i), i, cell)
   end subroutine change_cell
 
-  !> Chooses the cell of disk i again after a collision.
+  !> Chooses the cell of disk i again after a collision, if cells overlap.
   subroutine choose_cell(self, gravity, disk, tag, i)
     class(cell_grid_t), intent(inout) :: self
     real(real64), intent(in) :: gravity(2)         !! [length/time**2]
@@ -316,7 +317,7 @@ contains
 
     if (self%cells%cell(self%cells%number(sim%tag(i)%cell))%needs_care()) then
       call self%predict_with_care(sim, i, .false.)
-    else if (self%faces%falling) then              ! with literal arguments the compiler can specialise the kernel
+    else if (self%faces%falling) then              ! literal arguments allow the compiler to specialise the procedure
       call predict_one(self, sim%box, sim%disk, sim%tag, sim%now, 0, i)
     else
       call predict_one(self, sim%box, sim%disk, sim%tag, sim%now, no_gravity, i)
@@ -343,7 +344,7 @@ contains
     end if
   end subroutine predict_both
 
-  !> Predicts the next events of two disks that have collided, in the general case. Usually both have neighbour lists.
+  !> Predicts the next events of two disks that have collided, in the general case. Usually both disks have neighbour lists.
   subroutine predict_both_with_care(self, sim, i, j)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -362,7 +363,7 @@ contains
     call predict_collided(j)
   contains
 
-    !> Predicts the next event of one of the two disks.
+    !> Predicts the next event of disk k, which is one of the two disks.
     subroutine predict_collided(k)
       integer(int32), intent(in) :: k
 
@@ -393,7 +394,7 @@ contains
 
     call survey_list(self, sim%box, sim%disk(i), sim%now, i, near_i)
     call survey_list(self, sim%box, sim%disk(j), sim%now, j, near_j)
-    if (self%faces%falling) then                   ! with literal arguments the compiler can specialise the kernel
+    if (self%faces%falling) then                   ! literal arguments allow the compiler to specialise the procedure
       call take_earliest(sim%box%gravity, sim%disk, sim%tag, sim%now, latest_clock, near_i)
       call take_earliest(sim%box%gravity, sim%disk, sim%tag, sim%now, latest_clock, near_j)
     else
@@ -418,8 +419,8 @@ contains
     call self%lists%copy_list(near)
   end subroutine survey_list
 
-  !> Predicts the next events of two disks in unmarked cells. The cell faces and the candidates of both disks are determined first,
-  !> because they do not depend on the tests of candidates.
+  !> Predicts the next events of two disks in unmarked cells. The crossings of faces and the candidates are first determined for
+  !> both disks, because these operations do not depend on the tests of candidates.
   subroutine predict_two(self, box, disk, tag, now, known, pair)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -461,7 +462,7 @@ contains
     type(tag_t), intent(in) :: tag
     real(real64), intent(in) :: now
     integer(int32), value :: known
-    type(prospect_t), intent(inout) :: near        !! prospect of the disk `near%disk`
+    type(prospect_t), intent(inout) :: near        !! earliest event and candidates of the disk `near%disk`
 
     call self%faces%next(box, disk, tag%cell, now, iand(known, no_gravity) == 0, near)
     near%cell = self%cells%number(tag%cell)
@@ -480,10 +481,10 @@ contains
     call earliest_contact(disk, tag, near, now, gravity, known)
     disk(near%disk)%event_time = near%time
     disk(near%disk)%partner = near%partner
-    tag(near%disk)%partner_counter = disk(max(near%partner, 1))%collision_counter  ! used only if partner > 0; needs no branch
+    tag(near%disk)%partner_counter = disk(max(near%partner, 1))%collision_counter  ! used if partner > 0
   end subroutine take_earliest
 
-  !> Prefetches data for predictions of some disks, in stages.
+  !> Prefetches, in several stages, the data that are needed to predict the events of some disks.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(cell_grid_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -497,13 +498,13 @@ contains
     end if
   end subroutine read_ahead
 
-  !> Predicts the next event of a disk in the general case. A disk that has left the patch is removed from the search; no other disk
-  !> is tested against it any more.
+  !> Predicts the next event of a disk in the general case. A disk that has left the patch is removed from the search. No other disk
+  !> is then tested against the removed disk.
   subroutine predict_with_care(self, sim, i, has_collided)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    logical, intent(in) :: has_collided            !! the disk has collided at this moment, so that no other disk has a later clock
+    logical, intent(in) :: has_collided            !! whether disk i has just collided, so that no other disk has a later clock
     type(prospect_t) :: near
     integer(int32) :: known                        ! as in `earliest_contact`
 

@@ -1,4 +1,4 @@
-!> The width of the cells of the search.
+!> Chooses the width of the cells for the cell search.
 module cell_layout
   use kinds, only: int32, never, real64
   use cell_faces, only: all_cells, patch_t
@@ -9,13 +9,13 @@ module cell_layout
   private
   public :: whole_box
 
-  !> With fewer disks per cell there are fewer candidates, but more crossings of faces.
+  !> With fewer disks per cell, a prediction tests fewer candidates, but disks cross cell faces more often.
   real(real64), parameter :: disks_per_cell = 0.6_real64    !! intended mean number of disks per cell in a dilute system
 
 contains
 
-  !> Chooses the cells for all disks and obstacles of a simulation. In this choice an obstacle counts as a disk, because each disk
-  !> has to be tested against the obstacles that reach into its cell.
+  !> Chooses the cells for all disks and obstacles of a simulation. For the number of disks per cell, an obstacle counts as a disk,
+  !> because each disk has to be tested against the obstacles that reach into its cell.
   pure function whole_box(sim, undivided) result(patch)
     type(simulation_t), intent(in) :: sim
     logical, intent(in) :: undivided

@@ -1,5 +1,5 @@
-!> Finds contacts that the simple scan of nine cells does not find: contacts with disks in the linked lists of crowded cells, with
-!> disks across a periodic side, and with given disks.
+!> Finds contacts that the simple search of nine cells does not find: contacts with disks in the linked lists of crowded cells, with
+!> disks across a periodic side, with obstacles and big disks, and with given disks.
 module cell_scans
   use kinds, only: int16, int32, int64, real64
   use box_geometry, only: find_image_contact
@@ -16,8 +16,8 @@ module cell_scans
 
 contains
 
-  !> Tests the candidates of a prospect, and then empties the list of candidates. The kernel is called with literal arguments, for
-  !> which the compiler can specialise the kernel.
+  !> Tests the candidates in `near`, and then empties the list of candidates. `earliest_contact` is called with literal arguments,
+  !> so that the compiler can generate specialised versions of this procedure.
   subroutine test_list(sim, known, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
@@ -37,7 +37,7 @@ contains
     near%n = 0
   end subroutine test_list
 
-  !> Tests the candidates of a prospect, which are in a periodic image of the box, and then empties the list of candidates.
+  !> Tests the candidates in `near`, which are in a periodic image of the box, and then empties the list of candidates.
   subroutine test_through_image(sim, known, image, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known
@@ -55,7 +55,7 @@ contains
     near%n = 0
   end subroutine test_through_image
 
-  !> Finds contacts with given disks, which are in one periodic image of the box.
+  !> Finds contacts with the given disks, which are all in one periodic image of the box.
   subroutine scan_disks(sim, disks, image, known, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: disks(:)
@@ -71,16 +71,16 @@ contains
     end do
   end subroutine scan_disks
 
-  !> Finds contacts of a small disk with obstacles and big disks that reach into its cell.
+  !> Finds contacts of a small disk with the obstacles and big disks that reach into its cell.
   subroutine scan_reach(reach, cell, sim, images, known, near)
     type(reach_lists_t), intent(in) :: reach
-    integer(int16), intent(in) :: cell(2)          !! cell into which at least one such obstacle or big disk reaches
+    integer(int16), intent(in) :: cell(2)          !! cell of the small disk
     type(simulation_t), intent(in) :: sim
     type(images_t), intent(in) :: images
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prospect_t), intent(inout) :: near
-    integer(int32) :: e, last(2)                   ! entry; image that contains the listed big disks
-    real(real64) :: number(2), shift(2)            ! index of the image of an obstacle; shift to it [length]
+    integer(int32) :: e, last(2)                   ! index of an entry; image that contains the big disks in `near`
+    real(real64) :: number(2), shift(2)            ! index of the image of an obstacle; shift to this image [length]
 
     near%n = 0
     last = 0
@@ -103,7 +103,7 @@ contains
     call test_disks()
   contains
 
-    !> Tests the big disks in the list of candidates. All of them are in the same periodic image of the box.
+    !> Tests the big disks in the list of candidates, which are all in the same periodic image of the box.
     subroutine test_disks()
       if (all(last == 0)) then
         call test_list(sim, known, near)
@@ -113,7 +113,7 @@ contains
     end subroutine test_disks
   end subroutine scan_reach
 
-  !> Finds contacts with the disks in the neighbour list of a disk.
+  !> Finds contacts of a disk with the disks in its neighbour list.
   subroutine scan_list(lists, sim, images, known, near)
     type(neighbour_lists_t), intent(in) :: lists
     type(simulation_t), intent(in) :: sim
@@ -138,7 +138,7 @@ contains
     end do
   end subroutine scan_list
 
-  !> Finds contacts with the disks of some cells, which belong to one periodic image of the box.
+  !> Finds contacts with the disks in the given cells, which all belong to one periodic image of the box.
   subroutine scan_cells(cells, sim, c, images, number, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
@@ -195,8 +195,8 @@ contains
     end do
   end subroutine scan_rim
 
-  !> Adds further candidates to the candidates from `gather`: the disks in the linked lists of crowded cells. The cells are the cell
-  !> of a disk and the eight cells around it.
+  !> Adds the disks in the linked lists of crowded cells to the candidates from `gather`. The procedure searches the cell of a disk
+  !> and its eight neighbours.
   subroutine add_chains_around(cells, sim, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
@@ -219,9 +219,10 @@ contains
     end do
   end subroutine add_chains_around
 
-  !> Finds contacts of a disk if some of the nine cells around the disk are images across a periodic side. All cells that belong to
-  !> the same periodic image are searched in one call. If the images above and below move along x, the search includes more columns:
-  !> all columns that the disk can reach before the images have moved by one column. Disks two columns apart cannot touch.
+  !> Finds contacts of a disk if some of the nine cells around the disk are across a periodic side. All cells that belong to the
+  !> same periodic image are searched in one call. In a sheared box the images above and below the box move along x. The search then
+  !> includes all columns that the disk can reach before these images have moved by the width of a column. Disks in columns that are
+  !> not adjacent cannot touch.
   subroutine scan_around_seam(cells, patch, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch

@@ -1,13 +1,14 @@
-!> Neighbour lists: for each disk the disks that it can touch while both stay in their neighbourhoods.
+!> Neighbour lists. The list of a disk contains the disks that it can touch while both disks stay in their neighbourhoods.
 !>
 !> A neighbourhood is a square around the position at which the disk received its list, clipped at the faces of its cell and at the
 !> sides of the box. Two disks are in each other's lists if they can touch somewhere in their neighbourhoods. An event occurs when a
 !> disk leaves its neighbourhood: the nine cells around the disk are then searched, and the disk receives a new neighbourhood and a
 !> new list. A prediction therefore tests only a few neighbours, however many disks the cells contain (Donev, Torquato and
-!> Stillinger, J. Comput. Phys. 202, 737 (2005)).
+!> Stillinger, Journal of Computational Physics 202, 737 (2005)).
 !>
-!> Neighbour lists serve only to save time. If a list has no space for a further neighbour, it is marked as incomplete until the
-!> disk receives a new list. Until then the nine cells around the disk are searched in each prediction.
+!> Neighbour lists only save time and do not change results. A list without space for a further neighbour is marked as incomplete
+!> until the disk receives a new list. While the list of a disk is incomplete, each prediction searches the nine cells around the
+!> disk.
 module neighbour_lists
   use, intrinsic :: iso_fortran_env, only: real32
   use kinds, only: int16, int32, int64, pi, real64
@@ -21,42 +22,41 @@ module neighbour_lists
   private
   public :: neighbour_lists_t
 
-  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! values in place of the number of entries
+  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! values that replace the number of entries
   !> Number of entries that are copied from every list, so that no branch depends on the actual number.
   integer(int32), parameter :: always_copied = 15
-  !> Factor of the image in an entry; it exceeds every number of disks.
+  !> Factor of the image index in an entry. The factor is larger than any number of disks.
   integer(int32), parameter :: image_unit = 2**27
-  !> Largest number of disks with neighbour lists: 32-bit integers can then number all entries.
+  !> Largest number of disks for which neighbour lists are used, so that 32-bit integers can number all entries.
   integer(int32), parameter :: most_listed = image_unit/4
 
   !> The region around a disk for which its neighbour list is valid. When the centre of the disk leaves this region, the disk
   !> receives a new list.
   type :: neighbourhood_t
-    type(line_t) :: column(0:1), row(0:1)          !! left and right line, lower and upper line, each with the code of its event
+    type(line_t) :: column(0:1), row(0:1)          !! left and right lines; lower and upper lines
   end type neighbourhood_t
 
   real(real64), parameter, public :: candidates_that_pay = 30.0_real64
 
   type :: neighbour_lists_t
     logical :: used = .false.
-    !> Smallest mean number of disks in nine cells for which lists save time, in the dilute limit.
+    !> Smallest mean number of disks in nine cells for which neighbour lists save time in a dilute system.
     real(real64) :: least_candidates = candidates_that_pay
     integer(int32) :: capacity = 16                !! capacity of the list of a small disk; larger disks have more neighbours
     real(real64) :: mean_radius = 0.0_real64       !! [length]
     real(real64) :: margin = 0.0_real64            !! half the width of the neighbourhood of a disk with the mean radius [length]
     real(real64) :: origin(2) = 0.0_real64         !! lower left corner of the box [length]
     real(real64) :: period(2) = 0.0_real64         !! edges of the box [length]
-    real(real32) :: rounding = 0.0_real32          !! bound on the errors in `extent` [length]
+    real(real32) :: rounding = 0.0_real32          !! upper bound of the rounding errors in `extent` [length]
     type(neighbourhood_t), allocatable :: neighbourhood(:)   !! (disks)
-    !> (4,disks) x and y of the centre relative to `origin`, radius plus `rounding`, and half the width of the unclipped square
-    !> [length]
+    !> (4,disks) x and y of the centre relative to `origin`, radius plus `rounding`, and half the width of the neighbourhood before
+    !> clipping [length]
     real(real32), allocatable :: extent(:, :)
-    !> (disks+1) position of the list of each disk, which begins with the number of its entries.
+    !> (disks+1) position in `entry` of the list of each disk. A list begins with the number of its entries.
     integer(int32), allocatable :: first(:)
-    !> (0:) all lists: each entry is the index of a disk, which starts at 0, plus image_unit times the index of the image.
+    !> (0:) all lists. Each entry is the index of a disk, counted from 0, plus `image_unit` times the index of a periodic image.
     integer(int32), allocatable :: entry(:)
-    !> (0:) for each entry in the list of a disk i, which refers to a disk j, the position of the entry for disk i in the list of
-    !> disk j.
+    !> (0:) for the entry of disk j in the list of disk i, the position of the entry of disk i in the list of disk j.
     integer(int32), allocatable :: back(:)
   contains
     procedure :: prepare
@@ -74,9 +74,9 @@ module neighbour_lists
 
 contains
 
-  !> Determines whether neighbour lists save time, and allocates the lists in that case. With neighbour lists the prediction after a
-  !> collision tests fewer disks. However, the lists have to be renewed, and more frequently at lower densities. The limit and the
-  !> margin were measured for polydisperse disks.
+  !> Determines whether neighbour lists save time, and allocates the lists in that case. With neighbour lists, a prediction after a
+  !> collision tests fewer disks. However, the lists have to be renewed, and these renewals are more frequent at lower densities.
+  !> The limit `least_candidates` and the margin were optimised for polydisperse disks.
   subroutine prepare(self, disk, tag, lower, edges, patch)
     class(neighbour_lists_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -108,7 +108,7 @@ contains
     call self%make_room(disk, lower, edges)
   end subroutine prepare
 
-  !> Allocates the lists of all disks, which are still empty. Larger disks get longer lists, because they have more neighbours.
+  !> Allocates empty lists for all disks. Larger disks have longer lists, because larger disks have more neighbours.
   subroutine make_room(self, disk, lower, edges)
     class(neighbour_lists_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -156,8 +156,8 @@ contains
     self%neighbourhood(i)%row = clipped(faces%row(:, cell(2)), 2)
   contains
 
-    !> The two lines that limit a neighbourhood along an axis. Each of them is a face of the cell or an edge of the square,
-    !> whichever is closer to the disk.
+    !> The two lines that limit a neighbourhood along an axis. Each line is a face of the cell or an edge of the square, whichever
+    !> is closer to the disk.
     pure function clipped(line, axis) result(nearer)
       type(line_t), intent(in) :: line(0:1)
       integer(int32), intent(in) :: axis
@@ -177,9 +177,9 @@ contains
     end function clipped
   end subroutine lay
 
-  !> Finds the disks that disk i can touch in its new neighbourhood, among the disks in the nine cells around disk i. Adds disk i to
-  !> the list of each disk found, and each disk found to the list of disk i. If one of the disks found has no list yet, the pair is
-  !> added later, when the list of that disk is made.
+  !> Finds the disks that disk i can touch in its new neighbourhood, among the disks in the nine cells around disk i. The procedure
+  !> adds disk i to the list of each disk found, and each disk found to the list of disk i. If a disk found has no list yet, the
+  !> pair is added later, when the list of this disk is made.
   subroutine enter(self, i, cells, patch, cell)
     class(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -230,8 +230,8 @@ contains
       end do
     end subroutine add_chain
 
-    !> Adds the candidates that are close enough. The condition is evaluated without a branch, because a processor cannot predict
-    !> it.
+    !> Adds the candidates that are close enough to disk i. The distance is tested without a branch, because a processor cannot
+    !> predict the result of the test.
     subroutine test_candidates(image)
       integer(int32), intent(in) :: image          !! periodic image that contains the candidates
       integer(int32) :: j, k, found(list_capacity + 1), n_found
@@ -328,7 +328,7 @@ contains
     last = self%entry(at + n)
     self%entry(at + place) = last
     self%back(at + place) = self%back(at + n)
-    ! The value is not used if that list is incomplete.
+    ! This value is not used if the list of the other disk is incomplete.
     self%back(self%first(iand(last, image_unit - 1) + 1) + self%back(at + n)) = place
     self%entry(at) = n - 1
   end subroutine remove
@@ -346,7 +346,7 @@ contains
     end do
   end subroutine remove_disk
 
-  !> A cell and its eight neighbours, and the periodic image to which each of these cells belongs.
+  !> Lists a cell and its eight neighbours, and the periodic image to which each of these nine cells belongs.
   pure subroutine find_cells(cells, patch, cell, around, image)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
@@ -362,7 +362,7 @@ contains
     end do
   end subroutine find_cells
 
-  !> The image of disk i that disk j can touch, if disk i can touch the image `image` of disk j.
+  !> Index of the image of disk i that disk j can touch, if disk i can touch the image `image` of disk j.
   elemental function reverse(image)
     integer(int32), intent(in) :: image
     integer(int32) :: reverse
@@ -370,7 +370,7 @@ contains
     reverse = merge(9 - image, 0, image > 0)
   end function reverse
 
-  !> Index of an image along each axis: -1, 0 or 1. An entry encodes the two indices as x + 3 y, modulo 9.
+  !> Index of an image along each axis: -1, 0 or 1. An entry encodes the indices x and y of an image as x + 3 y, modulo 9.
   pure function periods(image) result(number)
     integer(int32), intent(in) :: image
     real(real64) :: number(2)
@@ -378,7 +378,7 @@ contains
     number = [modulo(image + 4, 3) - 1, modulo(image + 4, 9)/3 - 1]
   end function periods
 
-  !> Whether the list of disk i contains all disks that it can touch in its neighbourhood.
+  !> Whether the list of disk i contains all disks that disk i can touch in its neighbourhood.
   pure function is_complete(self, i) result(yes)
     class(neighbour_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -398,7 +398,7 @@ contains
     end associate
   end function is_short
 
-  !> Copies the list of a disk that has no neighbours across a periodic side.
+  !> Copies the neighbour list of a disk to the list of candidates. No neighbour may be across a periodic side.
   pure subroutine copy_list(self, near)
     class(neighbour_lists_t), intent(in) :: self
     type(prospect_t), intent(inout) :: near
@@ -435,9 +435,9 @@ contains
     end associate
   end subroutine neighbour
 
-  !> Prefetches the data that are needed to predict the events of some disks. The first stage prefetches the records of the disks,
-  !> the second stage their lists, and the third stage the disks in these lists. For the collision partner of each disk the same
-  !> data are prefetched one stage later.
+  !> Prefetches the data that are needed to predict the events of some disks. The first stage prefetches the records of these disks,
+  !> the second stage prefetches their neighbour lists, and the third stage prefetches the disks in the lists. The data for the
+  !> collision partner of a disk are prefetched one stage later than the data for the disk.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(neighbour_lists_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)

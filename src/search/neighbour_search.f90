@@ -1,4 +1,5 @@
-!> Defines types for predicted events, and the kernel that predicts contacts of disks. All search methods use this kernel.
+!> Defines types for predicted events, and the procedure `earliest_contact`, which predicts contacts of disks. All search methods
+!> use this procedure.
 module neighbour_search
   use images, only: image_t
   use kinds, only: int32, never, real64
@@ -9,50 +10,52 @@ module neighbour_search
   public :: event_t, prospect_t, earliest_contact, event_of, list_capacity, latest_clock, no_gravity, wins
 
   integer(int32), parameter :: list_capacity = 64
-  !> Flags for conditions that the caller of the kernel guarantees; a sum of flags states several conditions. `latest_clock`: the
-  !> clock of the disk is `now`, and no candidate has a later clock. `no_gravity`: there is no gravity. The compiler generates
-  !> versions of the kernel without the parts that are then not needed.
+  !> Flags for conditions that the caller of `earliest_contact` guarantees. The sum of both flags states both conditions. The flag
+  !> `latest_clock` means that the clock of the disk is `now` and that no candidate has a later clock. The flag `no_gravity` means
+  !> that no gravity acts on the disks. The compiler generates versions of `earliest_contact` without the operations that these
+  !> conditions make unnecessary.
   integer(int32), parameter :: latest_clock = 1, no_gravity = 2
-  real(real64), parameter :: margin_of_times = 32*epsilon(1.0_real64)    !! larger than all rounding errors in the kernel
+  real(real64), parameter :: margin_of_times = 32*epsilon(1.0_real64)    !! larger than all rounding errors in `earliest_contact`
 
   !> A predicted event.
   type :: event_t
-    real(real64) :: time = 0.0_real64         !! time since the epoch [time]
+    real(real64) :: time = 0.0_real64         !! time of the event, relative to the time origin `box%epoch` [time]
     integer(int32) :: disk = 0                !! disk that stores the event
     integer(int32) :: partner = 0             !! partner in the event: a disk (> 0) or a code (<= 0)
   end type event_t
 
-  !> The prospect of a disk: the earliest event that is known so far, and the candidates that the disk may touch before this event.
-  !> The components have no initial values, because a prospect is created in each prediction.
+  !> The state of a prediction for one disk: the earliest event that is known so far, and the candidates that the disk may touch
+  !> before this event. The components have no initial values, because the initialisation would take time in each prediction.
   type :: prospect_t
     real(real64) :: time                      !! time of the earliest event [time]
-    integer(int32) :: partner                 !! partner in this event
+    integer(int32) :: partner                 !! partner in the earliest event
     integer(int32) :: disk                    !! disk for which the prediction is made
     integer(int32) :: cell                    !! number of the cell of the disk
     integer(int32) :: n                       !! number of candidates
-    integer(int32) :: list(list_capacity)     !! (n) candidates, counted from 0
+    integer(int32) :: list(list_capacity)     !! (n) indices of the candidates, counted from 0
   end type prospect_t
 
 contains
 
-  !> Finds the earliest contact of a disk with the candidates, if it precedes the earliest event known so far.
+  !> Finds the earliest contact of a disk with the candidates, if this contact precedes the earliest event that is known so far.
   !>
-  !> The time is a pure function of the states of the two disks: both are advanced to the later of their clocks. An exchange of the
-  !> two disks changes at most the signs of the terms of the formula, not their magnitudes. The result is therefore bit-identical
-  !> for both disks and for any time of the prediction. The order of simultaneous contacts is defined by `wins`. A contact time
-  !> before `now` results from rounding errors. After a perfectly inelastic collision the distance of two disks equals the sum of
-  !> their radii within rounding errors, and the shift of one disk by a period changes these errors. In this case the kernel decides
-  !> whether a contact occurs now or not at all. A shift is an event, after which the contact is predicted again. Predictions at
-  !> later times do not change the decision.
+  !> The contact time of two disks is a pure function of the states of the two disks, which are both advanced to the later of their
+  !> clocks. An exchange of the two disks changes at most the signs of the terms in the formula. The contact time is therefore
+  !> bit-identical for both disks and for any time of the prediction. The function `wins` defines the order of simultaneous
+  !> contacts. A contact time before `now` results from rounding errors. For example, the distance of two disks after a perfectly
+  !> inelastic collision equals the sum of their radii within rounding errors, and the shift of one disk by a period changes these
+  !> errors. If the contact time is before `now`, the procedure decides whether a contact occurs at the time `now` or not at all.
+  !> The shift of a disk by a period is an event, after which the contact is predicted again. Predictions at later times do not
+  !> change the decision of the procedure.
   !>
-  !> The root of |dx + dv s| = sigma is c/(sqrt(disc) - b), which is free of cancellation near contact. The discriminant sigma**2
-  !> dv**2 - (dx x dv)**2 is free of cancellation for distant grazing pairs. Disks that touch, or overlap by rounding, and approach
-  !> collide now.
+  !> The root of |dx + dv s| = sigma is s = c/(sqrt(disc) - b). This expression has no cancellation near contact. The discriminant
+  !> sigma**2 dv**2 - (dx x dv)**2 has no cancellation for distant grazing pairs. If two disks approach each other and touch, or
+  !> overlap because of rounding errors, the disks collide at the time `now`.
   !>
   !> One combined test excludes most candidates. A candidate is excluded if the root is not real, if the root is not earlier than
-  !> the earliest contact found so far, or if the root is not earlier than the next event of the candidate. (In the last case the
-  !> candidate is predicted again after this event, and the pair is tested in that prediction.) A root before t requires c < -2 b (t
-  !> - late), which is tested with a margin above rounding errors.
+  !> the earliest contact found so far, or if the root is not earlier than the next event of the candidate. The events of a
+  !> candidate are predicted again after its next event, and that prediction tests the pair. A root before t requires c < -2 b (t -
+  !> late). This condition is tested with a margin that is larger than all rounding errors.
   pure subroutine earliest_contact(disk, tag, near, now, gravity, known, image)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, with indices that start at 0
     type(tag_t), intent(in) :: tag(*)
@@ -75,7 +78,7 @@ contains
     do k = 1, n
       j = near%list(k)
       call read_state(disk(j), xj, yj, uj, vj, clock_j, rj)
-      if (.not. fresh) then                   ! with si = 0 the results would be the same
+      if (.not. fresh) then                   ! with si = 0 these operations would change nothing
         late = merge(clock, clock_j, clock > clock_j)
         from = 2*late - margin
         si = late - clock
@@ -101,7 +104,7 @@ contains
       in_time = merge(in_time, disc, in_time < disc)
       if (in_time > 0 .and. b < 0) then
         t_j = late + max(c, 0.0_real64)/(sqrt(min(disc, b*b)) - b)
-        if (t_j < now .and. .not. fresh) then ! caused by rounding: no contact, or contact now
+        if (t_j < now .and. .not. fresh) then ! a rounding error: no contact, or a contact at the time `now`
           t_j = merge(2*never, now, b + (du*du + dv*dv)*(now - late) >= 0)
         end if
         if (t_j < best) then
@@ -124,7 +127,8 @@ contains
     clock = d%clock; radius = d%radius
   end subroutine read_state
 
-  !> A coordinate after the time s. On a straight path the same result needs fewer operations.
+  !> A coordinate of a disk after a flight of duration s. On a straight path the calculation of the coordinate needs fewer
+  !> operations.
   elemental function moved(x, v, g, s, falling) result(there)
     real(real64), intent(in) :: x, v, g, s
     logical, intent(in) :: falling            !! .false. if g is zero
@@ -137,7 +141,7 @@ contains
     end if
   end function moved
 
-  !> A velocity component after the time s. On a straight path the velocity is constant and needs no operations.
+  !> A velocity component of a disk after a flight of duration s. On a straight path the velocity is constant.
   elemental function sped_up(v, g, s, falling) result(after)
     real(real64), intent(in) :: v, g, s
     logical, intent(in) :: falling

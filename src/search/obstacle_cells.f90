@@ -1,5 +1,6 @@
-!> Lists of the obstacles that may exclude a disk from a point, for each cell of the box. The cost of testing one point does not
-!> depend on the number of obstacles. The cost of making the lists is proportional to the number of obstacles.
+!> For each cell of the box, a list of the obstacles that a disk with its centre in the cell may overlap. With these lists, the cost
+!> of a test for overlaps at one point does not depend on the number of obstacles. The cost of making the lists is proportional to
+!> the number of obstacles.
 module obstacle_cells
   use box_geometry, only: box_t
   use kinds, only: int32, real64
@@ -10,7 +11,7 @@ module obstacle_cells
 
   !> An obstacle in the list of a cell.
   type :: entry_t
-    integer(int32) :: obstacle = 0                  !! index in the box
+    integer(int32) :: obstacle = 0                  !! index of the obstacle in the box
     !> Next entry in the same list, for an obstacle with a larger index; 0 at the end of the list.
     integer(int32) :: next = 0
   end type entry_t
@@ -19,7 +20,7 @@ module obstacle_cells
     real(real64), private :: radius = -1.0_real64   !! largest radius of disks for which the lists are valid [length]
     real(real64), private :: lower(2) = 0.0_real64  !! lower left corner of the box [length]
     real(real64), private :: side(2) = 0.0_real64   !! edges of a cell [length]
-    integer(int32), allocatable, private :: head(:, :)  !! (columns,rows) first entry of each cell; 0: none
+    integer(int32), allocatable, private :: head(:, :)  !! (columns,rows) first entry of each cell; 0: empty list
     integer(int32), private :: n_entries = 0
     type(entry_t), allocatable :: entry(:)
   contains
@@ -59,7 +60,7 @@ contains
     end do
   end subroutine serve
 
-  !> First entry of the list for a point; 0 if no obstacle is near the point.
+  !> First entry of the list for the cell that contains a point; 0 if no obstacle is near the cell.
   pure function first_near(self, p) result(e)
     class(obstacle_cells_t), intent(in) :: self
     real(real64), intent(in) :: p(2)                !! [length]
@@ -71,7 +72,7 @@ contains
     e = self%head(c(1), c(2))
   end function first_near
 
-  !> Adds an obstacle to the lists of all cells with a point from which it excludes the centre of a disk.
+  !> Adds an obstacle to the lists of all cells in which the centre of a disk may be when the disk overlaps the obstacle.
   subroutine enter(self, number, shape, periodic)
     type(obstacle_cells_t), intent(inout) :: self
     integer(int32), intent(in) :: number
@@ -95,10 +96,11 @@ contains
 
   contains
 
-    !> Adds the obstacle to the lists in a block of cells. The block is halved recursively until it is a single cell, or until the
-    !> outline does not cross the block. In the latter case the disks are excluded from all points of the block or from none.
+    !> Adds the obstacle to the lists in a block of cells. The block is halved recursively until the block is a single cell, or
+    !> until the outline of the obstacle does not cross the block. In a block that the outline does not cross, a disk overlaps the
+    !> obstacle at every point or at no point.
     recursive subroutine enter_block(low, high)
-      !> First and last column and row, which start at 0 and may be beyond periodic sides.
+      !> First and last column and row of the block, counted from 0. The block may extend beyond periodic sides.
       integer(int32), intent(in) :: low(2), high(2)
       real(real64) :: d(2), half(2)
       integer(int32) :: last(2), first(2), axis, i, j
@@ -124,7 +126,7 @@ contains
       end do
     end subroutine enter_block
 
-    !> Adds the obstacle to the list of one cell, unless the list already contains it because of another periodic image.
+    !> Adds the obstacle to the list of one cell, unless the list already contains the obstacle because of another periodic image.
     subroutine enter_cell(cell)
       integer(int32), intent(in) :: cell(2)         !! column and row, counted from 1
       type(entry_t), allocatable :: more(:)

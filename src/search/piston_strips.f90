@@ -1,6 +1,6 @@
-!> Lists the disks that a piston may touch in the near future. A piston can reach every disk in the long run. Until it has moved by
-!> the width of a cell, however, it can touch only the disks in a strip of adjacent columns or rows (`cell_faces: find_strips`).
-!> Only the disks in the strip are tested against the piston.
+!> Lists the disks that a piston may touch in the near future. A piston can reach every disk in the course of time. Before the
+!> piston has moved by the width of a cell, the piston can touch only disks in a strip of adjacent columns or rows of cells
+!> (`cell_faces: find_strips`). Only the disks in the strip are tested against the piston.
 module piston_strips
   use kinds, only: int16, int32
   use cell_grid, only: cell_grid_t
@@ -13,7 +13,7 @@ module piston_strips
 
 contains
 
-  !> Lists the disks that a piston may touch before it leaves its strip.
+  !> Lists the disks that a piston may touch before the piston leaves its strip.
   function near_piston(self, k) result(disks)
     class(cell_grid_t), intent(in) :: self
     integer, intent(in) :: k                       !! index of the side
@@ -60,7 +60,8 @@ contains
     end subroutine add
   end function near_piston
 
-  !> Finds the next strip of a piston that leaves its strip, and the disks in both strips, which have to be predicted again.
+  !> Finds the new strip of a piston that leaves its strip. The procedure lists the disks in the old and new strips, because their
+  !> events have to be predicted again.
   subroutine change_strips(self, sim, disks)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

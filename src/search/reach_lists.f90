@@ -1,9 +1,11 @@
-!> Lists the objects other than small disks that reach into each cell: obstacles, and a few big disks among many small disks.
+!> Lists the obstacles and the big disks that reach into each cell. Big disks are few disks that are much larger than all other
+!> disks.
 !>
-!> The width of the cells is chosen for the small disks. A big disk is listed in each cell from which a small disk could touch it.
-!> The list is valid while the big disk stays within a margin around its reference position, the position for which the list was
-!> made. The search for a small disk therefore finds big disks in the list of its own cell, and the search for a big disk tests the
-!> cells along its boundary. The cost for a disk depends only on the sizes of disks near it.
+!> The width of the cells is chosen for the small disks. A big disk is listed in each cell in which a small disk could touch the big
+!> disk. These entries are valid while the big disk stays within a margin around its reference position, which is the position for
+!> which the entries were made. A prediction for a small disk finds big disks in the list of the cell of the small disk. A
+!> prediction for a big disk tests the small disks in the cells along the boundary of the big disk. The cost of a prediction for a
+!> disk depends only on the sizes of nearby disks.
 module reach_lists
   use kinds, only: int16, int32, real64
   use cell_faces, only: cell_faces_t, patch_t
@@ -18,13 +20,13 @@ module reach_lists
 
   integer(int32), parameter :: most_big_disks = 256    !! largest number of big disks; each is tested against all other big disks
 
-  !> A cell into which an object reaches.
+  !> A cell into which an obstacle or a big disk reaches.
   type :: place_t
     integer(int32) :: cell(2) = 0                !! column and row
-    integer(int32) :: image(2) = 0               !! periodic image of the object that reaches into the cell, in periods
+    integer(int32) :: image(2) = 0               !! index of the periodic image of the object that reaches into the cell
   end type place_t
 
-  !> An object in the list of a cell.
+  !> An entry in the list of a cell: an obstacle or a big disk.
   type :: entry_t
     integer(int32) :: code = 0                   !! index of a big disk (> 0), or code of an obstacle (<= 0)
     integer(int32) :: image(2) = 0
@@ -34,19 +36,20 @@ module reach_lists
   type :: big_disk_t
     integer(int32) :: disk = 0                   !! index of the disk
     real(real64) :: centre(2) = 0.0_real64       !! reference position [length]
-    type(place_t), allocatable :: rim(:)         !! cells in which small disks may touch this disk
-    integer(int32), allocatable :: obstacles(:)  !! codes of the obstacles that the disk may touch, in descending order
+    type(place_t), allocatable :: rim(:)         !! cells in which small disks may touch the big disk
+    integer(int32), allocatable :: obstacles(:)  !! codes of the obstacles that the big disk may touch, in descending order
   end type big_disk_t
 
   type :: reach_lists_t
     type(big_disk_t), allocatable :: big(:)
     real(real64) :: margin = 0.0_real64          !! margin around the reference positions of big disks [length]
-    !> (columns,rows) first entry of each cell; 0 if its list is empty. Not allocated if there are neither obstacles nor big disks.
+    !> (columns,rows) first entry in the list of each cell; 0 for an empty list. The array is not allocated if there are neither
+    !> obstacles nor big disks.
     integer(int32), allocatable :: first(:, :)
     type(entry_t), allocatable :: entry(:)
     integer(int32), private :: vacant = 0        !! head of the list of free entries
     type(patch_t), private :: patch              !! patch of cells for which the lists of obstacles were made
-    !> Lower left and upper right corner of the rectangle of all these cells [length]
+    !> Lower left and upper right corner of the rectangle that contains all cells of the box [length]
     real(real64), private :: span(2, 2) = 0.0_real64
   contains
     procedure :: serves
@@ -60,7 +63,8 @@ module reach_lists
 
 contains
 
-  !> The radius that determines the width of the cells: the largest radius, unless a few disks are much bigger than all other disks.
+  !> The radius that determines the width of the cells: the largest radius of all disks, or the largest radius of the small disks if
+  !> a few disks are much bigger.
   pure function largest_small_radius(disk) result(radius)
     type(disk_t), intent(in) :: disk(:)
     real(real64) :: radius, next
@@ -75,7 +79,7 @@ contains
     end do
   end function largest_small_radius
 
-  !> Whether the lists of obstacles have already been made for these cells.
+  !> Whether the lists of obstacles have already been made for the cells of the given patch.
   pure function serves(self, patch, faces) result(yes)
     class(reach_lists_t), intent(in) :: self
     type(patch_t), intent(in) :: patch
@@ -86,7 +90,7 @@ contains
     if (yes) yes = self%patch%equals(patch) .and. all(abs(span_of(patch, faces) - self%span) <= 0)
   end function serves
 
-  !> The lower left and the upper right corner of the rectangle of all cells.
+  !> The lower left and the upper right corner of the rectangle that contains all cells of the box.
   pure function span_of(patch, faces) result(span)
     type(patch_t), intent(in) :: patch
     type(cell_faces_t), intent(in) :: faces
@@ -96,7 +100,7 @@ contains
     call faces%rectangle(patch%whole, patch%whole, other, span(:, 2))
   end function span_of
 
-  !> Lists the obstacles, and the disks that are bigger than those for which the cells are made.
+  !> Makes the lists of obstacles and big disks. Big disks are disks for which the cells are not wide enough.
   subroutine renew(self, sim, patch, faces)
     class(reach_lists_t), intent(out) :: self
     type(simulation_t), intent(in) :: sim
@@ -155,7 +159,7 @@ contains
     end do
   end function rims
 
-  !> Whether an object reaches into a cell.
+  !> Whether any obstacle or big disk reaches into a cell.
   pure function has_any(self, cell) result(yes)
     class(reach_lists_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)          !! column and row, counted from 1
@@ -165,7 +169,7 @@ contains
     if (yes) yes = self%first(cell(1), cell(2)) > 0
   end function has_any
 
-  !> Index of disk i among the big disks; 0 if it is not big.
+  !> Index of disk i among the big disks; 0 if disk i is not a big disk.
   pure function number_of(self, i) result(k)
     class(reach_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -176,7 +180,7 @@ contains
     end do
   end function number_of
 
-  !> Makes the present position of the k-th big disk its reference position, and renews its entries in the lists.
+  !> Makes the present position of the k-th big disk its reference position, and renews the entries of this disk in the lists.
   subroutine follow(self, sim, k, patch, faces)
     class(reach_lists_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -194,7 +198,7 @@ contains
   end subroutine follow
 
   !> Codes of the obstacles that reach into the given cells, in descending order. If a big disk touches an obstacle, the point of
-  !> contact is in a cell into which both of them reach.
+  !> contact is in a cell into which both the big disk and the obstacle reach.
   pure function obstacles_along(self, places) result(codes)
     class(reach_lists_t), intent(in) :: self
     type(place_t), intent(in) :: places(:)
@@ -212,7 +216,7 @@ contains
     end do
   end function obstacles_along
 
-  !> Finds the cells in which a small disk may touch an outline that has moved by up to a margin.
+  !> Finds the cells in which a small disk may touch the outline of a shape that has moved by up to `margin`.
   subroutine find_places(shape, margin, patch, faces, places)
     class(shape_t), intent(in) :: shape
     real(real64), intent(in) :: margin             !! [length]
@@ -239,8 +243,8 @@ contains
 
   contains
 
-    !> Adds the cells of this kind from a block of cells. The block is halved recursively until it is a single cell, or until the
-    !> outline does not cross the block.
+    !> Adds the cells of a block in which a small disk may touch the outline of the shape. The block is halved recursively until the
+    !> block is a single cell, or until the outline does not cross the block.
     recursive subroutine search_block(low, high)
       integer(int32), intent(in) :: low(2), high(2)  !! first and last column and row
       real(real64) :: lower(2), upper(2), beyond(2), half(2), d(2)
@@ -269,7 +273,8 @@ contains
     end subroutine search_block
   end subroutine find_places
 
-  !> Appends an object to the lists of some cells. Obstacles come first, in their order.
+  !> Appends an obstacle or a big disk to the lists of some cells. In each list obstacles come first, in ascending order of their
+  !> indices.
   pure subroutine enter(self, code, places)
     class(reach_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: code
@@ -301,7 +306,7 @@ contains
     end do
   end subroutine enter
 
-  !> Removes an object from the lists of some cells.
+  !> Removes a big disk from the lists of some cells.
   pure subroutine leave(self, code, places)
     class(reach_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: code
