@@ -1,5 +1,6 @@
-!> Layout of an output file, which follows H5MD 1.1 (https://www.nongnu.org/h5md/h5md.html). This module defines groups and fixed
-!> paths. The names of observables are defined in `observables`, and the names in the event log in `samples`.
+!> Layout of an output file, which follows H5MD 1.1 (https://www.nongnu.org/h5md/h5md.html). This module defines the names of groups
+!> and the fixed paths of datasets. The module `observables` defines the names of observables, and the module `samples` defines the
+!> names in the event log.
 module h5md_layout
   implicit none
   private
@@ -29,9 +30,9 @@ module h5md_layout
   character(len=*), parameter, public :: &
     wall_time = provenance//"@wall_time", &
     saved_at = provenance//"/saved_at", &
-    replaced_file = provenance//"@replaced"       !! identity of the file that the finished output may replace
+    replaced_file = provenance//"@replaced"       !! identity of the existing file that the finished output may replace
 
-  ! H5MD elements: groups that contain the datasets step, time and value
+  ! H5MD elements; each element is a group with the datasets step, time and value
   character(len=*), parameter, public :: &
     position = disks_group//"position", &
     velocity = disks_group//"velocity", &
@@ -41,14 +42,14 @@ module h5md_layout
     image = disks_group//"image", &
     step_of = "/step", time_of = "/time", value_of = "/value"
 
-  ! Datasets that contain the numbers of complete samples
+  ! Paths of the datasets that contain the numbers of complete samples
   character(len=*), parameter, public :: &
     frame_counter = disks_group//"committed", &
     sample_counter = observables_group//"committed", &
     event_counter = events_group//"committed"
 
-  !> Names that a species must not have, because the groups of species and of observables contain objects with these names. The
-  !> names of observables are excluded as well.
+  !> Names that a species must not have, because HDF5 groups that contain the names of species also contain objects with these
+  !> names. A species must not have the name of an observable either.
   character(len=*), parameter, public :: beside_species(3) = [character(len=9) :: "committed", "names", "counts"]
 
 end module h5md_layout

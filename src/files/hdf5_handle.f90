@@ -1,7 +1,7 @@
 !> An open HDF5 file, with procedures that create, open, rename, flush and close the file and that create groups and hard links.
 !>
-!> The first failed call is recorded, and all later calls do nothing. A writer therefore need not test every call: `report` returns
-!> the recorded failure at the end.
+!> The first failure of a call is recorded, and all later calls have no effect. A procedure that writes a file therefore need not
+!> test the result of every call; `report` returns the recorded failure at the end.
 module hdf5_handle
   use, intrinsic :: iso_c_binding, only: c_int
   use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, &
@@ -25,10 +25,10 @@ module hdf5_handle
     character(len=:), allocatable :: path
     character(len=:), allocatable :: final_path   !! path of the completed file, used in messages
     character(len=:), allocatable :: failure      !! the first action that failed, as a phrase that can follow "cannot "
-    logical, private :: has_reason = .false.      !! `failure` includes the reason
+    logical, private :: has_reason = .false.      !! the text `failure` includes the reason for the failure
     integer(hid_t) :: id = -1
-    integer(hid_t) :: links = -1                  !! HDF5 properties of links, which let HDF5 create the missing groups on a path
-    integer(hid_t) :: storage = -1                !! HDF5 properties of datasets: see `prepare`
+    integer(hid_t) :: links = -1                  !! HDF5 properties of links, which make HDF5 create missing groups of a path
+    integer(hid_t) :: storage = -1                !! HDF5 properties of datasets, set by `prepare`
     integer(int64) :: unsaved = 0                 !! amount written since the last flush [bytes]
   contains
     procedure :: create
@@ -44,7 +44,7 @@ module hdf5_handle
   end type hdf5_handle_t
 
   interface
-    !> Removes support for one kind of link from the HDF5 library.
+    !> Disables one kind of link in the HDF5 library.
     function forget_link(kind) result(status) bind(C, name="H5Lunregister")
       import :: c_int
       integer(c_int), value :: kind
@@ -54,12 +54,12 @@ module hdf5_handle
 
 contains
 
-  !> Records the failed action if `status` is an error and no failure has been recorded before.
+  !> Records the failure of an action if `status` indicates an error and no failure has been recorded before.
   subroutine check(self, status, action, reason, needed)
     class(hdf5_handle_t), intent(inout) :: self
     integer, intent(in) :: status                 !! return value of an HDF5 call, which is negative after a failure
     character(len=*), intent(in) :: action        !! the intended action, as a phrase that can follow "cannot "
-    character(len=*), intent(in), optional :: reason    !! reason of the failure, if known
+    character(len=*), intent(in), optional :: reason    !! reason for the failure, if known
     integer(int64), intent(in), optional :: needed  !! disk space that the action needs; default: the amount of unsaved data [bytes]
     integer(hsize_t) :: bytes                     ! size of the file, including space allocated in advance
     integer(int64) :: most
@@ -95,7 +95,7 @@ contains
     error%message = error%message//": "//written(self%unsaved)//" bytes needed, "//written(free)//" bytes free"
   end subroutine report
 
-  !> Version of the HDF5 library, for the provenance of a file.
+  !> Version of the HDF5 library, which is stored among the provenance data of a file.
   function hdf5_version() result(text)
     character(len=:), allocatable :: text
     integer :: major, minor, release, status
@@ -104,10 +104,10 @@ contains
     text = written(major)//"."//written(minor)//"."//written(release)
   end function hdf5_version
 
-  !> Initialises the HDF5 library, once per process, because each initialisation leaks memory. The library is set up to print no
-  !> errors and to install no exit handler. The exit handler is not needed, because the program closes all files before it exits. If
-  !> a file cannot be closed because the disk is full, the exit handler would crash. External links are disabled, because they could
-  !> refer to devices or to files of other users.
+  !> Initialises the HDF5 library. The library is initialised only once per process, because each initialisation leaks memory. The
+  !> settings prevent HDF5 from printing errors and from installing an exit handler. The exit handler is not needed, because the
+  !> program closes all files before it exits, and it would crash if a file could not be closed on a full disk. External links are
+  !> disabled, because they could refer to devices or to files of other users.
   subroutine start_library(status)
     integer, intent(out) :: status
     logical, save :: started = .false.
@@ -123,14 +123,14 @@ contains
     started = status >= 0
   end subroutine start_library
 
-  !> Sets the properties of a file. The file locks of HDF5 are disabled: they would prevent other programs from reading the file,
-  !> and the lock of a reader could stop a run. The storage of a dataset is allocated when the dataset is created. A dataset is not
-  !> filled with a value and has no time stamps, so that equal runs write equal bytes. Small datasets do not share a block of
-  !> storage. HDF5 would release such a block in two steps, and between these steps the header of the file would contain a wrong
+  !> Sets the properties of a file. The file locks of HDF5 are disabled, because they would prevent other programs from reading the
+  !> file, and the lock of a reader could stop a run. The storage of a dataset is allocated when the dataset is created. Datasets
+  !> are not filled with a default value and have no time stamps, so that equal runs write equal bytes. Small datasets do not share
+  !> a block of storage, because HDF5 releases a shared block in two steps, between which the header of the file contains a wrong
   !> length.
   subroutine prepare(self, access, status)
     class(hdf5_handle_t), intent(inout) :: self
-    integer(hid_t), intent(out) :: access         !! HDF5 properties for access to the file
+    integer(hid_t), intent(out) :: access         !! HDF5 properties of the access to the file
     integer, intent(out) :: status
 
     call start_library(status)
@@ -185,7 +185,7 @@ contains
     call h5pclose_f(access, closed)
   end subroutine open_file
 
-  !> Renames the open file to its final path and replaces the file that has this path.
+  !> Renames the open file to its final path. A file that already has this path is replaced.
   subroutine rename_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     logical :: moved
@@ -196,7 +196,7 @@ contains
     if (moved) self%path = self%final_path
   end subroutine rename_file
 
-  !> Passes all written data to the operating system, so that the data are not lost if the program is killed.
+  !> Passes all written data to the operating system, so that no data are lost if the program is killed.
   subroutine flush_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     integer :: status
@@ -207,8 +207,8 @@ contains
     if (status >= 0) self%unsaved = 0
   end subroutine flush_file
 
-  !> Closes the file if it is open, and frees the HDF5 property lists, which exist even if the file could not be opened. A recorded
-  !> failure can still be reported.
+  !> Closes the file if the file is open, and frees the HDF5 property lists, which exist even if the file could not be opened. After
+  !> this call, `report` still returns a recorded failure.
   subroutine close_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     integer :: status
@@ -224,7 +224,7 @@ contains
     self%id = -1
   end subroutine close_file
 
-  !> Closes the file and deletes it. A recorded failure can still be reported.
+  !> Closes the file and deletes the file. After this call, `report` still returns a recorded failure.
   subroutine discard(self)
     class(hdf5_handle_t), intent(inout) :: self
 
@@ -232,7 +232,7 @@ contains
     call remove_file(self%path)
   end subroutine discard
 
-  !> Creates a group and the missing groups on its path.
+  !> Creates a group and all missing groups on the path of the group.
   subroutine make_group(self, name)
     class(hdf5_handle_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -245,7 +245,7 @@ contains
     if (status >= 0) call h5gclose_f(group, closed)
   end subroutine make_group
 
-  !> Adds a hard link to an object.
+  !> Adds a second name (a hard link) for an object in the file.
   subroutine link(self, name, second_name)
     class(hdf5_handle_t), intent(inout) :: self
     character(len=*), intent(in) :: name, second_name

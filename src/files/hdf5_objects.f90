@@ -1,6 +1,6 @@
 !> Reads and writes attributes and datasets, or parts of datasets, in an open HDF5 file.
 !>
-!> A name is a path, `group/dataset`, or with @ an attribute, `group@name`.
+!> A name of the form `group/dataset` is the path of a dataset; a name of the form `group@name` denotes an attribute of a group.
 module hdf5_objects
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use hdf5, only: haddr_t, hid_t, hsize_t, size_t, h5_integer_kind, h5kind_to_type, h5ldelete_f, &
@@ -18,10 +18,10 @@ module hdf5_objects
   private
   public :: hdf5_file_t, scalar
 
-  integer, parameter :: scalar(0) = [integer ::]  !! extents of a single value
+  integer, parameter :: scalar(0) = [integer ::]  !! extents of a dataset with a single value
 
-  ! Limits on the texts in a file. No output of this program exceeds these limits. The limits are needed because the sizes in a
-  ! damaged file may be wrong.
+  ! Largest lengths of texts in a file. The limits are needed because a damaged file may contain wrong lengths. No output of this
+  ! program exceeds the limits.
   integer(int64), parameter :: most_texts = 10000
   integer(size_t), parameter :: longest_text = 67108864      !! [bytes]
 
@@ -42,10 +42,10 @@ module hdf5_objects
 
 contains
 
-  !> Removes the dataset that was created last. The file then ends at the end of the values of the dataset `before`. The file can be
-  !> opened at every moment during this procedure, because it has three steps. First the link to the dataset is deleted; the dataset
-  !> is still open and its storage is therefore not freed. Then the new length is written into the header of the file (HDF5 itself
-  !> would write it only after the truncation of the file). Finally the dataset is closed, which frees its storage.
+  !> Removes the dataset that was created last, so that the file ends after the values of the dataset `before`. The removal has
+  !> three steps, so that the file is valid at every moment. First the link to the dataset is deleted; the storage is not freed yet,
+  !> because the dataset is still open. Then the new length of the file is written into its header, because HDF5 would write the
+  !> length only after the truncation of the file. Finally the dataset is closed, which frees the storage.
   subroutine remove_last(self, name, before)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, before
@@ -68,7 +68,7 @@ contains
     call self%flush()
     if (allocated(self%failure)) return
     call write_word(self%path, header_end, int(offset + bytes, int64), done)
-    if (done) call h5dclose_f(dataset, closed)     ! otherwise the dataset stays open, because closing it would truncate the file
+    if (done) call h5dclose_f(dataset, closed)     ! after a failure the dataset stays open: closing it would truncate the file
     call self%check(merge(0, -1, done), "remove "//name)
   end subroutine remove_last
 
@@ -89,15 +89,15 @@ contains
     call h5sclose_f(space, closed)
   end subroutine make_dataset
 
-  !> Opens a dataset whose values are stored completely in this file. A dataset whose values are in other files is refused, because
-  !> these could be devices or files of other users. The size of the storage is checked, because HDF5 1.10 reads beyond the end of a
-  !> damaged dataset.
+  !> Opens a dataset whose values are all stored in this file. Datasets with values in other files are refused, because the other
+  !> files could be devices or belong to other users. The size of the storage is checked, because HDF5 1.10 reads beyond the end of
+  !> a damaged dataset.
   subroutine open_dataset(self, name, dataset, extents, status, like, bytes_each)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(hid_t), intent(out) :: dataset
     integer(hsize_t), allocatable, intent(out) :: extents(:)
-    integer, intent(out) :: status                !! negative if there is no such dataset
+    integer, intent(out) :: status                !! negative if the dataset does not exist or cannot be used
     integer(hid_t), intent(in), optional :: like  !! an HDF5 type; the dataset must be of the same class: real, integer or text
     integer, intent(out), optional :: bytes_each  !! size of a value
     integer(hid_t) :: creation, space, type
@@ -117,7 +117,7 @@ contains
     if (status >= 0) call h5dget_space_f(dataset, space, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
     call h5sget_simple_extent_npoints_f(space, n, closed)
-    ! For a dataset without values HDF5 reports a failure here and for the storage size.
+    ! HDF5 reports a failure for a dataset without values, here and for the storage size.
     if (closed < 0) n = 0
     if (status >= 0) call h5sget_simple_extent_dims_f(space, shape, most, status)
     call h5sclose_f(space, closed)
@@ -135,15 +135,15 @@ contains
     end if
     call h5tclose_f(type, closed)
     if (status >= 0) extents = shape(:rank)
-    if (status >= 0 .and. rank == 0 .and. n == 0) extents = [n]           ! the dataset was created without values
+    if (status >= 0 .and. rank == 0 .and. n == 0) extents = [n]           ! a dataset that was created without values
     if (status < 0) call h5dclose_f(dataset, closed)
   end subroutine open_dataset
 
-  !> Shape of a dataset; [-1] if it does not exist.
+  !> Shape of a dataset; [-1] if the dataset does not exist.
   function extents(self, name, bytes) result(extent)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
-    integer, intent(out), optional :: bytes       !! size of a value in the file
+    integer, intent(out), optional :: bytes       !! size of one value in the file [bytes]
     integer(hsize_t), allocatable :: extent(:)
     integer(hid_t) :: dataset
     integer :: status
@@ -154,8 +154,8 @@ contains
     if (status >= 0) call h5dclose_f(dataset, status)
   end function extents
 
-  !> Number of values in a dataset. The result is -1 if the dataset does not exist, or if its stated size exceeds the largest size
-  !> of a file.
+  !> Number of values in a dataset. The result is -1 if the dataset does not exist or claims to be larger than the largest possible
+  !> file.
   function length(self, name) result(n)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -173,12 +173,13 @@ contains
     if (product(real(extents, real64)) < real(huge(n), real64)) n = product(extents)
   end function product_of
 
-  !> Writes a part of a dataset from a memory address, or reads it to a memory address.
+  !> Transfers a part of a dataset: writes the values at a memory address to the file, or reads values from the file to a memory
+  !> address.
   subroutine transfer(self, name, first, counts, type, address, writing)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
-    integer(int64), intent(in) :: first           !! first index along the last dimension, which starts at 1
-    !> Number of values along each dimension; only the last dimension may be transferred in part.
+    integer(int64), intent(in) :: first           !! first index along the last dimension, starting at 1
+    !> Number of values along each dimension. The part may be smaller than the dataset only along the last dimension.
     integer(int64), intent(in) :: counts(:)
     integer(hid_t), intent(in) :: type            !! HDF5 type in memory
     type(c_ptr), intent(in) :: address
@@ -205,7 +206,7 @@ contains
     call self%check(status, trim(merge("write   ", "be read:", writing))//" "//name)
     call h5sclose_f(in_file, closed)
     call h5sclose_f(in_memory, closed)
-    call h5dclose_f(dataset, status)              ! closing the dataset also writes buffered values
+    call h5dclose_f(dataset, status)              ! this call also writes buffered values to the file
     call self%check(status, "write "//name)
   end subroutine transfer
 
@@ -269,7 +270,7 @@ contains
     call h5tclose_f(string, closed)
   end subroutine put_texts
 
-  !> The HDF5 type of texts with a fixed length, padded with blanks.
+  !> Creates the HDF5 type of texts that have a fixed length and are padded with blanks.
   function string_of(length) result(string)
     integer, intent(in) :: length
     integer(hid_t) :: string
@@ -279,8 +280,8 @@ contains
     call h5tset_size_f(string, int(length, size_t), status)
   end function string_of
 
-  !> Writes a dataset or an attribute, which is created if necessary. An existing dataset or attribute must have the same number of
-  !> values.
+  !> Writes a dataset or an attribute. A missing dataset or attribute is created; an existing dataset or attribute must have the
+  !> same number of values.
   subroutine put_values(self, name, extents, stored_as, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -307,11 +308,11 @@ contains
     if (product_of(there) /= product(int(extents, int64))) call self%check(-1, "write "//name)
     if (.not. allocated(self%failure)) call h5dwrite_f(dataset, in_memory, address, status)
     call self%check(status, "write "//name)
-    call h5dclose_f(dataset, status)              ! closing the dataset also writes buffered values
+    call h5dclose_f(dataset, status)              ! this call also writes buffered values to the file
     call self%check(status, "write "//name)
   end subroutine put_values
 
-  !> Writes an attribute of an existing object. The attribute is created if necessary.
+  !> Writes an attribute of an existing object. A missing attribute is created.
   subroutine put_attribute(self, name, extents, stored_as, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -382,7 +383,7 @@ contains
       call h5oclose_f(object, closed)
     else
       if (in_memory == h5t_native_double) then
-        call self%open_dataset(name, dataset, extents, status)      ! integers are accepted as reals
+        call self%open_dataset(name, dataset, extents, status)      ! integers are converted to reals
       else
         call self%open_dataset(name, dataset, extents, status, like=in_memory)
       end if

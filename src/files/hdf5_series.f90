@@ -1,6 +1,7 @@
-!> Datasets to which samples are added along the last dimension. The whole storage of a dataset is allocated when the dataset is
-!> created, although the file system uses disk space only for the part that has been written. Later only values are written. The
-!> file is therefore consistent at any time, for a reader and after the program has been killed.
+!> Series: datasets to which samples are added along the last dimension. The whole storage of a dataset is allocated when the
+!> dataset is created, although the file system uses disk space only for the part that has been written. After the creation only
+!> values are written. The file is therefore consistent at any time, for other programs that read the file and after the program has
+!> been killed.
 module hdf5_series
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8, real32
@@ -13,12 +14,12 @@ module hdf5_series
   private
   public :: series_t, double_precision, single_precision, short_integer, long_integer
 
-  !> Types in which values are stored.
+  !> Types of stored values.
   integer, parameter :: double_precision = 1, single_precision = 2, short_integer = 3, long_integer = 4
   integer, parameter :: bytes_of(4) = [8, 4, 4, 8]
   integer(int64), parameter :: copied_at_once = 1048576     !! size of the buffer for copying [bytes]
 
-  !> One series. The name, the storage type and the shape are set first. Then the series is created in a new file, or located in an
+  !> One series. After the name, the storage type and the shape have been set, the series is created in a new file or located in an
   !> existing file.
   type :: series_t
     character(len=96) :: name = ""                !! path of the dataset
@@ -48,7 +49,7 @@ contains
     width = product(self%shape)
   end function width
 
-  !> Whether all values are within the range of the storage type.
+  !> Whether the storage type can represent all given values.
   pure function holds(self, values) result(yes)
     class(series_t), intent(in) :: self
     real(real64), intent(in) :: values(:, :)      !! (width,samples)
@@ -66,7 +67,7 @@ contains
     bytes = int(bytes_of(self%storage), int64)*self%width()
   end function bytes_per_sample
 
-  !> The HDF5 type of the values in the file.
+  !> HDF5 type of the values in the file.
   function storage_type(self) result(type)
     class(series_t), intent(in) :: self
     integer(hid_t) :: type, types(4)
@@ -75,7 +76,7 @@ contains
     type = types(self%storage)
   end function storage_type
 
-  !> Extents of a dataset with `count` samples.
+  !> Shape of a dataset with `count` samples.
   pure function extents(self, count)
     class(series_t), intent(in) :: self
     integer(int64), intent(in) :: count
@@ -84,7 +85,7 @@ contains
     extents = [int(self%shape(:self%rank), int64), count]
   end function extents
 
-  !> Creates the series with space for `capacity` samples.
+  !> Creates the series in a file, with space for `capacity` samples.
   subroutine make(self, file, capacity)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -110,12 +111,12 @@ contains
     call file%check(merge(0, -1, there), "be read: there is no "//trim(self%name)//" of the expected shape")
   end subroutine find
 
-  !> Stores samples after their conversion to the type in the file. The conversion to single precision by HDF5 itself would take ten
-  !> times as long. A single sample in double precision is written without a copy, because it may be large.
+  !> Converts samples to the type in the file and stores the samples. HDF5 could convert the values to single precision, too, but
+  !> ten times more slowly. A single sample in double precision is written without a copy, because a sample may be large.
   subroutine store(self, file, first, values)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: first           !! number of the first of these samples; the numbers start at 1
+    integer(int64), intent(in) :: first           !! number of the first sample, starting at 1
     real(real64), intent(in), target :: values(:, :)     !! (width,samples)
     real(real64), allocatable, target :: doubles(:, :)
     real(real32), allocatable, target :: singles(:, :)
@@ -151,11 +152,11 @@ contains
     call file%transfer(trim(self%name), first, self%extents(count), type, address, writing=.true.)
   end subroutine store
 
-  !> Loads one sample in double precision.
+  !> Reads one sample and converts its values to double precision.
   subroutine load(self, file, number, values)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: number          !! number of the sample; the numbers start at 1
+    integer(int64), intent(in) :: number          !! number of the sample, starting at 1
     real(real64), intent(inout), target :: values(*)
 
     if (number < 1 .or. number > self%capacity) call file%check(-1, "be read: "//trim(self%name)//" has no sample " &

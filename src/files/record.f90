@@ -1,5 +1,5 @@
-!> A sequence of numbers that is stored in one dataset of an open file, followed by a checksum. Depending on the mode, the same
-!> calls count, write or read the numbers, so that the order of the numbers is always the same.
+!> A record: a sequence of numbers that is stored, together with a checksum, in one dataset of an open file. The same sequence of
+!> calls counts, writes or reads the numbers, depending on the mode; the order of the numbers therefore always agrees.
 module record
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_int, c_int8_t, c_loc, c_long, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8
@@ -14,7 +14,7 @@ module record
   integer, parameter :: counting = 0, writing = 1, reading = 2
   integer(int64), parameter :: bytes_of_word = 8
 
-  !> A sequence of numbers, each a word of 64 bits.
+  !> A record: a sequence of numbers of 64 bits.
   type :: record_t
     character(len=:), allocatable :: name         !! path of the dataset
     integer :: mode = counting
@@ -30,7 +30,7 @@ module record
   end type record_t
 
   interface
-    !> CRC-32 from zlib, which is a dependency of HDF5.
+    !> Calculates the CRC-32 checksum with the library zlib, on which HDF5 depends.
     pure function crc32(crc, bytes, length) bind(C) result(continued)
       import :: c_int, c_int8_t, c_long
       integer(c_long), value :: crc                   !! checksum of the preceding bytes; 0 if there are no preceding bytes
@@ -50,7 +50,7 @@ contains
     write (text, "(z8.8)") crc32(0_c_long, bytes, size(bytes, kind=c_int))
   end function checksum
 
-  !> Creates the dataset of a record whose words have been counted.
+  !> Creates the dataset for a record whose numbers have been counted.
   subroutine make(self, file)
     class(record_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -60,7 +60,7 @@ contains
     call words%make(file, self%words)
   end subroutine make
 
-  !> Restarts the record, in order to count, write or read it.
+  !> Returns to the beginning of the record, in order to count, write or read the numbers.
   subroutine begin(self, mode)
     class(record_t), intent(inout) :: self
     integer, intent(in) :: mode
@@ -106,7 +106,8 @@ contains
     call self%pass(file, c_loc(values), size(values))
   end subroutine exchange_longs
 
-  !> Writes the checksum at the end of a record, or reads and compares it. A difference is recorded as a failure of the file.
+  !> Writes the checksum at the end of a record, or reads the stored checksum and compares it with the checksum of the numbers. If
+  !> the two checksums differ, a failure of the file is recorded.
   subroutine seal(self, file)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -118,8 +119,8 @@ contains
     if (there /= crc) call file%check(-1, "be read: the checksum of "//self%name//" is wrong")
   end subroutine seal
 
-  !> Counts n words, or transfers n words from or to a memory address. The words are numbers, or components of derived types without
-  !> padding.
+  !> Counts n words of 64 bits, writes n words from a memory address, or reads n words to a memory address. The words are numbers,
+  !> or components of derived types without padding.
   subroutine pass(self, file, address, n)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file

@@ -1,5 +1,6 @@
-!> The files of a run, whose names follow from the path of the output, OUT.h5. This module also contains the rules for replacing and
-!> removing files: only files that a run has written are replaced or removed, and files with results only with `--force`.
+!> Names of the files of a run, which are derived from the path of the output, OUT.h5. The module also contains the rules for
+!> replacing and removing files. Only files that a run has written may be replaced or removed. Files that contain results may be
+!> replaced only with the option `--force`.
 module run_files
   use errors, only: error_t, exit_files, exit_usage, fail
   use kinds, only: int64
@@ -9,16 +10,16 @@ module run_files
   private
   public :: output_of, is_file, source_of, check_name, check_places, check_replaced, take_final_name
 
-  ! Endings of the names of these files
+  ! Endings that are appended to the name of the output
   character(len=*), parameter, public :: &
-    unfinished = ".part", &                       !! ending of the output while the run writes it
+    unfinished = ".part", &                       !! ending of the output during the run
     unfinished_new = ".part_new", &               !! ending of a new unfinished output until its constant data are written
     lock = ".lock"                                !! ending of the lock file that prevents other runs from writing to this output
   character(len=9), parameter :: endings(*) = [character(len=9) :: "", unfinished, unfinished_new, lock]
 
 contains
 
-  !> Path of the output to which an auxiliary file of this name belongs; empty if the name does not belong to an auxiliary file.
+  !> Path of the output to which an auxiliary file belongs; empty if the path is not the path of an auxiliary file.
   pure function output_of(path) result(output)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: output
@@ -49,7 +50,7 @@ contains
     if (is_file(output//unfinished)) path = output//unfinished
   end function source_of
 
-  !> Refuses a name for the output that is reserved for an auxiliary file of another run.
+  !> Reports an error if the name of the output is reserved for an auxiliary file of another run.
   pure subroutine check_name(output, error)
     character(len=*), intent(in) :: output        !! path of the output
     type(error_t), allocatable, intent(out) :: error
@@ -58,7 +59,7 @@ contains
       //"for files of the run with the output "//shown(output_of(output))//"; choose another name")
   end subroutine check_name
 
-  !> Reports an error if a file that no run has written exists at one of the paths to which the run will write.
+  !> Reports an error if the run would write to the path of an existing file that no run has written.
   subroutine check_places(output, error)
     character(len=*), intent(in) :: output        !! path of the output
     type(error_t), allocatable, intent(out) :: error
@@ -79,8 +80,8 @@ contains
     end do
   end subroutine check_places
 
-  !> Whether a file begins with the first bytes of an HDF5 file, or is empty or contains only zeros. The last two cases occur if a
-  !> run is killed early.
+  !> Whether a file begins with the first bytes of an HDF5 file, is empty, or contains only zeros. Empty files and files of zeros
+  !> remain when a run is killed shortly after its start.
   function begins_like_a_run(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes

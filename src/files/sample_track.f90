@@ -1,9 +1,9 @@
-!> A track: series to which samples are added together, for frames, observables, or events. A counter in the file contains the
-!> number of complete samples. Because the counter is written after the values have been flushed, readers and resumed runs can rely
-!> on it.
+!> A track: a set of series to which samples are added together. The frames, the observables and the event log are tracks. A counter
+!> in the file contains the number of complete samples of a track. The counter is written after the values have been flushed;
+!> readers and resumed runs can therefore rely on the counter.
 !>
-!> A sample is an array of reals that contains the values of all series, one series after another. Integers are exact up to 2**53.
-!> Small samples are buffered, because one HDF5 call costs as much time as writing a hundred kilobytes.
+!> A sample is an array of reals that contains the values of all series, one series after another. The array represents integers
+!> exactly up to 2**53. Small samples are buffered, because one HDF5 call takes as much time as writing a hundred kilobytes.
 module sample_track
   use kinds, only: int64, real64
   use hdf5_objects, only: hdf5_file_t, scalar
@@ -21,10 +21,10 @@ module sample_track
   integer(int64), parameter :: growth = 4               !! factor by which the capacity increases when the file is full
 
   type :: track_t
-    !> The series. If all series have the same step and time, the series of step and time are the first two.
+    !> The series of the track. If a common step and time belong to all series, the first two series are the step and the time.
     type(series_t), allocatable :: series(:)
     character(len=:), allocatable :: counter            !! path of the counter dataset
-    integer(int64) :: planned = 0                       !! number of samples of the whole run; 0 if it is unknown
+    integer(int64) :: planned = 0                       !! number of samples of the whole run; 0 if unknown
     integer(int64) :: capacity = 0                      !! number of samples that fit into the file
     integer(int64), private :: committed = 0            !! number of complete samples in the file
     integer(int64), private :: waiting = 0              !! number of samples in the buffer
@@ -94,12 +94,12 @@ contains
     end do
   end function enlarged
 
-  !> Switches series to 64-bit integers if the given samples contain integers that are too large for 32 bits. The change takes
-  !> effect in the next file.
+  !> Changes the type of series to 64-bit integers if the given samples contain integers that are too large for 32 bits. The new
+  !> type takes effect when the next file is created.
   subroutine widen(self, samples, widened)
     class(track_t), intent(inout) :: self
     real(real64), intent(in) :: samples(:, :)           !! (width,count)
-    logical, intent(out) :: widened                     !! whether any series has changed
+    logical, intent(out) :: widened                     !! whether the type of any series has changed
     integer :: k, first
 
     widened = .false.
@@ -130,8 +130,8 @@ contains
     call self%put_counter(file)
   end subroutine make
 
-  !> Creates links to step and time of the first element in all other elements, as H5MD prescribes for elements that are sampled
-  !> together.
+  !> Creates links from all other H5MD elements to the step and time of the first element, as H5MD prescribes for elements that are
+  !> sampled together.
   subroutine link_step_and_time(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -168,7 +168,8 @@ contains
     self%committed = count
   end subroutine resume
 
-  !> Writes the number of complete samples. After `resume`, readers then ignore the samples after the first `count`.
+  !> Writes the number of complete samples to the file. A call after `resume` makes readers ignore samples that were written after
+  !> the checkpoint.
   subroutine put_counter(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -176,7 +177,7 @@ contains
     call file%put(self%counter, scalar, [self%committed])
   end subroutine put_counter
 
-  !> Creates the series in a new file with another capacity and copies all written samples.
+  !> Creates the series with a different capacity in a new file and copies all samples that have been written.
   subroutine move(self, file, source, capacity)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file, source
@@ -189,7 +190,7 @@ contains
     end do
   end subroutine move
 
-  !> Checks that the file contains all samples and no unused space. Otherwise a failure of the file is recorded.
+  !> Checks that the file contains all samples and no unused space. If the check fails, a failure of the file is recorded.
   subroutine verify(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -207,8 +208,8 @@ contains
     end do
   end subroutine verify
 
-  !> Appends samples, for which the file must have space. When the number of buffered samples reaches the size of a batch, they are
-  !> committed.
+  !> Appends samples, for which the file must have space. When the number of buffered samples reaches the size of a batch, the
+  !> buffered samples are committed (written to the file).
   subroutine append(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -228,7 +229,7 @@ contains
     if (self%waiting == self%batch()) call self%flush(file, 0.0_real64)
   end subroutine append
 
-  !> Commits the buffered samples if the oldest of them has waited for at least `least_wait`.
+  !> Commits the buffered samples if the oldest buffered sample has waited for at least `least_wait`.
   subroutine flush_buffer(self, file, least_wait)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -240,7 +241,7 @@ contains
     self%waiting = 0
   end subroutine flush_buffer
 
-  !> Stores samples after the complete samples, flushes the file, and then increases the counter.
+  !> Writes samples to the file after the samples that are already complete, flushes the file, and then increases the counter.
   subroutine commit(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file

@@ -1,4 +1,5 @@
-!> Tables of numbers in HDF5 files of other programs. Each column, or group of adjacent columns, is a dataset at the top level.
+!> Reads tables of numbers from HDF5 files that other programs have written. Each column of a table, or group of adjacent columns,
+!> is a dataset at the top level of the file.
 module table_file
   use kinds, only: real64
   use errors, only: error_t
@@ -8,7 +9,7 @@ module table_file
 
   interface
     !> Reads a table. The submodule `table_in_hdf5` implements this procedure. The submodule `table_without_hdf5` only reports that
-    !> such files cannot be read. The linker selects one of the two.
+    !> such files cannot be read. The linker selects one of the two submodules.
     module subroutine read_table(path, names, widths, most, table, error)
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: names(:)                 !! names of the datasets

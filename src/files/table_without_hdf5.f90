@@ -1,4 +1,4 @@
-!> Reports that tables in HDF5 files cannot be read. This submodule is used in a library that is linked without HDF5.
+!> Reports that tables in HDF5 files cannot be read. This submodule is part of libricochet.so, the library without HDF5.
 submodule(table_file) table_without_hdf5
   use errors, only: exit_usage, fail
   implicit none
