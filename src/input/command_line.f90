@@ -1,4 +1,4 @@
-!> The command line: options, file names of any length, and the answers to --help and other questions.
+!> Reads the command line, with file names of any length, and prints the answers to --help and similar options.
 module command_line
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use build_info, only: build_flags, git_commit
@@ -16,7 +16,7 @@ module command_line
   type :: command_t
     !> Question to be answered: help, version, print-defaults, print-variables or explain; empty for a run.
     character(len=:), allocatable :: question
-    character(len=:), allocatable :: topic         !! variable or word of --explain
+    character(len=:), allocatable :: topic         !! variable or word to be explained by --explain
     character(len=:), allocatable :: input         !! path of the input file
     character(len=:), allocatable :: output        !! path of the output file
     type(text_t), allocatable :: overrides(:)      !! GROUP.VARIABLE=VALUE of each --set
@@ -48,7 +48,8 @@ contains
     call parse_arguments(arguments, command, error)
   end subroutine read_command_line
 
-  !> Converts the arguments to a command, or reports the first invalid one. Arguments after a question are not read.
+  !> Converts the arguments to a command, or reports the first invalid argument. Arguments after a question such as --help are not
+  !> read.
   subroutine parse_arguments(arguments, command, error)
     type(text_t), intent(in) :: arguments(:)
     type(command_t), intent(out) :: command
@@ -87,14 +88,14 @@ contains
 
   contains
 
-    !> Reports wrong usage. Only the first report is kept.
+    !> Reports an error in the command line. Only the first error is kept.
     subroutine refuse(why)
       character(len=*), intent(in) :: why
 
       if (.not. allocated(error)) call fail(error, exit_usage, why)
     end subroutine refuse
 
-    !> Reads the option in argument k, and the next argument if it is the value of the option.
+    !> Reads the option in argument k, and also argument k+1 if this argument is the value of the option.
     subroutine take_option(name)
       character(len=*), intent(in) :: name
       type(text_t) :: override
@@ -132,7 +133,7 @@ contains
       end select
     end subroutine take_option
 
-    !> Reads the value of an option, which is the text after `=` or the next argument.
+    !> Reads the value of an option: the text after `=` or, without `=`, the next argument.
     subroutine take_value(name, value)
       character(len=*), intent(in) :: name
       character(len=:), allocatable, intent(out) :: value
@@ -145,7 +146,7 @@ contains
       if (value == "") call refuse("option "//name//" needs a value")
     end subroutine take_value
 
-    !> Reports an error for `--set NAME VALUE`, because the value would be interpreted as a file name.
+    !> Reports an error for `--set NAME VALUE` (without `=`), because VALUE would be interpreted as a file name.
     subroutine expect_assignment(text)
       character(len=*), intent(in) :: text
 
@@ -156,7 +157,7 @@ contains
       end associate
     end subroutine expect_assignment
 
-    !> Reports an unknown option, which may be misspelt or a file name.
+    !> Reports an unknown option. The message suggests a known option or a file name that the user may have meant.
     subroutine report_unknown(name)
       character(len=*), intent(in) :: name
       character(len=:), allocatable :: meant
@@ -181,7 +182,7 @@ contains
     output = "runs/"//output//".h5"
   end function default_output
 
-  !> Prints the answer to `command%question`.
+  !> Prints the answer to the question in `command%question`.
   subroutine answer(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
@@ -204,7 +205,7 @@ contains
     call print_text(text, error)
   end subroutine answer
 
-  !> Answer to `--version`: all data that a bug report should contain.
+  !> Answer to `--version`, which contains all data that a bug report needs.
   function version_text() result(text)
     character(len=:), allocatable :: text
 
@@ -213,7 +214,7 @@ contains
       "threads:  "//trim(merge("set by run.threads", "one, no OpenMP    ", index(build_flags, "-fopenmp") > 0))
   end function version_text
 
-  !> Answer to `--help`: one screen of text.
+  !> Answer to `--help`, which fits on one screen.
   pure function help_text() result(text)
     character(len=:), allocatable :: text
 

@@ -1,5 +1,5 @@
-!> Values of the input variables as a run uses them, by group and name. The output file lists all of them; `settings` contains the
-!> same values as typed data.
+!> Values of the input variables as a run uses them, ordered by group and name. The output file lists all these values; the module
+!> `settings` contains the same values as typed data.
 module input_groups
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
@@ -12,16 +12,16 @@ module input_groups
   integer, parameter :: text_length = 512      !! longest text value, in bytes
   integer, parameter, public :: most_written = 100      !! largest number of values in an assignment; longer lists are truncated
 
-  !> One variable. Real numbers are stored in `reals`, and all other values in `texts`. The text of an integer consists of its
-  !> digits, so that all 64 bits are represented. The text of a logical is `.true.` or `.false.`. If the variable has no value,
-  !> neither component is allocated.
+  !> The value of one variable. Real numbers are stored in `reals`, and all other values in `texts`. An integer is stored as its
+  !> decimal digits, which represent all 64 bits. A logical value is stored as `.true.` or `.false.`. If the variable has no value,
+  !> neither `reals` nor `texts` is allocated.
   type :: value_t
-    integer :: row = 0                         !! row in the table of variables
+    integer :: row = 0                         !! row of the variable in the table of variables
     character(len=name_length) :: name = ""
     character(len=8) :: kind = ""              !! "integer", "real", "logical" or "text"
     logical :: given = .false.                 !! the user has set the variable
     logical :: faulty = .false.                !! the user has set an invalid value, which has been reported
-    integer :: line = 0                        !! line of the file in which the variable is set, or -k for override k
+    integer :: line = 0                        !! line of the input file that sets the variable, or -k for override number k
     integer :: elements = 0                    !! bit mask: bit i is 1 if element i has been set by name(i) = value
     real(real64), allocatable :: reals(:)
     character(len=text_length), allocatable :: texts(:)
@@ -38,9 +38,9 @@ module input_groups
   type :: group_t
     character(len=8) :: name = ""
     character(len=text_length) :: instance = ""  !! `name` of an obstacle or species; otherwise blank
-    integer :: number = 0                      !! number among the groups of the same name, which starts at 1
+    integer :: number = 0                      !! number among the groups of the same name, starting at 1
     integer :: line = 0                        !! first line of the group in the file; 0 if the group is not in the file
-    integer :: first = 0, last = 0             !! positions of the first character (&) and the last character (/) in the text
+    integer :: first = 0, last = 0             !! positions of the first character (&) and the last character (/) of the group
     type(value_t), allocatable :: values(:)
   contains
     procedure :: integer_of, real_of, reals_of, text_of
@@ -61,7 +61,7 @@ contains
     is_set = allocated(self%reals) .or. allocated(self%texts)
   end function is_set
 
-  !> Number of values; 0 if the variable has none.
+  !> Number of values; 0 if the variable has no value.
   pure function length(self)
     class(value_t), intent(in) :: self
     integer :: length
@@ -84,7 +84,7 @@ contains
     end if
   end function integers
 
-  !> Whether all variables have the same values in the groups of two inputs. Default values are included.
+  !> Whether all variables have the same values in two inputs. Default values are compared, too.
   pure function same_values(one, other) result(yes)
     type(group_t), intent(in) :: one(:), other(:)  !! groups of the two inputs, in the same order
     logical :: yes
@@ -134,7 +134,7 @@ contains
     end associate
   end function integer_of
 
-  !> All values of a variable of kind "real"; an empty array if the variable has no value.
+  !> Values of a variable of kind "real"; an empty array if the variable has no value.
   pure function reals_of(self, name) result(numbers)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -187,7 +187,7 @@ contains
     given = self%values(row_of(self%name, name))%given
   end function given
 
-  !> Whether a variable has been set to an invalid value, which has been reported.
+  !> Whether the user has set a variable to an invalid value, which has been reported.
   pure function faulty(self, name)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -196,7 +196,7 @@ contains
     faulty = self%values(row_of(self%name, name))%faulty
   end function faulty
 
-  !> Sets a single value that follows from other variables.
+  !> Stores the value of a variable, calculated from other variables, as a text.
   pure subroutine put_text(self, name, text)
     class(group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -209,7 +209,7 @@ contains
     end associate
   end subroutine put_text
 
-  !> Sets values that follow from other variables.
+  !> Stores real values of a variable that were calculated from other variables.
   pure subroutine put_reals(self, name, numbers)
     class(group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -242,11 +242,12 @@ contains
     end associate
   end subroutine demand
 
-  !> Sets choices that the user has not given. A choice follows from a given variable that is used only with this choice. If several
-  !> such variables are given, the last one in the table determines the choice.
+  !> Sets choices (such as `placement = 'grid'`) that the user has not given but that follow from other variables. If the user has
+  !> given a variable that has an effect only with one choice (such as `grid`), this choice is set. If several given variables
+  !> determine a choice, the last variable in the table takes precedence.
   pure subroutine infer_choices(self)
     class(group_t), intent(inout) :: self
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! words of `goes_with`: see `variable_rows`
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! words of the condition `goes_with`
     integer :: k
 
     do k = 1, size(self%values)
@@ -256,13 +257,13 @@ contains
     end do
   end subroutine infer_choices
 
-  !> Checks the variables that depend on choices. A choice may require a variable. If a variable has no effect with the present
-  !> choice, its value is removed, and a given value is reported as an error, because no part of an input may be ignored silently.
-  !> Mutually exclusive variables are reported as well.
+  !> Checks the variables that have an effect only with certain choices. A variable that a choice requires must be given. The value
+  !> of a variable that has no effect with the present choice is removed. If the user has given such a value, an error is reported,
+  !> because no part of an input may be ignored silently. Mutually exclusive variables are also reported.
   pure subroutine check_choices(self, problems)
     class(group_t), intent(inout) :: self
     type(problem_list_t), intent(inout) :: problems
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! words of `goes_with`: see `variable_rows`
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! words of the condition `goes_with`
     character(len=len(table%goes_with)) :: word
     integer :: j, k
 
@@ -288,11 +289,11 @@ contains
     end do
   end subroutine check_choices
 
-  !> Indices of the first and the last group with one of these names. If there are no such groups, the last index is smaller than
-  !> the first.
+  !> Indices of the first and the last group with one of the given names. If the input contains no such group, the last index is
+  !> smaller than the first index.
   pure function range_of(groups, names) result(range)
     type(group_t), intent(in) :: groups(:)   !! groups in the order of the table
-    character(len=*), intent(in) :: names(:)           !! names that are adjacent in the table
+    character(len=*), intent(in) :: names(:)           !! names of groups that are adjacent in the table
     integer :: range(2), k
     logical :: named(size(groups))
 
@@ -301,7 +302,7 @@ contains
     range(2) = range(1) + count(named) - 1
   end function range_of
 
-  !> An assignment of the value of a variable: `species.bed.radius = 0.005`.
+  !> A line that assigns the value of a variable, such as `species.bed.radius = 0.005`.
   pure function value_line(self, k, most) result(text)
     class(group_t), intent(in) :: self
     integer, intent(in) :: k                   !! index of the variable in the group
@@ -316,7 +317,7 @@ contains
     text = text//trim(self%values(k)%name)//" = "//self%values(k)%json(longest)
   end function value_line
 
-  !> The value or list of values as JSON. A list with more than `most` values is truncated.
+  !> Converts the value of a variable, or a list of values, to JSON. A list with more than `most` values is truncated.
   pure function json(self, most) result(text)
     class(value_t), intent(in) :: self
     integer, intent(in), optional :: most
@@ -345,7 +346,7 @@ contains
     if (table(self%row)%size /= 1 .or. n > 1) text = "["//text//"]"
   end function json
 
-  !> A text as JSON, without trailing blanks.
+  !> Converts a text to JSON, without its trailing blanks.
   pure function json_text(text) result(quoted)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: quoted

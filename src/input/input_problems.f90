@@ -1,4 +1,4 @@
-!> Collects the problems of an input, which are reported together.
+!> Collects all problems of an input, so that they can be reported together.
 module input_problems
   use errors, only: error_t, exit_files, exit_usage
   use texts, only: legible, text_t, written
@@ -10,15 +10,15 @@ module input_problems
   integer, parameter :: whole_file = 1000000000 !! larger than any line number
 
   type :: problem_t
-    integer :: line                             !! line of the file (> 0), 0 for the whole file, or -k for override k
+    integer :: line                             !! line of the input file (> 0), 0 for the whole file, or -k for override number k
     character(len=:), allocatable :: text
   end type problem_t
 
-  !> The problems in the order of the report: first the problems of lines of the file, by line, then the problems of the whole file,
-  !> then the problems of overrides.
+  !> The list of problems in the order of the report: first problems of single lines of the file, in the order of the lines, then
+  !> problems of the whole file, and then problems of overrides.
   type :: problem_list_t
     integer :: count = 0
-    integer :: unreadable = 0                   !! number of problems with unreadable files
+    integer :: unreadable = 0                   !! number of problems that are files that cannot be read
     logical :: cut_short = .false.              !! there were more problems than the list can contain
     type(problem_t) :: items(most_problems)
   contains
@@ -28,7 +28,7 @@ module input_problems
 
 contains
 
-  !> Adds the problem `where: what`, unless it is already in the list.
+  !> Adds the problem `where: what` to the list, unless the list already contains the problem.
   pure subroutine add(self, line, where, what)
     class(problem_list_t), intent(inout) :: self
     integer, intent(in) :: line                 !! as in `problem_t`
@@ -54,7 +54,7 @@ contains
     self%count = self%count + 1
   end subroutine add
 
-  !> Position of a line in the report.
+  !> Rank by which the problems of a line are sorted in the report.
   pure function rank(line)
     integer, intent(in) :: line
     integer :: rank
@@ -62,12 +62,13 @@ contains
     rank = merge(line, whole_file - line, line > 0)
   end function rank
 
-  !> Converts all problems to one error, with a line for each: `path:line: group.variable: problem, allowed values`.
+  !> Converts all problems to one error. The message contains one line for each problem: `path:line: group.variable: problem,
+  !> allowed values`.
   subroutine report(self, path, error, overrides)
     class(problem_list_t), intent(in) :: self
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
-    type(text_t), intent(in), optional :: overrides(:)    !! texts of the overrides, which are quoted in reports of their problems
+    type(text_t), intent(in), optional :: overrides(:)    !! texts of the overrides, which the message quotes
     character(len=:), allocatable :: text, place
     integer :: k
 

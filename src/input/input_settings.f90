@@ -1,4 +1,5 @@
-!> Converts the groups of the input to `settings`. Derives values that follow from other values, and checks combinations of values.
+!> Converts the groups of the input to `settings`, calculates values that follow from other values, and checks whether the values
+!> are compatible.
 module input_settings
   use kinds, only: int64, never, real64
   use box_geometry, only: box_t
@@ -21,14 +22,14 @@ module input_settings
 
 contains
 
-  !> Fills the settings. Derived values are also stored in the groups, so that the groups contain all values that the run uses.
+  !> Fills the settings. Calculated values are also stored in the groups, so that the groups contain all values that the run uses.
   subroutine resolve_settings(groups, settings, problems, stepped)
     type(group_t), intent(inout) :: groups(:)             !! groups of the same name are adjacent
     type(settings_t), intent(out) :: settings
     type(problem_list_t), intent(inout) :: problems
-    logical, intent(in), optional :: stepped              !! .true.: the caller ends the run, so that `&stop` may be empty
+    logical, intent(in), optional :: stepped              !! .true.: the caller ends the run, and `&stop` may therefore be empty
     logical :: must_end
-    type(wall_law_t) :: wall_law                          ! the default law of walls, from `&contact`
+    type(wall_law_t) :: wall_law                          ! default contact law of walls, from `&contact`
     integer :: o(2), s(2), w(2), k
 
     must_end = .true.
@@ -203,8 +204,8 @@ contains
     end subroutine take_sampling
   end subroutine resolve_settings
 
-  !> Reports settings of different groups that cannot be combined, and intervals that are too short. Mutually exclusive variables of
-  !> one group are marked in the table of variables.
+  !> Reports settings of different groups that cannot be combined, and intervals that are too short. Variables of the same group
+  !> that exclude each other are not checked here; the table of variables lists them.
   subroutine check_conflicts(settings, groups, must_end, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
@@ -278,9 +279,9 @@ contains
       end associate
     end subroutine check_columns
 
-    !> Reports that a variable or group cannot be combined with another setting.
+    !> Reports that a variable or group cannot be combined with another setting, if both are present.
     subroutine refuse(together, variable, other)
-      logical, intent(in) :: together                     !! both settings are present
+      logical, intent(in) :: together                     !! .true. if both settings are present
       character(len=*), intent(in) :: variable, other
       integer :: dot
 
@@ -292,7 +293,7 @@ contains
       end associate
     end subroutine refuse
 
-    !> Reports an interval that is so short that it would elapse more than `most` times before stop.time.
+    !> Reports an interval that is too short, because more than `most` intervals would elapse before stop.time.
     subroutine limit(group, name, of_what, most)
       character(len=*), intent(in) :: group, name, of_what
       real(real64), intent(in) :: most

@@ -17,7 +17,7 @@ module input_species
 
 contains
 
-  !> Fills the settings of all species. Derived values are also stored in the groups.
+  !> Fills the settings of all species. Calculated values are also stored in the groups.
   subroutine take_species(groups, box, seed, species, problems)
     type(group_t), intent(inout) :: groups(:)             !! the species
     type(box_t), intent(in) :: box
@@ -80,7 +80,7 @@ contains
       call take_pairs(group, "position", s%position)
     end subroutine take_placement
 
-    !> Reads the polydispersity, and whether masses follow from radii.
+    !> Sets the polydispersity, and whether the masses depend on the radii.
     subroutine take_spread(group, s)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(inout) :: s
@@ -109,8 +109,8 @@ contains
       end associate
     end subroutine take_pairs
 
-    !> Number of disks, which is given or follows from the grid or the list of positions. The disks in a starting file are counted
-    !> later.
+    !> Sets the number of disks, which is given directly or follows from the grid or from the list of positions. The disks in a
+    !> starting file are counted later.
     subroutine take_count(group, s)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(inout) :: s
@@ -156,11 +156,12 @@ contains
       end associate
     end subroutine take_velocities
 
-    !> Sets masses and radii. Factors are multiplied along the chain of `relative_to`.
+    !> Sets the masses and radii of all species. The species in `relative_to` may also have a `relative_to`; the factors of all
+    !> species in such a chain are multiplied.
     subroutine resolve_sizes()
       real(real64), dimension(size(species)) :: mass, radius
       character(len=:), allocatable :: wanted
-      integer :: base(size(species)), k, j, step            ! base: index of the species in `relative_to`, or 0
+      integer :: base(size(species)), k, j, step            ! base: index of the species that `relative_to` names, or 0
       logical :: fits
 
       do k = 1, size(species)
@@ -199,8 +200,8 @@ contains
       species%mean_radius = species%radius
     end subroutine resolve_sizes
 
-    !> The radius of a species: the given radius, a multiple of the radius of another species, or the radius that follows from the
-    !> packing fraction; 0 if it is unknown.
+    !> Radius of a species: the given radius or, with `relative_to`, the factor relative to the radius of another species. If the
+    !> packing fraction is given, the radius follows from the packing fraction. The result is 0 if the radius is unknown.
     function own_radius(group, s, number) result(radius)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(in) :: s
@@ -225,8 +226,8 @@ contains
     end function own_radius
   end subroutine take_species
 
-  !> Checks the name of an obstacle or species. The name must be unique, and valid in paths of the output file, in overrides and in
-  !> messages.
+  !> Checks the name of an obstacle or species. The name must be unique and must be valid in paths of the output file, in overrides
+  !> and in messages.
   subroutine check_name(groups, k, problems)
     type(group_t), intent(in) :: groups(:)                !! all obstacles, or all species
     integer, intent(in) :: k
@@ -241,14 +242,14 @@ contains
     else if (any(own_names() == name) .or. any(beside_species == name)) then
       call groups(k)%complain("name", shown(name)//" is reserved for the output file", problems)
     end if
-    do j = 1, k - 1                                       ! a loop avoids a copy of all names for each name
+    do j = 1, k - 1                                       ! an array expression would copy all names for each name
       if (groups(j)%instance == name) exit
     end do
     if (j < k) call groups(k)%complain("name", shown(name)//" is already the name of the group in line "// &
       written(groups(j)%line), problems)
   end subroutine check_name
 
-  !> Area of a region; 0 if its lower and upper limits are interchanged.
+  !> Area of a region; 0 if the lower limits of the region exceed its upper limits.
   pure function area(region)
     real(real64), intent(in) :: region(4)                 !! xlo, xhi, ylo, yhi [length]
     real(real64) :: area

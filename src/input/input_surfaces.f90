@@ -1,4 +1,4 @@
-!> Converts the groups of sides and obstacles to shapes and laws.
+!> Converts the groups of sides and obstacles to shapes, contact laws and motions.
 module input_surfaces
   use box_geometry, only: box_t
   use circles, only: new_circle
@@ -20,7 +20,7 @@ module input_surfaces
 
 contains
 
-  !> Adds the obstacles to the box, unless one of them is incomplete.
+  !> Adds the obstacles to the box, unless one of the obstacles is incomplete.
   subroutine take_obstacles(groups, box, problems)
     type(group_t), intent(inout) :: groups(:)             !! all groups whose name is in `obstacle_groups`
     type(box_t), intent(inout) :: box
@@ -83,7 +83,7 @@ contains
     end subroutine take_circles
   end subroutine take_obstacles
 
-  !> Whether a group describes obstacles from a file, or a polyline.
+  !> Whether a group describes several obstacles, by a file or a polyline.
   pure function has_many(group) result(yes)
     type(group_t), intent(in) :: group
     logical :: yes
@@ -91,7 +91,7 @@ contains
     yes = has(group, "file") .or. has(group, "points")
   end function has_many
 
-  !> Whether the group contains a variable of this name and the user has set the variable.
+  !> Whether the group contains a variable of this name that the user has set.
   pure function has(group, name) result(yes)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: name
@@ -100,7 +100,7 @@ contains
     yes = any(group%values%name == name .and. group%values%given)
   end function has
 
-  !> Stores the obstacles from a file as values of the variables that describe a single obstacle.
+  !> Reads the obstacles from the file of a group, and stores their data as lists of values in the variables for a single obstacle.
   subroutine take_file(group, problems)
     type(group_t), intent(inout) :: group
     type(problem_list_t), intent(inout) :: problems
@@ -140,7 +140,8 @@ contains
     end associate
   end subroutine take_points
 
-  !> The contact laws of all walls, from the groups of the walls or, by default, from `&contact`.
+  !> Sets the contact laws of all sides and obstacles, and the motions of all sides. Values that a group does not contain are taken
+  !> from `&contact`.
   subroutine take_wall_laws(sides, obstacles, otherwise, box, problems)
     type(group_t), intent(inout) :: sides(:)
     type(group_t), intent(inout) :: obstacles(:)
@@ -171,7 +172,7 @@ contains
         width = box%upper(axis) - box%lower(axis)
         call take_motion(sides(k), box%surface(side)%motion)
         if (.not. box%surface(side)%motion%moves()) cycle
-        ! Opposite sides must never touch each other, for any phases of their motions.
+        ! Opposite sides must not touch each other, whatever the phases of their motions are.
         if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%innermost_position()) >= width) call sides(k)%complain( &
           culprit(box%surface(side)%motion), "lets the sides meet, which are "// &
           written(width)//" apart (box.upper)", problems)
@@ -183,7 +184,8 @@ contains
 
   contains
 
-    !> The contact law of one wall. Values that follow from `&contact` are stored in the group of the wall.
+    !> Sets the contact law of one side or obstacle. Values that are taken from `&contact` are also stored in the group of the side
+    !> or obstacle.
     subroutine take_law(group, law)
       type(group_t), intent(inout) :: group
       type(wall_law_t), intent(out) :: law
@@ -208,7 +210,7 @@ contains
         "has no effect on disks without temperature or tangential_restitution of the same wall", problems)
     end subroutine take_law
 
-    !> The variable that determines how far inwards a side moves.
+    !> Name of the variable that determines how far inwards a side moves.
     pure function culprit(motion) result(name)
       type(side_motion_t), intent(in) :: motion
       character(len=:), allocatable :: name
@@ -218,7 +220,7 @@ contains
       if (motion%kind == constant_velocity .and. motion%prescribed_velocity > 0) name = "end_time"
     end function culprit
 
-    !> The motion of a side.
+    !> Sets the motion of a side.
     subroutine take_motion(group, motion)
       type(group_t), intent(in) :: group
       type(side_motion_t), intent(out) :: motion
@@ -255,7 +257,7 @@ contains
     end subroutine take_motion
   end subroutine take_wall_laws
 
-  !> Reports given restitutions that are too small for their dependence on the impact velocity.
+  !> Reports coefficients of restitution in the input that are smaller than the viscoelastic law allows.
   subroutine check_least(group, name, by_speed, problems)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: name
@@ -267,7 +269,8 @@ contains
       problems)
   end subroutine check_least
 
-  !> Tangential contact law of disks or walls, from variables whose names begin with a given prefix in &contact.
+  !> Sets the tangential contact law of disks or walls from the variables `tangential_restitution` and `friction` with the given
+  !> prefix.
   subroutine take_grip(group, prefix, otherwise, grip, problems)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: prefix

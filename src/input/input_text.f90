@@ -1,6 +1,6 @@
-!> The text of an input file: its bytes, lines and tokens. The namelist reader of Fortran accepts some invalid texts without a
-!> message, its messages contain neither the line nor the variable, and it can crash. The text is therefore read by this module and
-!> `namelist_input`, with a small and strict grammar:
+!> Reads the text of an input file and splits the text into lines and tokens. The namelist reader of Fortran is not used: it accepts
+!> some invalid texts without a message, its messages contain neither the line nor the variable, and it can crash. This module and
+!> `namelist_input` read the text instead, with a small and strict grammar:
 !>
 !>     &group  name = value, value  name(2) = value  name = 3*value  /     ! comment
 !>
@@ -21,12 +21,13 @@ module input_text
   character(len=1), parameter :: control(*) = [(achar(i), i=0, 8), achar(11), achar(12), (achar(i), i=14, 31), achar(127)]
   character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
 
-  !> Kinds of tokens. The kind of a quoted text or of a single character such as & or = is the character itself.
+  !> Kinds of tokens. The kind of a single character such as & or = is the character itself, and the kind of a quoted text is its
+  !> quotation mark.
   character(len=1), parameter :: word = "w", unclosed = "u", junk = "?", ending = "e"
   character(len=*), parameter :: blanks = " "//achar(9), quotes = "'""", marks = "&/=,()"
   character(len=*), parameter :: word_characters = digits//".+-"//letters//"_*%#:$@?<>|[]{}~^`\"
 
-  !> A token. `first` and `last` are the positions of its first and last character in the text, including quotes.
+  !> A token. `first` and `last` are the positions of its first and last character in the text, including quotation marks.
   type :: token_t
     character(len=1) :: kind
     integer :: first, last, line
@@ -34,16 +35,16 @@ module input_text
   end type token_t
 
   type :: assignment_t
-    integer :: line = 0                          !! > 0: line of the file; otherwise not in the file, see `value_t`
+    integer :: line = 0                          !! line of the input file (> 0), or -k for override number k
     character(len=:), allocatable :: where       !! group.variable, for messages
-    integer :: element = 0                       !! index of an element: the 2 in name(2) = value; 0 if there is no index
+    integer :: element = 0                       !! index of an element, such as 2 in name(2) = value; 0 without an index
     type(token_t), allocatable :: tokens(:)      !! tokens of the values of the assignment
-    logical :: sound = .true.                    !! .false. if a problem of this assignment has been reported
+    logical :: sound = .true.                    !! .false. after a problem of this assignment has been reported
   end type assignment_t
 
 contains
 
-  !> Finds the words in a line of a table. Text from a # on is a comment.
+  !> Finds the words in a line of a table. A # and the text after it are a comment.
   pure subroutine find_words(line, first, last, n)
     character(len=*), intent(in) :: line
     integer, intent(out) :: first(:), last(:)
@@ -95,7 +96,7 @@ contains
       " is a control character, code "//written(iachar(text(odd:odd))))
   end subroutine read_text
 
-  !> Suggests an input file whose extension or folder `input` is missing in the path.
+  !> Suggests an existing input file if the path lacks only the extension or the folder `input`.
   function advice(path)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: advice
@@ -111,7 +112,7 @@ contains
     if (advice /= "") advice = "; did you mean "//advice//"?"
   end function advice
 
-  !> The text in a normal form: line feeds are the only line ends, there is no byte order mark, and the text ends in a line feed.
+  !> Converts a text to a normal form in which every line ends in a line feed and no byte order mark is present.
   pure function unix_lines(text) result(lines)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: lines
@@ -133,7 +134,7 @@ contains
     lines = lines(:n)//eol
   end function unix_lines
 
-  !> Splits a text into tokens, followed by several tokens of kind `ending` for look-ahead.
+  !> Splits a text into tokens. Several tokens of kind `ending` follow, so that a parser can look ahead beyond the last token.
   pure subroutine cut(text, tokens)
     character(len=*), intent(in) :: text         !! every line ends in a line feed
     type(token_t), allocatable, intent(out) :: tokens(:)
@@ -172,7 +173,8 @@ contains
 
   contains
 
-    !> Finds the end of a quoted text, which must be in the same line. Two quotes in succession represent one quote in the text.
+    !> Finds the end of a quoted text, which must be in the line in which the text begins. Two quotation marks in succession
+    !> represent one quotation mark.
     pure subroutine end_quote(token)
       type(token_t), intent(inout) :: token
 
@@ -189,7 +191,7 @@ contains
     end subroutine end_quote
   end subroutine cut
 
-  !> The value of a token. Two quotes in succession are replaced by one quote.
+  !> Value of a token. In a quoted text, two quotation marks in succession are replaced by one.
   pure function content(text, token) result(value)
     character(len=*), intent(in) :: text
     type(token_t), intent(in) :: token
@@ -208,7 +210,7 @@ contains
     value = value(:n)
   end function content
 
-  !> A name in the form used in messages: a long name is truncated and quoted.
+  !> Converts a name to the form that is used in messages: a long name is truncated and quoted.
   pure function plain(name)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: plain

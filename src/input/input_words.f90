@@ -1,4 +1,4 @@
-!> Converts words of the input to checked values: numbers, choices, counts and ranges.
+!> Converts words of the input to values, and checks numbers, ranges, choices and the number of values.
 module input_words
   use kinds, only: int64, real64
   use input_problems, only: most_problems, problem_list_t
@@ -17,8 +17,8 @@ module input_words
 
 contains
 
-  !> Stores the values of an assignment in `slot`. Invalid values are reported. In this case `slot` is marked as faulty and its
-  !> previous value does not change.
+  !> Stores the values of an assignment in `slot`. If a value is invalid, the problem is reported, `slot` is marked as faulty, and
+  !> the previous value in `slot` does not change.
   subroutine store_values(slot, text, assignment, problems)
     type(value_t), intent(inout) :: slot
     character(len=*), intent(in) :: text                 !! text to which the tokens refer
@@ -63,7 +63,7 @@ contains
 
   contains
 
-    !> Checks the number of values.
+    !> Checks the number of values in the assignment.
     subroutine check_number()
       problem = ""
       if (assignment%element > 0) then
@@ -82,14 +82,14 @@ contains
       end if
     end subroutine check_number
 
-    !> A hint for the case that one real number was written with a decimal comma, as in `0,9`.
+    !> A hint for users who have written a real number with a decimal comma, as in `0,9`.
     function decimal_hint() result(hint)
       character(len=:), allocatable :: hint
 
       hint = ""
       associate (tokens => assignment%tokens)
         do k = 1, size(tokens), 2
-          if (tokens(k + 1)%first /= tokens(k)%last + 2) return     ! there is more than a comma between the two numbers
+          if (tokens(k + 1)%first /= tokens(k)%last + 2) return     ! more than a comma separates the two numbers
           if (verify(content(text, tokens(k + 1)), digits) > 0) return
         end do
         hint = "; did you mean "//content(text, tokens(1))//"."//content(text, tokens(2))// &
@@ -97,7 +97,7 @@ contains
       end associate
     end function decimal_hint
 
-    !> Checks one word and stores it after the first n values.
+    !> Checks one word and stores its value after the first n values.
     subroutine store_token(token, word)
       type(token_t), intent(in) :: token
       character(len=*), intent(in) :: word
@@ -137,8 +137,8 @@ contains
       end if
     end subroutine store_token
 
-    !> Checks a text. The text must be in quotes (except in overrides), and it must not be too long. If the variable has choices,
-    !> the text must be one of them.
+    !> Checks a text. The text must be in quotation marks (except in overrides) and must not be too long. If the variable has
+    !> choices, the text must be one of the choices.
     subroutine check_text(word, quoted)
       character(len=*), intent(in) :: word
       logical, intent(in) :: quoted
@@ -193,7 +193,7 @@ contains
     real(real64), intent(out) :: value
     character(len=:), allocatable, intent(out) :: problem
     integer, parameter :: longest = 60
-    character(len=longest) :: mantissa                 ! the digits without the decimal point
+    character(len=longest) :: mantissa                 ! the digits before the exponent; 0 replaces the decimal point
     integer :: mark, exponent, status
 
     value = 0
@@ -212,7 +212,7 @@ contains
     end if
     problem = ""
     if (scan(word(:mark - 1), "123456789") == 0) return
-    if (abs(exponent) <= 200) then                 ! then a word of this length cannot overflow or underflow
+    if (abs(exponent) <= 200) then                 ! with such an exponent the number cannot overflow or underflow
       read (word, "(f60.0)", iostat=status) value
       if (status == 0 .and. abs(value) >= smallest .and. abs(value) <= largest) return
     end if

@@ -1,4 +1,5 @@
-!> Reads the input text and the `--set` overrides, and converts their tokens to assignments and values. All problems are collected.
+!> Reads the input text and the overrides of `--set`, and converts their tokens to assignments and values. All problems are
+!> collected and reported together.
 module namelist_input
   use input_groups, only: group_t, value_t
   use input_problems, only: most_problems, problem_list_t
@@ -12,31 +13,31 @@ module namelist_input
   private
   public :: read_groups
 
-  !> Largest number of groups with the same name; largest n in n*value.
+  !> `most_instances`: largest number of groups with the same name. `most_repeats`: largest repeat count n in n*value.
   integer, parameter :: most_instances = 5000, most_repeats = 10000000
 
 contains
 
-  !> Reads the text and applies the overrides. Each variable has the given value or its default.
+  !> Reads the text and applies the overrides. Variables that are not set have their default values.
   subroutine read_groups(text, overrides, groups, problems, complete)
     character(len=*), intent(in) :: text
     type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
     type(group_t), allocatable, intent(out) :: groups(:)  !! groups in the order of the table; groups of the same name are adjacent
     type(problem_list_t), intent(out) :: problems
-    logical, intent(out) :: complete                                !! .false. if parts of the text were skipped
+    logical, intent(out) :: complete                                !! .false. if parts of the text could not be read
     type(value_t) :: defaults(size(table))
     type(group_t), allocatable :: found(:)                          ! groups in the order of the text
-    integer :: n, i, j, k                                           ! n: number of groups found
-    ! The text that is read at present: a default, the input, or an override.
+    integer :: n, i, j, k                                           ! n: number of groups found so far
+    ! The text that is being read: a default, the input text, or an override.
     character(len=:), allocatable :: source
-    type(token_t), allocatable :: token(:)                          ! tokens of the source
+    type(token_t), allocatable :: token(:)                          ! tokens of `source`
     integer :: at                                                   ! index of the next token
-    character(len=:), allocatable :: own                            ! name of the group that is read at present, for messages
-    integer :: group  ! index of the group to which assignments belong; 0 if the name of the group is unknown
-    ! First line of the group that is read at present; 0 between groups.
+    character(len=:), allocatable :: own                            ! name of the group that is being read, for messages
+    integer :: group  ! index of the group that is being read; 0 if its name is unknown
+    ! First line of the group that is being read; 0 between groups.
     integer :: opened
-    logical :: too_many                                             ! there are too many groups with the same name
-    logical :: quote_open  ! a quote in this group is not closed, so that the / may be part of a text
+    logical :: too_many                                             ! too many groups have the same name
+    logical :: quote_open  ! a quoted text in this group is not closed and may contain the /
 
     complete = .true.
     too_many = .false.
@@ -48,7 +49,7 @@ contains
     end do
     allocate (found(size(group_names) + n_sides + min(count([(text(k:k) == "&", k=1, len(text))]), &
       count(is_repeated(group_names))*most_instances)))
-    do k = 1, size(group_names)                                     ! groups that must not be repeated are created at the start
+    do k = 1, size(group_names)                                     ! groups that cannot be repeated always exist
       if (.not. is_repeated(group_names(k))) call add_group(group_names(k), 0, 1)
     end do
     call open_source(unix_lines(text))
@@ -71,7 +72,7 @@ contains
 
   contains
 
-    !> Starts to read another text.
+    !> Starts to read the tokens of a different text.
     subroutine open_source(text)
       character(len=*), intent(in) :: text
 
@@ -92,7 +93,7 @@ contains
     !> Adds a group with the defaults of the table.
     subroutine add_group(name, line, number)
       character(len=*), intent(in) :: name
-      !> line: first line of the group; number: index among the groups of this name.
+      !> `line` is the first line of the group, and `number` is its number among the groups of the same name.
       integer, intent(in) :: line, number
       integer, allocatable :: rows(:)
       integer :: v
@@ -110,12 +111,13 @@ contains
       end associate
     end subroutine add_group
 
-    !> Stores a value that is not from the file, which is a default or an override. Texts in such values need no quotes.
+    !> Stores a value that does not come from the input file: a default or an override. Such a value may contain a text without
+    !> quotation marks.
     subroutine assign_text(slot, text, line, element)
       type(value_t), intent(inout) :: slot
       character(len=*), intent(in) :: text
-      integer, intent(in) :: line                         !! -k for override k; 0 for a default
-      integer, intent(in) :: element                      !! index of the value; 0 for all values of the variable
+      integer, intent(in) :: line                         !! -k for override number k; 0 for a default
+      integer, intent(in) :: element                      !! index of the element; 0 for all values of the variable
       type(assignment_t) :: assignment
 
       call open_source(text//eol)
@@ -162,8 +164,8 @@ contains
       end do
     end subroutine read_text
 
-    !> Reads the text between groups, in which only `&name` is allowed. Other text is reported and skipped up to a line that begins
-    !> with &.
+    !> Reads the text between groups, in which only `&name` is allowed. Any other text is reported and skipped up to the next line
+    !> that begins with &.
     subroutine between_groups()
       character(len=:), allocatable :: problem
 
@@ -226,7 +228,7 @@ contains
       end if
     end subroutine read_assignment
 
-    !> Reads the index of an element, as the `(2)` in `name(2) = value`.
+    !> Reads the index of an element, such as `(2)` in `name(2) = value`.
     subroutine read_element(assignment)
       type(assignment_t), intent(inout) :: assignment
       integer :: status
@@ -254,7 +256,7 @@ contains
       assignment%sound = .false.
     end subroutine complain
 
-    !> Reads the values after `=`, up to the next name, `/`, `&` or the end.
+    !> Reads the values after `=`, up to the next name, the next `/` or `&`, or the end of the text.
     subroutine read_values(assignment)
       type(assignment_t), intent(inout) :: assignment
       logical :: after_comma
@@ -283,7 +285,7 @@ contains
       assignment%tokens = pack(token(first:at - 1), token(first:at - 1)%kind /= ",")
     end subroutine read_values
 
-    !> Reads a repeat count, as in `3*value`. The value may be a text in quotes.
+    !> Reads a value with a repeat count, as in `3*value`. The value may be a quoted text.
     subroutine read_repeats(assignment)
       type(assignment_t), intent(inout) :: assignment
       integer :: star, status
@@ -302,7 +304,7 @@ contains
         if (own%first <= own%last) return
         if (scan(next%kind, "'"""//unclosed) > 0 .and. next%first == own%first) then
           next%repeats = own%repeats
-          own%kind = ","                                  ! marks that the repeat count has been used
+          own%kind = ","                                  ! marks that the repeat count has been read
         else
           call complain(assignment, "a value is missing after the *")
         end if
@@ -315,7 +317,7 @@ contains
       integer :: instances
 
       own = plain(name)
-      do group = n, 1, -1                                 ! finds the last group with this name; 0 if there is none
+      do group = n, 1, -1                                 ! finds the last group with this name; 0 if no group has this name
         if (found(group)%name == name) exit
       end do
       instances = 0
@@ -363,8 +365,8 @@ contains
       end associate
     end subroutine take_assignment
 
-    !> Reports an unknown variable. The name of the variable may be misspelt, an earlier name, or the name of a variable in another
-    !> group.
+    !> Reports an unknown variable. The message suggests the correct name if the given name is misspelt, if an earlier version used
+    !> the name, or if the variable belongs to another group.
     subroutine report_unknown(group, name, line)
       character(len=*), intent(in) :: group, name
       integer, intent(in) :: line
@@ -380,7 +382,7 @@ contains
       call problems%add(line, trim(group)//"."//plain(name), "unknown variable; "//advice)
     end subroutine report_unknown
 
-    !> Sets the name of an obstacle or species whose name is not given.
+    !> Sets the default name of an obstacle or species whose name is not given.
     subroutine name_instance(group)
       type(group_t), intent(inout) :: group
 
@@ -430,10 +432,11 @@ contains
       end if
     end subroutine override
 
-    !> Separates the index of an element from the name of a variable. Brackets without a number remain part of the name.
+    !> Separates the index of an element from the name of a variable. Parentheses that do not contain a number remain part of the
+    !> name.
     subroutine split_element(name, element)
       character(len=:), allocatable, intent(inout) :: name
-      integer, intent(out) :: element                     !! index of the element; 0 if there is no index
+      integer, intent(out) :: element                     !! index of the element; 0 without an index
       integer :: bracket
 
       element = 0
@@ -446,11 +449,11 @@ contains
       if (element > 0) name = name(:bracket - 1)
     end subroutine split_element
 
-    !> Removes a sampling interval that the file sets, if an override sets another interval for the same samples. The interval of
-    !> the override replaces that of the file.
+    !> Removes a sampling interval that the file sets if an override sets a different kind of interval for the same samples, so that
+    !> the override replaces the interval in the file.
     subroutine replace_cadence(group, name)
       type(group_t), intent(inout) :: group
-      character(len=*), intent(in) :: name                !! name of the variable that is set
+      character(len=*), intent(in) :: name                !! name of the variable that the override sets
       integer :: v
 
       if (track_of(name) == "") return
@@ -462,8 +465,8 @@ contains
       end do
     end subroutine replace_cadence
 
-    !> Finds the group to which an override refers. A missing group of a side is created. If there is no such group, the result is 0
-    !> and the problem is reported.
+    !> Finds the group to which an override refers. If the override refers to a side without a group, the group is created. If the
+    !> input contains no such group, the result is 0 and the problem is reported.
     subroutine find_group(group, instance, line, g)
       character(len=*), intent(in) :: group, instance
       integer, intent(in) :: line

@@ -21,7 +21,7 @@ module obstacle_file
 
 contains
 
-  !> Whether a path is that of an HDF5 file.
+  !> Whether a path has the name of an HDF5 file.
   pure function is_hdf5(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
@@ -29,7 +29,7 @@ contains
     yes = index(path//"|", ".h5|") > 0
   end function is_hdf5
 
-  !> Reads the obstacles from a file, or reports a problem and its place in the file.
+  !> Reads the obstacles from a file. If the file is invalid, the error contains the problem and its location in the file.
   subroutine read_obstacles(path, walls, rows, error)
     character(len=*), intent(in) :: path
     logical, intent(in) :: walls                           !! .true. for straight walls, .false. for circles
@@ -75,8 +75,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: text, line, problem
     character(len=6), allocatable :: names(:)
-    integer, allocatable :: column(:)  ! index in `names` of each column of the file; empty before the first line has been read
-    integer :: first(longest_line), last(longest_line)     ! position of each word in the line
+    integer, allocatable :: column(:)  ! for each column of the file, index in `names`; empty at first
+    integer :: first(longest_line), last(longest_line)     ! first and last position of each word in the line
     integer(int64) :: past
     integer :: number, n, n_words
 
@@ -110,7 +110,7 @@ contains
 
   contains
 
-    !> Reads the first line, which names the columns in any order.
+    !> Reads the first line, which contains the names of the columns in any order.
     subroutine read_names()
       integer :: k
 
@@ -123,7 +123,7 @@ contains
       end do
     end subroutine read_names
 
-    !> Reads a line with one obstacle.
+    !> Reads a line that describes one obstacle.
     subroutine read_row()
       real(real64) :: value(size(names))
       integer :: k
@@ -148,7 +148,7 @@ contains
     end subroutine read_row
   end subroutine read_text
 
-  !> The place of the n-th obstacle in its file, for messages.
+  !> Location of the n-th obstacle in its file, for messages.
   function origin_of_row(path, n) result(place)
     character(len=*), intent(in) :: path
     integer, intent(in) :: n
@@ -162,7 +162,7 @@ contains
     if (is_hdf5(path)) return
     call read_file(path, text, problem)
     number = 0
-    rows = -1                                              ! the line of names is not an obstacle
+    rows = -1                                              ! the first line contains the names of columns
     past = 1
     do while (past <= len(text, int64) .and. rows < n)
       call next_line(text, past, line)
@@ -182,7 +182,7 @@ contains
 
     begin = past
     past = begin + index(text(begin:), eol, kind=int64)
-    if (past == begin) past = len(text, int64) + 2         ! the last line may have no line end
+    if (past == begin) past = len(text, int64) + 2         ! the last line may lack a line feed
     line = text(begin:past - 2)
     if (begin == 1 .and. index(line, byte_order_mark) == 1) line = line(len(byte_order_mark) + 1:)
   end subroutine next_line

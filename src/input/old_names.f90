@@ -1,5 +1,5 @@
-!> Names of variables and choices in earlier versions, and the corresponding present names. If an input uses an old name, the
-!> message contains the present name.
+!> Names of variables and choices in earlier versions of the program, and the corresponding present names. If an input contains an
+!> old name, the error message contains the present name.
 module old_names
   use variables, only: name_length
   implicit none
@@ -8,8 +8,8 @@ module old_names
 
   type :: old_name_t
     character(len=8) :: group
-    character(len=name_length) :: name        !! name of the variable; for a choice, the present name of its variable
-    character(len=20) :: choice               !! choice of a text variable; blank if the variable itself was renamed
+    character(len=name_length) :: name        !! old name of the variable; for a choice, present name of its variable
+    character(len=20) :: choice               !! old name of the choice; blank if the variable itself was renamed
     character(len=name_length) :: now
   end type old_name_t
 
@@ -32,7 +32,7 @@ module old_names
 
 contains
 
-  !> The present name of a variable or choice that was renamed; empty if the name is not an old one.
+  !> Present name of a variable or choice that was renamed; empty if the name was never changed.
   pure function new_name(group, name, choice) result(now)
     character(len=*), intent(in) :: group, name
     character(len=*), intent(in) :: choice     !! old name of the choice; blank for the variable itself
@@ -45,8 +45,8 @@ contains
     end do
   end function new_name
 
-  !> The variables or choices that replace an old variable or choice; empty if there are none. The name of a variable may be given
-  !> with or without its group.
+  !> Present names of the variables or choices that replace an old variable or choice; empty if no replacement exists. The old name
+  !> of a variable may include its group.
   pure function present_names(name, of_choices) result(names)
     character(len=*), intent(in) :: name
     logical, intent(in) :: of_choices

@@ -1,6 +1,6 @@
-!> The radii of the disks of a species: equal, or drawn from a distribution. Drawn radii have limits, and the upper limit is ten
-!> times the lower limit. A radius beyond the limits is drawn again. A distribution with many radii beyond the limits is not
-!> allowed.
+!> The radii of the disks of a species, which are equal or drawn from a distribution. The distribution is truncated at a smallest
+!> and a largest radius, which is ten times the smallest radius. If a drawn radius is outside these limits, a new radius is drawn.
+!> Polydispersities for which many radii would be outside the limits are not allowed.
 module radii
   use kinds, only: int64, real64
   use random_stream, only: random_stream_t
@@ -10,15 +10,15 @@ module radii
   public :: drawn_radii, largest_radius, widest_spread
 
   integer, parameter :: purpose = 7                         !! number that identifies the random streams of this module
-  real(real64), parameter :: part = 9.0_real64/11           !! largest deviation of a radius from the mean, relative to the mean
-  real(real64), parameter :: powers = 0.5_real64*log(10.0_real64)   !! largest deviation of the logarithm of a radius from its mean
-  !> Smallest allowed distance of the limits from the mean, in standard deviations.
+  real(real64), parameter :: part = 9.0_real64/11  !! largest deviation of a radius from the mean radius, divided by the mean radius
+  real(real64), parameter :: powers = 0.5_real64*log(10.0_real64)  !! largest deviation of ln(radius) from its mean
+  !> Smallest allowed distance between the mean and the limits of the distribution, in standard deviations.
   real(real64), parameter :: deviations = 3
 
 contains
 
-  !> The radius of each disk. The logarithm of a lognormal radius has the variance ln(1 + spread**2). The last bits of lognormal
-  !> and Gaussian radii may depend on the mathematical library.
+  !> Draws the radius of each disk. In a lognormal distribution, the logarithm of the radius has the variance
+  !> ln(1+polydispersity**2). The last bits of lognormal and Gaussian radii may depend on the mathematical library.
   pure function drawn_radii(species, s, seed) result(radius)
     class(species_settings_t), intent(in) :: species
     integer, intent(in) :: s                                !! index of the species
@@ -48,7 +48,7 @@ contains
     end do
   end function drawn_radii
 
-  !> An estimate of the largest radius of a species, without drawing the radii.
+  !> Estimates the largest radius of a species without drawing the radii.
   pure function largest_radius(species) result(radius)
     class(species_settings_t), intent(in) :: species
     real(real64) :: radius                                  !! [length]
@@ -69,7 +69,7 @@ contains
     end associate
   end function largest_radius
 
-  !> Largest polydispersity that is allowed for a distribution.
+  !> Largest allowed polydispersity for a kind of distribution.
   pure function widest_spread(distribution) result(spread)
     character(len=*), intent(in) :: distribution            !! 'uniform', 'gaussian' or 'lognormal'
     real(real64) :: spread

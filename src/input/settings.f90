@@ -1,5 +1,5 @@
-!> The input as typed data: file, defaults and overrides, with all values resolved. Meaning, range and unit of each variable are in
-!> `variables`.
+!> The settings of a run as typed data, which combine the input file, the overrides and the defaults. The module `variables`
+!> contains the meaning, the range and the unit of each variable.
 module settings
   use kinds, only: int64, never, real64
   use disks, only: species_t
@@ -14,8 +14,8 @@ module settings
   private
   public :: run_input_t, settings_t, run_settings_t, sampling_t, species_settings_t, output_settings_t, disks_in_file_t
 
-  !> Number of disks from which a division into domains saves time even on one core, because the data of one domain fit into the
-  !> cache.
+  !> Smallest number of disks for which a division into domains saves time even on one core, because the data of one domain fit into
+  !> the cache.
   integer, parameter :: many_disks = 500000
 
   type :: run_settings_t
@@ -25,17 +25,17 @@ module settings
     real(real64) :: dt                                !! time step of 'steps' [time]
     character(len=:), allocatable :: search           !! 'cells', 'pairs' or 'rescan'
     character(len=:), allocatable :: queue            !! 'calendar' or 'heap'
-    !> Number of threads. The value 0 in the input is replaced by the value of the environment when the threads are started.
+    !> Number of threads. If the value in the input is 0, a value from the environment replaces the 0 when the threads are started.
     integer :: threads
-    integer :: threads_asked = 1                      !! number of threads that was requested
+    integer :: threads_asked = 1                      !! number of threads that the user requested
   end type run_settings_t
 
   !> Disks read from a file.
   type :: disks_in_file_t
-    real(real64), allocatable :: table(:, :)          !! (column_names,n) see `position_file`; deallocated when the disks are placed
-    logical, allocatable :: there(:)                  !! (column_names) for each column, whether the file contains it
+    real(real64), allocatable :: table(:, :)          !! (column_names,n) data of each disk; deallocated when the disks are placed
+    logical, allocatable :: there(:)                  !! (column_names) whether the file contains each column
     integer, allocatable :: rows(:)                   !! (n) line numbers in a text file, or row numbers in the last frame of a run
-    type(error_t), allocatable :: error               !! reason why the disks cannot be used
+    type(error_t), allocatable :: error               !! reason why the disks in the file cannot be used
   end type disks_in_file_t
 
   !> A species and its initial state.
@@ -46,13 +46,14 @@ module settings
     !> Standard deviation of the radii divided by their mean; 0 if all radii are equal.
     real(real64) :: polydispersity = 0.0_real64
     character(len=:), allocatable :: distribution     !! 'uniform', 'gaussian', 'lognormal'
-    !> Masses are proportional to areas; `mass` is then the mass of a disk with the mean radius.
+    !> Whether the masses of the disks are proportional to their areas. If .true., `mass` is the mass of a disk with the mean
+    !> radius.
     logical :: mass_by_area = .false.
     logical :: mass_in_file = .false.                 !! masses are read from the file, if the file contains masses
     logical :: radius_in_file = .false.               !! radii are read from the file
     logical :: spin_in_file = .false.                 !! angular velocities are read from the file
     logical :: angle_in_file = .false.                !! the file contains orientations
-    logical :: is_base = .false.                      !! mass and radius of other species are relative to those of this species
+    logical :: is_base = .false.                      !! other species have masses and radii relative to this species
     real(real64) :: region(4)                         !! xlo, xhi, ylo, yhi [length]
     character(len=:), allocatable :: placement        !! 'random', 'grid', 'lattice', 'dense', 'explicit', 'file', 'grown'
     integer :: grid(2)                                !! numbers of columns and rows; 0, 0 if they are not given
@@ -65,35 +66,35 @@ module settings
     real(real64) :: speed
     real(real64) :: temperature                       !! kT for 'maxwell' [energy]
     real(real64) :: exact_temperature = -1.0_real64   !! kT to which velocities are scaled; negative if it is not given [energy]
-    real(real64), allocatable :: velocity(:, :)       !! velocities for 'explicit': (2,count), or (2,1) for all disks; else (2,0)
+    real(real64), allocatable :: velocity(:, :)       !! 'explicit' velocities, (2,count) or (2,1) for all disks; otherwise (2,0)
     real(real64) :: angular_velocity = 0.0_real64     !! angular velocity of all disks [1/time]
     !> kT of rotation, the mean of I omega**2; negative if it is not given [energy]
     real(real64) :: rotational_temperature = -1.0_real64
   end type species_settings_t
 
-  !> Quantities by which samples are scheduled, in the form used in the names of variables.
+  !> Quantities that determine when samples are taken, as written in the names of variables.
   character(len=19), parameter, public :: sampled_by(4) = [character(len=19) :: "time", "collisions", "events", &
     "collisions_per_disk"]
 
-  !> Kinds of samples, in the form used in the names of variables.
+  !> Kinds of samples, as written in the names of variables.
   character(len=11), parameter, public :: sampled(2) = [character(len=11) :: "frames", "observables"]
 
-  !> A sampling schedule. An interval that is not set is `never`.
+  !> A sampling schedule. Intervals that the input does not set have the value `never`.
   type :: sampling_t
-    real(real64) :: every(4) = never                  !! interval for each of `sampled_by`
+    real(real64) :: every(4) = never                  !! interval for each quantity in `sampled_by`
     real(real64), allocatable :: at(:)                !! given sampling times in ascending order [time]
     integer :: per_decade = 0                         !! number of logarithmic sampling times per decade; 0 if there are none
     real(real64) :: from = never                      !! the first of the logarithmic sampling times [time]
   end type sampling_t
 
   type :: output_settings_t
-    type(sampling_t) :: sampling(2)                   !! schedule for each of `sampled`
+    type(sampling_t) :: sampling(2)                   !! schedule for each kind of samples in `sampled`
     !> Columns of frames in addition to positions. If this array is not allocated, frames contain all columns.
     character(len=text_length), allocatable :: frame_columns(:)
-    logical :: single_precision                       !! frames are stored in single precision
+    logical :: single_precision                       !! .true. if frames are stored in single precision
     logical :: event_log
-    logical :: virial_tensor                          !! the virial tensor is accumulated for smooth disks as well
-    logical :: helfand                                !! the Helfand moments are accumulated
+    logical :: virial_tensor                          !! .true. to accumulate the virial tensor in all systems
+    logical :: helfand                                !! .true. to accumulate the Helfand moments
     real(real64) :: checkpoint_every                  !! wall-clock time between two checkpoints [s]
   end type output_settings_t
 
@@ -109,16 +110,16 @@ module settings
     procedure :: wants_domains
   end type settings_t
 
-  !> The input of a run in all its forms.
+  !> The input of a run in all its forms: text, groups and settings.
   type :: run_input_t
     character(len=:), allocatable :: path                !! path of the input file, for messages
     character(len=:), allocatable :: text                !! contents of the input file
     type(text_t), allocatable :: overrides(:)            !! GROUP.VARIABLE=VALUE of each --set
     real(real64) :: saved_at = -1.0_real64  !! time at which a simulation in memory was saved; negative if it was not saved [time]
-    !> Changes during the run, with a line `TIME VARIABLE=VALUE` for each change.
+    !> Changes during the run: one line `TIME VARIABLE=VALUE` for each change.
     character(len=:), allocatable :: changes
     type(group_t), allocatable :: groups(:)    !! groups with all values that the run uses
-    type(settings_t) :: settings                         !! the same values as typed data
+    type(settings_t) :: settings                         !! the values in `groups` as typed data
   end type run_input_t
 
 contains
@@ -140,7 +141,7 @@ contains
     n = sum(int(self%species%count, int64), mask=self%drive%acts_on([(k, k=1, size(self%species))]))
   end function n_driven
 
-  !> Determines the features of the run, after starting files have been read.
+  !> Determines the features that the run needs, such as rotation. The starting files must have been read before.
   pure subroutine choose_features(self)
     class(settings_t), intent(inout) :: self
 
@@ -155,7 +156,7 @@ contains
     end associate
   end subroutine choose_features
 
-  !> Whether domains should be used: with several threads, or for many disks on one core.
+  !> Whether the run should use domains, which is the case with several threads, or with many disks on one core.
   pure function wants_domains(self) result(yes)
     class(settings_t), intent(in) :: self
     logical :: yes

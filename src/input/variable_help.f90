@@ -1,5 +1,5 @@
-!> Texts about the input variables: the reference file, the answers to `--explain`, and JSON for other programs (the table of
-!> variables, and an input as the program interprets it).
+!> Texts about the input variables: the reference input file, the answers to `--explain`, and JSON for other programs. The JSON
+!> texts are the table of variables, and an input as the program interprets the input.
 module variable_help
   use choices, only: meaning_of
   use errors, only: error_t, exit_usage, fail
@@ -35,7 +35,8 @@ contains
     end do
   end function defaults_text
 
-  !> Characters at the beginning of each line of a group in the reference file. Groups of boundaries are comments in this file.
+  !> Characters at the beginning of each line of a group in the reference file. Groups that describe boundaries are commented out in
+  !> the reference file.
   pure function margin(group)
     character(len=*), intent(in) :: group
     character(len=:), allocatable :: margin
@@ -44,7 +45,7 @@ contains
     if (any(wall_groups == group)) margin = "! "
   end function margin
 
-  !> A variable in the reference file, with the first sentence of its help, and its choices if there are any.
+  !> Lines for a variable in the reference file, with the first sentence of its help text and, for a text variable, its choices.
   pure function reference_line(row) result(line)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: line
@@ -61,7 +62,7 @@ contains
     if (row%choices /= "") line = line//eol//next//allowed(row)
   end function reference_line
 
-  !> A text padded with blanks up to the column of comments.
+  !> Pads a text with blanks up to the column of comments.
   pure function padded(text)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: padded
@@ -69,8 +70,8 @@ contains
     padded = text//repeat(" ", max(comment_column - len(text), 0))
   end function padded
 
-  !> Answers `--explain`. The topic is a variable with or without its group, a group, or a word that is searched in names, choices
-  !> and help texts.
+  !> Answers `--explain`. The topic may be the name of a variable, with or without its group, or the name of a group. Any other word
+  !> is searched for in names, choices and help texts.
   pure subroutine explain(name, text, error)
     character(len=*), intent(in) :: name
     character(len=:), allocatable, intent(out) :: text
@@ -99,7 +100,7 @@ contains
     end if
   end subroutine explain
 
-  !> The explanations of some variables.
+  !> Explanations of the variables in the given rows.
   pure function explanations(rows) result(text)
     integer, intent(in) :: rows(:)                         !! rows of the table
     character(len=:), allocatable :: text
@@ -111,8 +112,8 @@ contains
     end do
   end function explanations
 
-  !> The name of a variable without the index of an element and without the name of a species or boundary, as `species.velocity` for
-  !> `species.gas.velocity(2)`.
+  !> Name of a variable without the index of an element and without the name of a species or boundary. For example, the result for
+  !> `species.gas.velocity(2)` is `species.velocity`.
   pure function bare(name)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: bare
@@ -124,7 +125,8 @@ contains
     if (last > first) bare = bare(:first)//bare(last + 1:)
   end function bare
 
-  !> A line for each variable whose name or help contains a text, and for each choice whose name or meaning contains this text.
+  !> Lists each variable whose name or help text contains the wanted text, and each choice whose name or meaning contains the wanted
+  !> text.
   pure function matches(wanted) result(text)
     character(len=*), intent(in) :: wanted                 !! the text, in lower case
     character(len=:), allocatable :: text
@@ -143,7 +145,8 @@ contains
     text = text(len(eol) + 1:)
   contains
 
-    !> Whether a text contains the wanted text; `packing_fraction` and `packing fraction` are equivalent.
+    !> Whether a text contains the wanted text. Underscores and blanks are equivalent, as in `packing_fraction` and `packing
+    !> fraction`.
     pure function has(where) result(yes)
       character(len=*), intent(in) :: where
       logical :: yes
@@ -151,7 +154,7 @@ contains
       yes = index(spaced(lower_case(where)), spaced(wanted)) > 0
     end function has
 
-    !> A text with blanks in place of underscores.
+    !> Replaces the underscores in a text by blanks.
     pure function spaced(name)
       character(len=*), intent(in) :: name
       character(len=len(name)) :: spaced
@@ -164,7 +167,7 @@ contains
     end function spaced
   end function matches
 
-  !> All data of the table about a variable, one per line.
+  !> All data that the table contains about a variable, with one line for each.
   pure function explanation(k) result(text)
     integer, intent(in) :: k                               !! row of the table
     character(len=:), allocatable :: text
@@ -187,7 +190,7 @@ contains
     end associate
   end function explanation
 
-  !> The default of a variable, or a description of the behaviour if it is not given.
+  !> Default of a variable, or a description of what the program does if the variable is not given.
   pure function default_of(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
@@ -202,8 +205,8 @@ contains
     end if
   end function default_of
 
-  !> The choice with which a variable has an effect; empty if the variable always has an effect. In &species the choice can follow
-  !> from the variable.
+  !> Condition under which a variable has an effect, such as a choice of another variable; empty if the variable always has an
+  !> effect. In &species, giving the variable can also set the choice.
   pure function condition_of(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
@@ -216,7 +219,7 @@ contains
     end associate
   end function condition_of
 
-  !> When a variable may be changed after the start of a run.
+  !> Text that states when a variable may be changed after the start of a run.
   pure function change_text(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
@@ -226,7 +229,7 @@ contains
     if (row%may_change == in_motion) text = "may change in a running simulation (Python, laboratory page); fixed on --resume"
   end function change_text
 
-  !> The table of variables as JSON: an object for each group with an object for each variable.
+  !> Converts the table of variables to JSON: each group is an object that contains an object for each variable.
   pure function variables_text() result(text)
     character(len=:), allocatable :: text, between
     integer :: g, k
@@ -246,7 +249,8 @@ contains
     text = text//eol//"}"
   end function variables_text
 
-  !> A row of the table as JSON. For numbers, the bounds `above` and `below` are exclusive, `from` and `to` inclusive.
+  !> Converts a row of the table to JSON. The bounds of a number are called `from` and `to` if they are allowed values, or `above`
+  !> and `below` if they are not.
   pure function row_text(k) result(text)
     integer, intent(in) :: k                               !! row of the table
     character(len=:), allocatable :: text, value, meanings
@@ -291,9 +295,9 @@ contains
       member("changeable", .true., trim(merge("true ", "false", row%may_change == in_motion)))
   end function row_text
 
-  !> The groups of an input in the order of the file, each with its given variables. `from` and `to` are the positions of the first
-  !> and last byte of the group in the file. These positions start at 0 and apply to the text without byte order mark and with line
-  !> feeds as line ends. The positions are null if the group is not in the file.
+  !> Converts the groups of an input to JSON, in the order of the file. Each group contains the variables that the user has given.
+  !> `from` and `to` are the positions of the first and last byte of the group in the file, and null if the file does not contain
+  !> the group. Positions start at 0, and refer to the text without a byte order mark and with line feeds as line ends.
   pure function groups_text(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -323,8 +327,8 @@ contains
     text = "["//growing%text()//eol//"]"
   end function groups_text
 
-  !> An input file with the same content as the groups. Masses and radii of species have their final values, so that `relative_to`
-  !> is omitted.
+  !> Converts groups to the text of an input file with the same content. The variable `relative_to` is omitted, because the masses
+  !> and radii of all species have their final values.
   pure function input_of(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -360,7 +364,7 @@ contains
     text = growing%text()
   contains
 
-    !> The text of a value that is not a real number. A text is in quotes.
+    !> A value that is not a real number, as in an input file. Texts are quoted.
     pure function word(kind, value)
       character(len=*), intent(in) :: kind, value
       character(len=:), allocatable :: word
@@ -377,7 +381,7 @@ contains
     end function word
   end function input_of
 
-  !> `, "name": value` as JSON, with null if there is no value.
+  !> The JSON text `, "name": value`, with null if there is no value.
   pure function member(name, is_there, value) result(text)
     character(len=*), intent(in) :: name, value
     logical, intent(in) :: is_there
@@ -387,7 +391,7 @@ contains
     if (is_there) text = text(:len(text) - 4)//value
   end function member
 
-  !> A list of words as JSON.
+  !> Converts a list of words to a JSON array.
   pure function list(words) result(text)
     character(len=*), intent(in) :: words(:)
     character(len=:), allocatable :: text
