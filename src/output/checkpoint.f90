@@ -1,10 +1,11 @@
-!> Checkpoints: the variable state of a simulation and the progress of its output, stored in the output file. A resumed run yields
-!> data that are bit-identical to those of an uninterrupted run.
+!> Checkpoints. A checkpoint contains the present state of a simulation and the progress of its output, and is stored in the output
+!> file. A resumed run yields bit-identical data to a run without interruption.
 !>
-!> During a run the output file contains two slots. A slot is a dataset with space for one checkpoint. One slot is valid, and the
-!> next checkpoint is written to the other slot. When the data have been stored on the disk completely, a number in the file is
-!> changed, which makes the new checkpoint the valid one. A complete checkpoint therefore exists at every moment. Each checkpoint
-!> has a checksum. A finished file contains one slot. The file of a run that broke off has no valid checkpoint.
+!> During a run the output file contains two slots, which are datasets with space for one checkpoint each. One of the slots is
+!> valid, and the next checkpoint is written to the slot that is not valid. After the new checkpoint has been stored on the disk, a
+!> number in the file is changed, which marks the slot of the new checkpoint as valid. The file therefore contains a complete
+!> checkpoint at every moment. Each checkpoint has a checksum. The output of a finished run contains one slot. The output of a run
+!> that broke off contains no valid checkpoint.
 module checkpoint
   use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int8
@@ -31,21 +32,21 @@ module checkpoint
   public :: checkpoint_bytes, copy_checkpoints, has_both_checkpoints, has_broken_off, make_checkpoints, mark_as_broken
   public :: put_checkpoint, put_last_checkpoint, read_checkpoint, recall_overrides, recall_input
 
-  integer, parameter :: layout = 10               !! version of the layout of checkpoints; other versions cannot be read
+  integer, parameter :: layout = 10               !! version of the layout of checkpoints; no other version can be read
   character(len=*), parameter :: slots(2) = checkpoint_group//["1", "2"]
   character(len=*), parameter :: current = checkpoint_group//"current"     !! number of the valid slot, or `none`
   integer, parameter :: none = 0
   character(len=*), parameter :: described = checkpoint_group//"input_checksum"
 
-  !> A hard link to the first slot. When HDF5 deletes the link that was created last, it overwrites the name of the link before it
-  !> removes the link from the list. If the program were killed between these two steps, h5dump could not list the file. The present
-  !> link is therefore created last and never deleted.
+  !> Path of a hard link to the first slot, which is created after all other links and never deleted. To delete the last link of a
+  !> group, HDF5 first overwrites the name of the link and then removes the link from a list. If the program were killed between
+  !> these two steps, h5dump could not list the file.
   character(len=*), parameter :: kept = checkpoint_group//"kept"
 
 contains
 
-  !> A text that identifies the program. It contains the version of checkpoints, and the compiler flags that permit inexact
-  !> arithmetic and can therefore change the results.
+  !> A text that identifies the program. The text contains the version of the layout of checkpoints, and those compiler flags that
+  !> permit inexact arithmetic and can therefore change the results.
   pure function program() result(text)
     character(len=:), allocatable :: text
 
@@ -54,7 +55,7 @@ contains
     if (index(build_flags, "-ffast-math") + index(build_flags, "-Ofast") > 0) text = text//", fast math"
   end function program
 
-  !> The input as it was used, except for variables that may change on `--resume`: one variable per line.
+  !> The input that the run uses, with one variable per line. Variables that may change on `--resume` are omitted.
   pure function fixed_input(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -63,7 +64,7 @@ contains
 
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
-        if (groups(g)%values(k)%name == "relative_to") cycle           ! the values of other variables include it
+        if (groups(g)%values(k)%name == "relative_to") cycle           ! the values of mass and radius include this factor
         if (.not. groups(g)%values(k)%is_set() .or. table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add(groups(g)%value_line(k)//eol)
       end do
@@ -71,7 +72,7 @@ contains
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
         if (.not. allocated(groups(g)%values(k)%reals)) cycle
-        if (size(groups(g)%values(k)%reals) <= most_written) cycle      ! the text above contains the value completely
+        if (size(groups(g)%values(k)%reals) <= most_written) cycle      ! the lines above contain such a value completely
         if (table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add("checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
           //trim(groups(g)%values(k)%name)//" = "//checksum(transfer(groups(g)%values(k)%reals, [0_int8]))//eol)
@@ -80,13 +81,13 @@ contains
     text = growing%text()
   end function fixed_input
 
-  !> Adds the overrides of the original command line whose variables must not change on `--resume`, so that users need not repeat
-  !> these overrides.
+  !> Adds overrides from the command line of the original run, so that users need not repeat these overrides on `--resume`.
+  !> Overrides of variables that may change on `--resume` are not added.
   subroutine recall_overrides(output, overrides, error)
     character(len=*), intent(in) :: output                       !! path of the output
-    !> in: GROUP.VARIABLE=VALUE of the present command line; out: these and the overrides from the file.
+    !> Overrides in the form GROUP.VARIABLE=VALUE. In: those of the present command line. Out: also those from the output file.
     type(text_t), allocatable, intent(inout) :: overrides(:)
-    !> Set if another version wrote the output, or if the input in the output is damaged.
+    !> Error if another version of the program wrote the output, or if the input in the output is damaged.
     type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
     type(text_t) :: override
@@ -98,7 +99,7 @@ contains
     call file%open(source_of(output), writable=.false.)
     call file%fetch_text(parameters_group//"overrides", text)
     if (checkpoint_number(file) /= none) then
-      call check_program(file, error)                         ! another version may use other names of variables
+      call check_program(file, error)                         ! other versions may use other names of variables
       if (.not. allocated(error)) call check_description(file, error)
     end if
     call file%close()
@@ -116,11 +117,12 @@ contains
     overrides = [overrides, given]
   end subroutine recall_overrides
 
-  !> Reads the texts of the input from a file, after a check that the texts are undamaged and that this program wrote them.
+  !> Reads the texts of the input from an output file. The procedure checks that the texts are undamaged and that this version of
+  !> the program wrote the texts.
   subroutine recall_input(file, text, overrides, changes, error)
     type(hdf5_file_t), intent(inout) :: file
     character(len=:), allocatable, intent(out) :: text, overrides
-    character(len=:), allocatable, intent(out) :: changes         !! changes made during the run; not allocated if there are none
+    character(len=:), allocatable, intent(out) :: changes         !! changes during the run; not allocated without changes
     type(error_t), allocatable, intent(out) :: error
 
     text = ""
@@ -133,7 +135,7 @@ contains
     call check_description(file, error)
   end subroutine recall_input
 
-  !> Reports an error if the texts of the input in the file have changed since they were written.
+  !> Reports an error if the texts of the input in the file have changed after the run wrote the texts.
   subroutine check_description(file, error)
     type(hdf5_file_t), intent(inout) :: file
     type(error_t), allocatable, intent(out) :: error
@@ -144,7 +146,7 @@ contains
     call file%report(error)
   end subroutine check_description
 
-  !> Checksum of the texts of the input in a file.
+  !> Checksum of the texts that describe the input in an output file.
   function description_checksum(file) result(text)
     type(hdf5_file_t), intent(inout) :: file
     character(len=8) :: text
@@ -165,7 +167,7 @@ contains
     name = lower_case(trim(adjustl(override(:index(override//"=", "=") - 1))))
   end function variable_of
 
-  !> Creates both slots in a new file and writes the present state to each.
+  !> Creates both slots in a new file and writes a checkpoint of the present state to each slot.
   subroutine make_checkpoints(file, groups, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -181,7 +183,8 @@ contains
     call file%link(slots(1), kept)
   end subroutine make_checkpoints
 
-  !> Copies both slots of another file into a new file, in the same layout as `make_checkpoints`, on which `remove_last` relies.
+  !> Copies both slots of another file into a new file. The slots are created in the same order as in `make_checkpoints`, because
+  !> `remove_last` depends on this order.
   subroutine copy_checkpoints(file, source)
     type(hdf5_file_t), intent(inout) :: file
     type(hdf5_file_t), intent(inout) :: source
@@ -204,8 +207,7 @@ contains
     call file%link(slots(1), kept)
   end subroutine copy_checkpoints
 
-  !> Writes a checkpoint to the slot that is not valid, and makes this slot the valid one when the data have been stored on the
-  !> disk.
+  !> Writes a checkpoint to the slot that is not valid. After the data have been stored on the disk, this slot is marked as valid.
   subroutine put_checkpoint(file, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim      !! unchanged on return
@@ -222,7 +224,7 @@ contains
     call file%flush()
   end subroutine put_checkpoint
 
-  !> Writes the final checkpoint to the first slot and removes the second one.
+  !> Writes the final checkpoint to the first slot and removes the second slot.
   subroutine put_last_checkpoint(file, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim      !! unchanged on return
@@ -233,7 +235,7 @@ contains
     call file%remove_last(slots(2), before=slots(1))
   end subroutine put_last_checkpoint
 
-  !> Marks a new file as the output of a run that broke off, which cannot be resumed.
+  !> Marks a new file as the output of a run that broke off; such a run cannot be resumed.
   subroutine mark_as_broken(file)
     type(hdf5_file_t), intent(inout) :: file
 
@@ -251,7 +253,7 @@ contains
     number = int(there(1))
   end function checkpoint_number
 
-  !> Whether a file has the second slot.
+  !> Whether a file contains the second slot.
   function has_both_checkpoints(file) result(yes)
     type(hdf5_file_t), intent(inout) :: file
     logical :: yes
@@ -259,7 +261,7 @@ contains
     yes = file%length(slots(2)) > 0
   end function has_both_checkpoints
 
-  !> Whether the run of an unfinished output broke off.
+  !> Whether an unfinished output was written by a run that broke off.
   function has_broken_off(output) result(yes)
     character(len=*), intent(in) :: output        !! path of the finished output
     logical :: yes
@@ -282,7 +284,7 @@ contains
     bytes = 8*record%words
   end function checkpoint_bytes
 
-  !> Writes a checkpoint to a slot, which is created if necessary.
+  !> Writes a checkpoint to a slot. A missing slot is created.
   subroutine put_slot(file, name, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
     character(len=*), intent(in) :: name
@@ -301,11 +303,12 @@ contains
     call exchange_all(file, record, sim, copy)
   end subroutine put_slot
 
-  !> Restores a run from its finished or unfinished output. The output has to be continued from the returned `progress`.
+  !> Restores a run from its finished or unfinished output. The returned `progress` states how many samples the output contained at
+  !> the checkpoint.
   subroutine read_checkpoint(output, input, sim, progress, finished, error)
     character(len=*), intent(in) :: output      !! path of the finished output
     type(run_input_t), intent(in) :: input
-    type(simulation_t), intent(inout) :: sim    !! in: with the box, contact law and species of the input
+    type(simulation_t), intent(inout) :: sim    !! in: simulation with the box, contact law and species of the input
     type(progress_t), intent(out) :: progress
     logical, intent(out) :: finished            !! the run had finished
     type(error_t), allocatable, intent(out) :: error
@@ -334,7 +337,7 @@ contains
     call progress%schedule%look_ahead(sim)
   end subroutine read_checkpoint
 
-  !> Reads the valid checkpoint or, if this checkpoint is damaged, the other one.
+  !> Reads the valid checkpoint. If the valid checkpoint is damaged, the checkpoint in the other slot is read.
   subroutine read_slot(file, sim, progress, error)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
@@ -342,7 +345,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(record_t) :: record
     type(simulation_t) :: blank
-    character(len=:), allocatable :: failure      ! failure of the first attempt
+    character(len=:), allocatable :: failure      ! failure of reading the valid checkpoint
     integer(int64) :: words
     integer :: number, trial
 
@@ -371,7 +374,7 @@ contains
     call file%report(error)
   end subroutine read_slot
 
-  !> Reports an error if another program, or another version, has written the checkpoint.
+  !> Reports an error if another version of the program wrote the checkpoint.
   subroutine check_program(file, error)
     type(hdf5_file_t), intent(inout) :: file
     type(error_t), allocatable, intent(out) :: error
@@ -384,7 +387,7 @@ contains
     if (.not. allocated(error)) call file%report(error)
   end subroutine check_program
 
-  !> Reports an error if the checkpoint belongs to another program or to another input.
+  !> Reports an error if another version of the program wrote the checkpoint, or if the checkpoint belongs to a different input.
   subroutine check_origin(file, groups, error)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -405,9 +408,10 @@ contains
       //", here "//legible(line_at(here, k))//"; --resume needs the unchanged input, --force starts the run again")
   end subroutine check_origin
 
-  !> Counts, writes or reads a checkpoint. For reading, the box and the species of the simulation must already be set.
+  !> Counts, writes or reads the numbers of a checkpoint. Before a checkpoint is read, the box and the species of the simulation
+  !> must be set.
   subroutine exchange_all(file, record, sim, progress)
-    type(hdf5_file_t), intent(inout) :: file      !! not used while words are counted
+    type(hdf5_file_t), intent(inout) :: file      !! not used when the numbers are counted
     type(record_t), intent(inout) :: record
     type(simulation_t), intent(inout), target :: sim
     type(progress_t), intent(inout) :: progress
@@ -438,7 +442,7 @@ contains
     end if
     call exchange_disks()
     do k = 1, size(progress%schedule)
-      ! The input contains the intervals, from which the times of the next samples follow.
+      ! The times of the next samples are not stored, because they follow from the intervals in the input.
       associate (schedule => progress%schedule(k))
                                                   ! numbers
         call record%exchange(file, schedule%count)
@@ -450,7 +454,7 @@ contains
     call record%seal(file)
   contains
 
-    !> The sums and counters over all events.
+    !> Counts, writes or reads the sums and counters over all events.
     subroutine exchange_tally()
       call sim%tally%make_room(size(sim%box%surface))
       associate (tally => sim%tally)
@@ -466,7 +470,7 @@ contains
       end associate
     end subroutine exchange_tally
 
-    !> The integers that represent each exact sum; each of these integers is twice as long as an ordinary integer.
+    !> Counts, writes or reads the 128-bit integers that represent exact sums.
     subroutine exchange_sums(sums)
       type(exact_sum_t), intent(inout) :: sums(:)
       integer(int128), target :: parts(2*size(sums))
@@ -477,7 +481,7 @@ contains
       sums%rare = parts(size(sums) + 1:)
     end subroutine exchange_sums
 
-    !> The state of the disks.
+    !> Counts, writes or reads the state of the disks.
     subroutine exchange_disks()
       real(real64), allocatable :: mass(:)
 
@@ -491,22 +495,22 @@ contains
         call exchange_short(tag%id)
         call record%exchange(file, tag%collisions)
         call exchange_short(tag%last_partner)
-        ! Without individual radii, the radii follow from the input.
+        ! If the radii are not individual, the input contains the radii.
         if (sim%features%own_sizes) call record%exchange(file, disk%radius)
       end associate
       settled = merge(1, 0, sim%events_done)
       do k = 1, merge(1, 0, sim%features%rotation) + merge(2, 0, sim%features%orientation)
-        ! Padding words, so that the length of the record differs between runs with and without rotation and orientation.
+        ! These additional numbers make the length of the record depend on whether the run has rotation and orientation.
         call record%exchange(file, settled)
       end do
       if (allocated(sim%extra)) call record%pass(file, c_loc(sim%extra(1)), size(sim%extra)*storage_size(sim%extra)/64)
       if (.not. sim%features%own_sizes) return
-      mass = sim%masses()                       ! stored even if all masses are equal to the masses of the species
+      mass = sim%masses()                       ! stored even if each mass equals the mass of the species
       call record%exchange(file, mass)
       if (record%mode == reading) sim%own_mass = mass
     end subroutine exchange_disks
 
-    !> 32-bit integers, stored as words of 64 bits.
+    !> Counts, writes or reads 32-bit integers, which are stored with 64 bits.
     subroutine exchange_short(values)
       integer(int32), intent(inout) :: values(:)
       integer(int64) :: words(size(values))

@@ -1,9 +1,10 @@
-!> Output of a run: determines when samples and checkpoints are written, and manages the output file. During the run the name of
-!> this file is OUT.h5.part, and a lock file prevents other runs from writing to it. A file with the name OUT.h5 belongs to a
-!> finished run.
+!> Output of a run: this module decides when samples are written, and manages the output file. During the run the name of the output
+!> file is OUT.h5.part, and a lock file prevents other runs from writing to the output file. A file with the name OUT.h5 belongs to
+!> a finished run.
 !>
-!> The layout of a file never changes. If the number of samples is known at the start, the file has space for exactly these
-!> samples. Otherwise a new file replaces the file, by an atomic renaming, whenever the space is used up and at the end of the run.
+!> The layout of an output file never changes after its creation. If the number of samples is known at the start, the file is
+!> created with space for exactly these samples. If the number is unknown, a larger file replaces the file by an atomic renaming
+!> whenever the space is used up. At the end of the run, a file without unused space replaces the file.
 module output
   use kinds, only: int64, real64
   use sampling_schedule, only: frames, progress_t, values
@@ -32,7 +33,8 @@ module output
 
   real(real64), parameter :: longest_wait = 0.05_real64  !! longest time that a sample waits in a buffer while the run is active [s]
   integer, parameter :: events = 3              !! index of the track of the event log, which follows `frames` and `values`
-  !> Treatment of checkpoints in a new file: copied from the old file, written for the present state, or omitted.
+  !> Treatment of the checkpoints when a new file replaces a file: copied from the old file (`kept`), written for the present state
+  !> (`anew`), or omitted (`dropped`).
   integer, parameter :: kept = 1, anew = 2, dropped = 3
 
   type :: output_t
@@ -62,7 +64,7 @@ module output
 
 contains
 
-  !> Creates the folders of the output, acquires its lock, and checks for files that must not be overwritten.
+  !> Creates the folders of the output, acquires the lock of the output, and reports files that must not be overwritten.
   subroutine claim(self, path, error)
     class(output_t), intent(inout) :: self
     character(len=*), intent(in) :: path          !! path of the finished file
@@ -84,7 +86,7 @@ contains
       if (problem /= "") call fail(error, exit_files, path//": "//problem)
     end if
     if (.not. allocated(error)) call check_places(path, error)
-    ! This file may be the incomplete file of a run that was killed.
+    ! A file with this name is the incomplete file of a run that was killed.
     if (.not. allocated(error)) call remove_file(path//unfinished_new)
     self%replaced = identity_of(path)
     if (is_file(path) .and. all(self%replaced == 0) .and. .not. allocated(error)) &
@@ -96,7 +98,7 @@ contains
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(inout) :: sim
-    !> Allows the run to replace an unfinished output now and a finished output at its end.
+    !> .true. allows the run to replace an unfinished output now, and a finished output at the end of the run.
     logical, intent(in) :: force
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: planned
@@ -145,9 +147,9 @@ contains
     end if
   end subroutine check_start
 
-  !> Opens the output of a resumed run after `claim`, and continues after the samples that had been written at the checkpoint. The
-  !> output of a finished run that is continued for longer is not changed until the longer run has finished. If the file does not
-  !> describe the present input, a new file is written.
+  !> Opens the output of a resumed run after `claim`. New samples follow the samples that had been written before the checkpoint. If
+  !> a finished run is continued, its output is not changed until the continued run has finished. If the description of the input in
+  !> the file differs from the present input, a new file is written.
   subroutine resume(self, input, sim, progress, finished, error)
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
@@ -192,7 +194,7 @@ contains
     call self%file%report(error)
   end subroutine resume
 
-  !> Sets up the tracks and the number of samples planned for each.
+  !> Sets up the tracks and the planned number of samples of each track.
   subroutine plan(self, input, sim)
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
@@ -215,8 +217,8 @@ contains
     end associate
   end subroutine plan
 
-  !> Smallest possible size of the output of a run in bytes. If the number of samples is unknown, only the first and the last sample
-  !> are included.
+  !> Smallest possible size of the output of a run in bytes. If the number of samples is unknown, the size includes only the first
+  !> and the last sample.
   function planned_bytes(input, sim) result(bytes)
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(inout) :: sim      !! unchanged on return
@@ -230,7 +232,7 @@ contains
       + sum(real(max(output%track%planned, 2_int64), real64)*real(output%track%bytes_per_sample(), real64))), int64)
   end function planned_bytes
 
-  !> Creates a file under a temporary name and writes everything except tracks and checkpoints.
+  !> Creates a file with a temporary name and writes all contents except tracks and checkpoints.
   subroutine create_file(self, file, sim)
     class(output_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -242,7 +244,7 @@ contains
     call file%put(wall_time, scalar, [self%spent])
   end subroutine create_file
 
-  !> Lowers the limits so that the simulation stops at the next sample.
+  !> Reduces the limits of the simulation, so that the simulation stops when the next sample is due.
   pure subroutine tighten(self, limits)
     class(output_t), intent(in) :: self
     type(limits_t), intent(inout) :: limits
@@ -267,7 +269,7 @@ contains
     call self%file%report(error)
   end subroutine take_due_samples
 
-  !> Takes a frame, or a sample of the observables.
+  !> Adds a frame, or a sample of the observables, to the output.
   subroutine take_sample(self, track, sim)
     class(output_t), intent(inout) :: self
     integer, intent(in) :: track                  !! `frames` or `values`
@@ -280,7 +282,8 @@ contains
     end associate
   end subroutine take_sample
 
-  !> Moves the collisions in the log to the output, and empties the log. The next call of `take_due_samples` reports a failure.
+  !> Moves the events in the event log to the output, and empties the log. If the output fails, the next call of `take_due_samples`
+  !> reports the failure.
   subroutine take_events(self, sim, log)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -292,8 +295,7 @@ contains
     log%n = 0
   end subroutine take_events
 
-  !> Adds samples to a track. If the file has no space for these samples, a larger file replaces the file before the samples are
-  !> added.
+  !> Adds samples to a track. If the file has too little space, a larger file first replaces the file.
   subroutine add(self, track, samples, sim)
     class(output_t), intent(inout) :: self
     integer, intent(in) :: track
@@ -309,7 +311,8 @@ contains
     call self%track(track)%append(self%file, samples)
   end subroutine add
 
-  !> Commits the samples that have been in a buffer for at least `least_wait`. Without this argument all samples are committed.
+  !> Commits (writes to the file) the samples that have been in a buffer for at least `least_wait`. If `least_wait` is absent, all
+  !> buffered samples are committed.
   subroutine flush_buffers(self, least_wait)
     class(output_t), intent(inout) :: self
     real(real64), intent(in), optional :: least_wait      !! [s]
@@ -323,12 +326,12 @@ contains
     end do
   end subroutine flush_buffers
 
-  !> Replaces the file by a new file with other capacities.
+  !> Replaces the file by a new file in which the tracks have different capacities.
   subroutine rebuild(self, capacities, sim, checkpoints)
     class(output_t), intent(inout) :: self
     integer(int64), intent(in) :: capacities(:)
     type(simulation_t), intent(inout) :: sim
-    integer, intent(in) :: checkpoints  !! treatment of the checkpoints: `kept`, written `anew` for the present state, or `dropped`
+    integer, intent(in) :: checkpoints  !! treatment of the checkpoints: `kept`, `anew` or `dropped`
     type(hdf5_file_t), allocatable :: new
     integer(int64) :: needed
     integer :: k
@@ -369,8 +372,8 @@ contains
     call self%file%report(error)
   end subroutine save
 
-  !> Completes the output of a finished run: checks the file and renames it to its final name. If the completion fails, the run can
-  !> be resumed just before its end from the checkpoint in the file.
+  !> Completes the output of a finished run: checks the file and gives the file its final name. If the completion fails, the run can
+  !> be resumed from the checkpoint in the file, just before the end of the run.
   subroutine finish(self, sim, cost, note, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -394,12 +397,12 @@ contains
     if (.not. allocated(error)) call self%release()
   end subroutine finish
 
-  !> Writes the last samples, removes unused space, and records how the run ended. The checkpoint of a finished run precedes the
-  !> last samples, because these samples might not be due if the run is continued for longer.
+  !> Writes the last samples, removes unused space, and records how the run ended. The final checkpoint contains the progress before
+  !> the last samples, because these samples might not be due if the run is continued.
   subroutine write_end(self, sim, cost, note, broken)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: cost(3)           !! three values since the start or the last resume:
+    real(real64), intent(in) :: cost(3)           !! three values for the present part of the run:
     !! wall time [s], collisions per processor time [1/s], number of events executed by the serial engine
     character(len=*), intent(in) :: note          !! reason why the run ended, if no stop rule was met
     logical, intent(in) :: broken
@@ -417,7 +420,8 @@ contains
     if (.not. broken) call put_last_checkpoint(self%file, sim, before)
   end subroutine write_end
 
-  !> Completes the output of a run that broke off, including its last state. The file keeps the name of an unfinished output.
+  !> Completes the output of a run that broke off, including the last state of the run. The file keeps the name of an unfinished
+  !> output.
   subroutine break_off(self, sim, cost, note)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -429,7 +433,7 @@ contains
     if (.not. allocated(uncountable)) call self%write_end(sim, cost, note, broken=.true.)
   end subroutine break_off
 
-  !> Closes the finished or unfinished file, and removes the lock.
+  !> Closes the finished or unfinished output file, and removes the lock file.
   subroutine release(self)
     class(output_t), intent(inout) :: self
 

@@ -16,7 +16,7 @@ module progress_line
     private
     real(real64) :: started = 0.0_real64           !! time when the program started [s]
     integer :: n = 0                               !! number of reports so far
-    ! Values at the times of the last reports, in circular buffers:
+    ! The following circular buffers contain the values at the times of the last reports.
     real(real64) :: clock(0:window - 1) = 0.0_real64       !! [s]
     real(real64) :: share(0:window - 1) = 0.0_real64       !! completed fraction of the run
     integer(int64) :: collisions(0:window - 1) = 0_int64
@@ -39,7 +39,7 @@ contains
     call remember(self, sim, stop_rule)
   end subroutine start
 
-  !> Shows a report if one is due.
+  !> Shows a progress report if a report is due.
   subroutine report(self, sim, stop_rule)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -61,7 +61,7 @@ contains
     call self%show(trim(line))
   end subroutine report
 
-  !> Records the present counts and times, from which the rates over the last reports are computed.
+  !> Records the present counts and times. The rates shown later are averages since an earlier record.
   subroutine remember(self, sim, stop_rule)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -75,7 +75,7 @@ contains
     self%n = self%n + 1
   end subroutine remember
 
-  !> Seconds as h:mm:ss.
+  !> Converts a number of seconds to a text of the form h:mm:ss.
   pure function clock_text(s) result(text)
     real(real64), intent(in) :: s
     character(len=:), allocatable :: text

@@ -1,4 +1,4 @@
-!> Constant contents of an output file: format and author, box, disks, all parameters, and provenance.
+!> Writes the constant contents of an output file: format and author, box, disks, all parameters, and provenance.
 module run_description
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_fortran_env, only: compiler_version
@@ -23,7 +23,7 @@ module run_description
 
   !> Largest number of values in an attribute, because HDF5 limits attributes to 64 kB.
   integer, parameter :: longest_attribute = 1000
-  integer, parameter :: longest_note = 500            !! length of the text that states why the run ended
+  integer, parameter :: longest_note = 500            !! largest length of the text that states why the run ended
 
 contains
 
@@ -51,7 +51,7 @@ contains
     call describe_end(file, input%settings%run%threads, 0.0_real64, [0.0_real64, 0.0_real64], "")
   contains
 
-    !> Format, author and creator, as H5MD requires.
+    !> Writes the version of the format, the author and the creator, as H5MD requires.
     subroutine describe_format()
       call file%make_group("h5md/author")
       call file%make_group("h5md/creator")
@@ -63,7 +63,7 @@ contains
       call file%put("h5md/modules/thermodynamics@version", [2], [1_int32, 0_int32])
     end subroutine describe_format
 
-    !> Boundary conditions and edges of the box.
+    !> Writes the boundary conditions and edges of the box.
     subroutine describe_box()
       character(len=8) :: boundary(2)
 
@@ -75,7 +75,7 @@ contains
       call file%put(box_group//"/lower", [2], sim%box%lower)
     end subroutine describe_box
 
-    !> Constant properties of the disks, in the order of the input.
+    !> Writes the constant properties of the disks, in the order of the input.
     subroutine describe_disks()
       integer(int32), allocatable :: numbers(:)
       real(real64), allocatable :: sizes(:)
@@ -92,14 +92,14 @@ contains
       call file%put(disk_radius, [size(sizes)], sizes)
     end subroutine describe_disks
 
-    !> The text of the input, and the value of every variable that the run uses.
+    !> Writes the text of the input, and the value of every variable that the run uses.
     subroutine describe_input()
       character(len=:), allocatable :: group
       integer :: g, k
 
       do g = 1, size(input%groups)
         associate (own => input%groups(g))
-          if (any(obstacle_groups == own%name)) cycle     ! one table for each group name describes these groups
+          if (any(obstacle_groups == own%name)) cycle     ! `describe_table` writes a table of these groups
           group = parameters_group//trim(own%name)
           if (is_repeated(own%name)) group = group//"/"//trim(own%instance)
           call file%make_group(group)
@@ -113,8 +113,8 @@ contains
       if (allocated(input%changes)) call file%put(changes_at_work, input%changes)
     end subroutine describe_input
 
-    !> Dimension and number of particles, which the thermodynamics module of H5MD requires in addition to the observables of a
-    !> group.
+    !> Writes the dimension and the number of particles, which the thermodynamics module of H5MD requires for each group of
+    !> observables.
     subroutine describe_populations()
       character(len=:), allocatable :: group
       integer(int32) :: n
@@ -131,7 +131,7 @@ contains
       end do
     end subroutine describe_populations
 
-    !> The build and the machine that created the file.
+    !> Writes data about the build of the program and the computer that created the file.
     subroutine describe_origin()
       call file%make_group(provenance)
       call file%put(provenance//"@program_version", program_version)
@@ -144,7 +144,7 @@ contains
     end subroutine describe_origin
   end subroutine describe_run
 
-  !> Name of the user, according to the environment.
+  !> Name of the user, from the environment variables.
   function author() result(name)
     character(len=:), allocatable :: name
     integer :: length
@@ -164,7 +164,7 @@ contains
     yes = index(variable, "run.threads") == 1
   end function changes_nothing
 
-  !> The overrides of the command line, one variable per line.
+  !> Overrides of the command line, with one variable per line.
   pure function overrides_text(input) result(text)
     type(run_input_t), intent(in) :: input
     character(len=:), allocatable :: text
@@ -177,7 +177,7 @@ contains
     text = growing%text()
   end function overrides_text
 
-  !> Whether a file describes this input.
+  !> Whether the description of the input in a file agrees with the given input.
   function describes(file, input) result(yes)
     type(hdf5_file_t), intent(inout) :: file
     type(run_input_t), intent(in) :: input
@@ -219,8 +219,8 @@ contains
     end select
   end subroutine describe_value
 
-  !> Writes all groups of one name as a table, with a dataset for each variable. A variable with a choice of two words is stored as
-  !> a flag with the name of the second word.
+  !> Writes all groups of one name as a table, with a dataset for each variable. If a variable has two choices, a flag is stored
+  !> under the name of the second choice; the flag is 1 for the second choice.
   subroutine describe_table(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -235,7 +235,7 @@ contains
       associate (row => table(groups(1)%values(k)%row))
         path = parameters_group//trim(row%group)//"/"
         second = trim(row%choices(index(trim(row%choices), " ", back=.true.) + 1:))
-        ! Not stored here, because the obstacles themselves are stored: see `describe_rows`.
+        ! The name of the file is not stored, because `describe_rows` stores the obstacles themselves.
         if (row%name == "file") cycle
         if (row%kind == "text") then
           do g = 1, n
@@ -245,7 +245,7 @@ contains
           if (second /= "") call file%put(path//second, [n], merge(1_int32, 0_int32, texts == second))
         else
           if (.not. any([(groups(g)%values(k)%is_set(), g=1, n)])) cycle
-          if (row%size == 0) cycle                          ! a list of points, which is stored as obstacles: see `describe_rows`
+          if (row%size == 0) cycle                          ! `describe_rows` stores lists of points as obstacles
           values = spread(ieee_value(0.0_real64, ieee_quiet_nan), 1, row%size*n)     ! NaN for groups without a value
           do g = 1, n
             if (size(groups(g)%reals_of(trim(row%name))) /= row%size) cycle
@@ -259,14 +259,15 @@ contains
   end subroutine describe_table
 
   !> Writes a table of all obstacles in the groups of one name, in the order of their codes. The table contains the geometry of each
-  !> obstacle and the number of its group. These data are needed if a group describes several obstacles by a file or a polyline.
+  !> obstacle and the number of the group of the obstacle. The table is needed because a group can describe several obstacles by a
+  !> file or a polyline.
   subroutine describe_rows(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: path
     integer(int32), allocatable :: group(:)
     real(real64), allocatable :: values(:)
-    integer :: g, k, n(size(groups))                  ! number of obstacles in each group
+    integer :: g, k, n(size(groups))                  ! n: number of obstacles in each group
 
     if (.not. any([(has_many(groups(g)), g=1, size(groups))])) return
     path = parameters_group//trim(groups(1)%name)//"_rows/"
@@ -284,12 +285,13 @@ contains
     call file%put(path//"group", [size(group)], group)
   end subroutine describe_rows
 
-  !> Writes or overwrites the values that are known only at the end.
+  !> Writes the values that are known only at the end of the run, or overwrites earlier values.
   subroutine describe_end(file, threads, wall_seconds, rate, note)
     type(hdf5_file_t), intent(inout) :: file
     integer, intent(in) :: threads                    !! number of threads in the last part of the run
     real(real64), intent(in) :: wall_seconds          !! wall time of the whole run, summed over its parts [s]
-    !> in the last part of the run: collisions per processor time [1/s], and number of events executed by the serial engine.
+    !> Two values for the last part of the run: collisions per processor time [1/s], and number of events that the serial engine
+    !> executed.
     real(real64), intent(in) :: rate(2)
     character(len=*), intent(in) :: note              !! reason why the run ended, if no stop rule was met
     character(len=longest_note) :: padded

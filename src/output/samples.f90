@@ -1,5 +1,5 @@
-!> The series in a frame, in a sample of the observables and in a sample of the event log. The series are in the same order as the
-!> values in `sample_values`.
+!> Defines the series of which a frame, a sample of the observables and a record of the event log consist. The order of the series
+!> agrees with the order of the values in the module `sample_values`.
 module samples
   use kinds, only: int32, int64, largest_exact
   use errors, only: error_t, exit_broken, fail
@@ -14,7 +14,7 @@ module samples
 
 contains
 
-  !> The series of the frames: step, time, and the values of all disks.
+  !> Series of the frames: step, time, and the values of all disks.
   pure function frame_series(list, n, single) result(series)
     type(frame_column_t), intent(in) :: list(:)   !! columns of the frames
     integer, intent(in) :: n                      !! number of disks
@@ -32,7 +32,7 @@ contains
     end do
   end function frame_series
 
-  !> The series of the observables: step, time, and every observable.
+  !> Series of the observables: step, time, and every observable.
   pure function observable_series(list) result(series)
     type(observable_list_t), intent(in) :: list
     type(series_t), allocatable :: series(:)
@@ -48,7 +48,7 @@ contains
     end do
   end function observable_series
 
-  !> The series of the event log, in the order of its records.
+  !> Series of the event log, in the order of the values in its records.
   pure function event_series() result(series)
     type(series_t) :: series(5)
 
@@ -57,7 +57,7 @@ contains
       series_t(events_group//"momentum_change", double_precision, 1, [2, 1])]
   end function event_series
 
-  !> Reports an error if a counter of the simulation is too large to be represented exactly in a sample, which consists of reals.
+  !> Reports an error if a counter of the simulation is too large to be represented exactly as a real number in a sample.
   subroutine check_counts(sim, error)
     type(simulation_t), intent(in) :: sim
     type(error_t), allocatable, intent(out) :: error
@@ -66,14 +66,14 @@ contains
 
     too_far = .false.
     do i = 1, merge(sim%n_disks(), 0, any(sim%box%periodic))
-      ! The number of periods must be smaller than the limit, because a frame may add one period.
+      ! The present number of periods must be smaller than `largest_exact`, because the number in a frame may be larger by one.
       too_far = too_far .or. any(abs(sim%extra(i)%image) >= largest_exact)
     end do
     if (sim%tally%events > int(largest_exact, int64) .or. too_far) &
       call fail(error, exit_broken, "more than 2**53 collisions or periods: the output cannot count further")
   end subroutine check_counts
 
-  !> The series of step and time of an H5MD element.
+  !> Series of the step and the time of an H5MD element.
   pure function step_and_time(element) result(series)
     character(len=*), intent(in) :: element
     type(series_t) :: series(2)

@@ -10,17 +10,17 @@ module sampling_schedule
   private
   public :: schedule_t, by_time, by_collisions, by_events, progress_t, frames, values
 
-  !> Quantities by which intervals are measured.
+  !> Quantities in which the intervals between samples are measured.
   integer, parameter :: by_time = 1, by_collisions = 2, by_events = 3
 
   integer, parameter :: units_lost = 4  !! times that differ by at most this number of units in the last place are treated as equal
 
   type :: schedule_t
-    !> Intervals of time, of collisions and of events; the intervals of collisions and events need not be integers.
+    !> Intervals of the time, of the number of collisions and of the number of events; none of the intervals needs to be an integer.
     real(real64) :: every(3) = never
-    type(sampling_t) :: chosen                    !! the sampling rules of the input, with the given times
+    type(sampling_t) :: chosen                    !! sampling schedule from the input, with the given times
     integer(int64) :: count = 0                   !! number of samples taken; the first sample is due at the start
-    real(real64) :: next(3) = never               !! time, collisions and events at which the next samples are due
+    real(real64) :: next(3) = never               !! time, number of collisions and number of events of the next samples
     real(real64) :: last_time = -1.0_real64       !! time of the last sample [time]
     integer(int64) :: last_events = -1            !! number of events and kicks before the last sample
   contains
@@ -33,10 +33,10 @@ module sampling_schedule
     procedure, private :: next_time, number_within
   end type schedule_t
 
-  !> The progress of the output. The progress and the state of the simulation together are sufficient to resume a run.
+  !> Progress of the output. A run can be resumed from the progress of the output and the state of the simulation.
   type :: progress_t
     type(schedule_t) :: schedule(2)               !! schedules of frames and of observables
-    integer(int64) :: events = 0                  !! number of collisions written to the event log
+    integer(int64) :: events = 0                  !! number of events written to the event log
   end type progress_t
   integer, parameter :: frames = 1, values = 2
 
@@ -46,7 +46,7 @@ module sampling_schedule
 
 contains
 
-  !> The progress of a run that has not written anything yet.
+  !> Progress of the output at the start of a run.
   pure function new_progress(settings) result(progress)
     type(settings_t), intent(in) :: settings
     type(progress_t) :: progress
@@ -58,7 +58,8 @@ contains
     end do
   contains
 
-    !> Intervals of time, of collisions (given in total or per disk), and of events.
+    !> Converts the intervals in the input, of which one may be given per disk, to intervals of the time, of collisions and of
+    !> events.
     pure function intervals(every)
       real(real64), intent(in) :: every(:)        !! see `settings: sampled_by`
       real(real64) :: intervals(3)
@@ -97,13 +98,13 @@ contains
     call self%look_ahead(sim)
   end subroutine take
 
-  !> Finds the times and counts at which the next samples are due, which are the next multiples of the intervals. The result follows
-  !> from the present state and does not depend on the time of the last sample. The only exception is a sample that is due now, at a
-  !> time at which events may still occur.
+  !> Finds the time and the counts at which the next samples are due, which are the next multiples of the intervals. The result
+  !> depends only on the present state and not on the time of the last sample. There is one exception: a sample that is due at the
+  !> present time is still to be taken if further events may occur at this time.
   elemental subroutine look_ahead(self, sim)
     class(schedule_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    logical :: over                               ! all samples of the present time have been taken or missed
+    logical :: over                               ! no further sample can be due at the present time
 
     over = sim%events_done .or. self%last_time >= sim%time()
     self%next(by_time) = self%next_time(sim%time(), merge(sim%time(), self%last_time, over))
@@ -121,9 +122,10 @@ contains
     limits%sampled = max(limits%sampled, self%last_time)
   end subroutine tighten
 
-  !> The time of the first sample that is due at or after `time` and after `past`. A sample is due at each multiple of the interval,
-  !> at each logarithmic sampling time, and at each given time. Multiples are computed as products, because sums would accumulate
-  !> rounding errors. If several such times differ only by rounding errors, a single sample is due at the last of these times.
+  !> Time of the next sample: the first sampling time that is not before `time` and is later than `past`. Sampling times are the
+  !> multiples of the interval, the logarithmic sampling times, and the given times. Multiples are calculated as products, because
+  !> sums would accumulate rounding errors. If several sampling times differ only by rounding errors, a single sample is taken, at
+  !> the last of these times.
   pure function next_time(self, time, past) result(next)
     class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: time, past        !! [time]
@@ -155,14 +157,14 @@ contains
     end do
   contains
 
-    !> Whether a time is later than the present time.
+    !> Whether the time t is not before `time` and is later than `past`.
     pure logical function is_ahead(t)
       real(real64), intent(in) :: t
 
       is_ahead = t >= time .and. t > past + units_lost*spacing(past)
     end function is_ahead
 
-    !> The first of the given times that is later than the present time.
+    !> The first of the given times for which `is_ahead` is .true.
     pure real(real64) function first_ahead(times)
       real(real64), intent(in) :: times(:)        !! in ascending order [time]
       integer :: behind, ahead, middle
@@ -182,8 +184,8 @@ contains
     end function first_ahead
   end function next_time
 
-  !> The first number of collisions or events beyond n at which the next multiple of an interval is reached. A run with this
-  !> multiple as a stop rule would end at the same number.
+  !> The first number of collisions or events larger than n at which a multiple of an interval is reached. A run whose stop rule is
+  !> equal to this multiple ends at the same number.
   elemental function next_number(n, every) result(next)
     integer(int64), intent(in) :: n
     real(real64), intent(in) :: every
@@ -199,12 +201,12 @@ contains
     next = whole_collisions(multiple*every)
   end function next_number
 
-  !> Number of samples of a run, if it is known in advance, otherwise 0. The number is known under two conditions: there is at most
-  !> one interval, and the only stop rule limits the quantity in which the interval is measured (the time, if sampling times are
-  !> given).
+  !> Number of samples of a run if this number is known at the start, otherwise 0. Two conditions must be met: the schedule has at
+  !> most one interval, and the run has only one stop rule, which limits the quantity in which the interval is measured. If the
+  !> schedule contains sampling times, this quantity is the time.
   elemental function planned(self, limits) result(n)
     class(schedule_t), intent(in) :: self
-    type(limits_t), intent(in) :: limits          !! of the run
+    type(limits_t), intent(in) :: limits          !! limits of the run
     integer(int64) :: n
     logical :: given(3), limited(3), chooses
 
@@ -221,8 +223,8 @@ contains
     if (given(by_events)) n = numbers_within(limits%events, self%every(by_events))
   end function planned
 
-  !> Number of times from 0 to t at which samples are due, including 0 and t. The result is 0 if the number is too large to reserve
-  !> space for all samples.
+  !> Number of times from 0 to t at which samples are due, including 0 and t. The result is 0 if the number is too large for an
+  !> output with space for all samples.
   pure function number_within(self, t) result(n)
     class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: t                 !! [time]
@@ -240,8 +242,8 @@ contains
     if (n > too_many) n = 0
   end function number_within
 
-  !> Number of times 0, dt, 2 dt, ... up to t, including t itself. The result is 0 if the number is too large to reserve space for
-  !> all samples.
+  !> Number of multiples of dt from 0 to t, including 0 and t. The result is 0 if the number is too large for an output with space
+  !> for all samples.
   pure function multiples_within(t, dt) result(n)
     real(real64), intent(in) :: t, dt
     integer(int64) :: n
@@ -255,7 +257,8 @@ contains
     n = n + 1
   end function multiples_within
 
-  !> Number of samples from 0 up to a limit of collisions or events, including the samples at 0 and at the limit.
+  !> Number of samples between 0 collisions (or events) and a limit of collisions (or events), including the samples at 0 and at the
+  !> limit.
   pure function numbers_within(limit, every) result(n)
     integer(int64), intent(in) :: limit
     real(real64), intent(in) :: every
