@@ -215,7 +215,8 @@ contains
     if (row%goes_with == "") return
     associate (words => words_of(row%goes_with))
       text = trim(row%group)//"."//trim(words(1))//" = "//either(words(2:))
-      if (row%group == "species") text = text//"; if "//trim(words(1))//" is not given, '"//trim(words(2))//"' follows"
+      if (row%group == "species") text = text//"; if "//trim(words(1))//" is not given, "//trim(row%name)//" sets " &
+        //trim(words(1))//" = '"//trim(words(2))//"'"
     end associate
   end function condition_of
 

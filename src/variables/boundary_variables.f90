@@ -1,4 +1,4 @@
-!> Variables of `&box`, `&side`, `&obstacle` and `&wall`: rows of the table of `variables`.
+!> Table rows that describe the variables of the groups `&box`, `&side`, `&obstacle` and `&wall`.
 module boundary_variables
   use collisions, only: wall_rules
   use side_motion, only: motions
@@ -11,17 +11,18 @@ module boundary_variables
     variable_t("box", "lower", "real", 2, "default", "0, 0", &
       "Lower left corner of the box: its x and its y coordinate.", unit="length"), &
     variable_t("box", "upper", "real", 2, "default", "1, 1", &
-      "Upper right corner of the box: its x and its y coordinate, each larger than that of box.lower.", unit="length"), &
+      "Upper right corner of the box: its x and its y coordinate. Each coordinate must be larger than the same coordinate of " &
+      //"box.lower.", unit="length"), &
     variable_t("box", "boundary", "text", 2, "default", "'wall', 'wall'", &
-      "Kind of boundary along each axis: first of the left and right side, then of the bottom and top side.", &
+      "Kinds of boundaries: first the kind of the left and the right side, then the kind of the bottom and the top side.", &
       choices="wall periodic"), &
     variable_t("box", "gravity", "real", 2, "default", "0, 0", &
       "Uniform acceleration of all disks: its x and its y component. The component along a periodic axis must be 0. Gravity " &
-      //"excludes box.shear_rate and output.helfand.", unit="length/time**2", may_change=in_motion), &
+      //"cannot be combined with box.shear_rate or output.helfand.", unit="length/time**2", may_change=in_motion), &
     variable_t("box", "shear_rate", "real", 1, "default", "0", &
       "Shear rate: the gradient along y of the flow velocity along x, imposed by Lees-Edwards boundary conditions. A shear " &
-      //"rate other than 0 needs box.boundary = 'periodic', 'periodic'. It excludes gravity, obstacles, walls, run.dynamics " &
-      //"= 'steps', output.helfand, stop.energy_fraction and stop.at_rest.", unit="1/time")]
+      //"rate other than 0 needs box.boundary = 'periodic', 'periodic'. Shear cannot be combined with box.gravity, &obstacle, " &
+      //"&wall, run.dynamics = 'steps', output.helfand, stop.energy_fraction or stop.at_rest.", unit="1/time")]
 
   type(variable_t), parameter :: side_rows(*) = [ &
     variable_t("side", "name", "text", 1, "example", "'bottom'", &
@@ -37,16 +38,15 @@ module boundary_variables
     variable_t("side", "period", "real", 1, "required", "1", &
       "Period of the oscillation.", positive, "time", goes_with="motion sine parabolic", may_change=in_motion), &
     variable_t("side", "phase", "real", 1, "fallback", "0", &
-      "Phase of the oscillation at t = 0, in units of the period. With 0 the side starts at its mean position, moving " &
-      //"inwards.", unit_interval, goes_with="motion sine parabolic", may_change=in_motion), &
+      "Phase of the oscillation at t = 0, in units of the period. With phase = 0 the side starts at its mean position and " &
+      //"moves inwards.", unit_interval, goes_with="motion sine parabolic", may_change=in_motion), &
     variable_t("side", "position", "real", 1, "optional", "1", &
       "Coordinate of the side at the start of its motion: x of the left or right side, y of the bottom or top side.", &
       unit="length", goes_with="motion still constant_velocity piston", &
       otherwise="the coordinate in box.lower or box.upper"), &
     variable_t("side", "velocity", "real", 1, "required", "1", &
-      "Velocity of the side, positive inwards. With motion = 'sawtooth' this is the velocity with which the side strikes the " &
-      //"disks, and it must be > 0. With motion = 'constant_velocity' a negative velocity moves the side " &
-      //"outwards.", unit="length/time", &
+      "Velocity of the side, positive inwards. With motion = 'sawtooth' the side strikes the disks with this velocity, which " &
+      //"must be > 0. With motion = 'constant_velocity' a negative velocity moves the side outwards.", unit="length/time", &
       goes_with="motion sawtooth constant_velocity", may_change=in_motion), &
     variable_t("side", "start_time", "real", 1, "fallback", "0", &
       "Time at which the side starts to move. Before this time the side stands still at its position.", not_negative, "time", &
@@ -55,7 +55,8 @@ module boundary_variables
       "Time at which the side stops, later than start_time. After this time the side does not move.", positive, "time", &
       goes_with="motion constant_velocity", may_change=in_motion), &
     variable_t("side", "mass", "real", 1, "required", "10", &
-      "Mass of the piston.", positive, "mass", goes_with="motion piston", may_change=in_motion), &
+      "Mass of the piston. Gravity does not act on the piston.", &
+      positive, "mass", goes_with="motion piston", may_change=in_motion), &
     variable_t("side", "force", "real", 1, "required", "1", &
       "Constant force on the piston, directed inwards. The force divided by the length of the side is the external pressure.", &
       not_negative, "energy/length", goes_with="motion piston", may_change=in_motion)]
@@ -73,7 +74,7 @@ module boundary_variables
     variable_t("obstacle", "side", "text", 1, "default", "'outside'", &
       "Side of the circle on which the disks are.", choices="outside inside"), &
     variable_t("obstacle", "file", "text", 1, "optional", "'scatterers.txt'", &
-      "File that describes many circles in place of centre and radius. A text file contains a line of column names (x y " &
+      "File that describes many circles and replaces centre and radius. A text file contains a line of column names (x y " &
       //"radius) and one line for each circle. An HDF5 file (.h5) contains the datasets centre and radius. A file may " &
       //"describe up to 1000000 circles. All circles of the file are one obstacle with one collision rule and one set of " &
       //"observables. The path is relative to the folder in which the program is started.", excludes="centre radius", &
@@ -91,17 +92,18 @@ module boundary_variables
       "Second end point of the straight wall: its x and its y coordinate, inside the box.", unit="length", &
       otherwise="none; needed, unless points or file is given"), &
     variable_t("wall", "points", "real", 0, "optional", "0, 0, 0.5, 0.2, 1, 0", &
-      "Points x1, y1, x2, y2, ... of a polyline (at least two) in place of from and to. The polyline is closed if the last " &
-      //"point equals the first point.", unit="length", excludes="from to", otherwise="none; the wall is one straight " &
+      "Points x1, y1, x2, y2, ... of a polyline, which replaces from and to. The polyline has at least two points, and is " &
+      //"closed if the last point equals the first point.", &
+      unit="length", excludes="from to", otherwise="none; the wall is one straight " &
       //"segment"), &
     variable_t("wall", "file", "text", 1, "optional", "'walls.txt'", &
-      "File that describes many straight walls in place of from and to. A text file contains a line of column names (x1 y1 x2 " &
-      //"y2) and one line for each wall. An HDF5 file (.h5) contains the datasets from and to. A file may describe up to " &
+      "File that describes many straight walls and replaces from and to. A text file contains a line of column names (x1 y1 " &
+      //"x2 y2) and one line for each wall. An HDF5 file (.h5) contains the datasets from and to. A file may describe up to " &
       //"1000000 walls. All walls of the file are one obstacle with one collision rule and one set of observables. The path " &
       //"is relative to the folder in which the program is started.", excludes="from to points", &
       otherwise="none; the group describes one wall or polyline")]
 
-  !> The collision rule of a boundary, which is set in the group of the boundary.
+  !> Variables of the contact law of a boundary, which belong to each of the groups `&side`, `&obstacle` and `&wall`.
   type(variable_t), parameter :: law_rows(*) = [ &
     variable_t("", "restitution", "real", 1, "optional", "0.9", &
       "Coefficient of restitution of collisions of disks with this boundary: 1 is elastic, 0 perfectly inelastic. The rule " &
@@ -126,10 +128,10 @@ module boundary_variables
       positive, "energy", excludes="restitution rule tangential_restitution friction motion", may_change=in_motion, &
       otherwise="none; the boundary is not thermal"), &
     variable_t("", "surface_velocity", "real", 1, "fallback", "0", &
-      "Tangential velocity of the surface, as of a conveyor belt; the boundary itself does not move. A positive velocity is " &
-      //"directed along +x on the bottom and top side, along +y on the left and right side, from the first to the second " &
-      //"point of a wall, and counter-clockwise on a circle. A value other than 0 needs a thermal boundary (temperature) or a " &
-      //"rough one (tangential_restitution > -1).", unit="length/time", may_change=in_motion)]
+      "Tangential velocity of the surface of this boundary, as of a conveyor belt. The boundary itself does not move. A " &
+      //"positive velocity is directed along +x on the bottom and top side, along +y on the left and right side, from the " &
+      //"first to the second point of a wall, and counter-clockwise on a circle. A value other than 0 needs a thermal " &
+      //"boundary (temperature) or a rough boundary (tangential_restitution > -1).", unit="length/time", may_change=in_motion)]
 
   integer :: g, r
   type(variable_t), parameter :: own_law_rows(*) = [((variable_t(wall_groups(g), law_rows(r)%name, law_rows(r)%kind, &

@@ -1,4 +1,4 @@
-!> Variables of `&species`, `&contact` and `&drive`: rows of the table of `variables`.
+!> Table rows that describe the variables of the groups `&species`, `&contact` and `&drive`.
 module disk_variables
   use collisions, only: restitution_laws, wall_rules
   use drive, only: drive_kinds
@@ -17,79 +17,85 @@ module disk_variables
       "Number of disks of the species.", count_of_disks, &
       otherwise="follows from grid, position or file; needed without these"), &
     variable_t("species", "mass", "real", 1, "default", "1", &
-      "Mass of each disk. With relative_to the value is a multiple of the mass of the other species; with mass_scaling = " &
-      //"'area' it is the mass of a disk that has the mean radius. If mass is not given and file contains masses, the masses " &
-      //"in file are used.", &
+      "Mass of each disk. With relative_to, the value is a multiple of the mass of the other species. With mass_scaling = " &
+      //"'area', the value applies to a disk that has the mean radius. If mass is not given and the starting file (file) " &
+      //"contains masses, these masses are used.", &
       positive, "mass"), &
     variable_t("species", "radius", "real", 1, "example", "0.01", &
-      "Radius of each disk; with polydispersity, the mean radius. With relative_to the value is a multiple of the radius of " &
-      //"the other species (1 if it is not given). One of radius, packing_fraction and relative_to must be given, unless file " &
-      //"contains radii.", positive, "length", otherwise="follows from packing_fraction, relative_to or file; needed without " &
+      "Radius of each disk; with polydispersity, the mean radius. With relative_to, the value is a multiple of the radius of " &
+      //"the other species, and its default is 1. One of the variables radius, packing_fraction and relative_to must be " &
+      //"given, unless the starting file (file) contains radii.", &
+      positive, "length", otherwise="follows from packing_fraction, relative_to or file; needed without " &
       //"these"), &
     variable_t("species", "packing_fraction", "real", 1, "optional", "0.3", &
-      "Packing fraction: total area of the disks of the species, divided by the area of its region. The radius follows from " &
-      //"the packing fraction.", fraction, excludes="radius relative_to", otherwise="none; the radius is given in another " &
+      "Packing fraction: total area of the disks of the species, divided by the area of its region. The program calculates " &
+      //"the radius from the packing fraction.", &
+      fraction, excludes="radius relative_to", otherwise="none; the radius is given in another " &
       //"way"), &
     variable_t("species", "radius_distribution", "text", 1, "optional", "'gaussian'", &
       "Distribution of the radii about their mean in a polydisperse species. The distribution is truncated so that the " &
-      //"largest radius is at most ten times the smallest radius. Used with polydispersity.", choices="uniform gaussian " &
+      //"largest radius is at most ten times the smallest radius. The variable polydispersity must also be given.", &
+      choices="uniform gaussian " &
       //"lognormal", &
       otherwise="'uniform' if polydispersity is given; else all radii are equal"), &
     variable_t("species", "polydispersity", "real", 1, "required", "0.2", &
-      "Polydispersity: standard deviation of the radii divided by the mean radius. Largest values are 0.47 for the uniform, " &
-      //"0.27 for the Gaussian and 0.39 for the lognormal distribution. Polydispersity cannot be combined with radii from " &
-      //"file.", &
+      "Polydispersity: standard deviation of the radii divided by the mean radius. The largest allowed value is 0.47 for the " &
+      //"uniform, 0.27 for the Gaussian and 0.39 for the lognormal distribution. Polydispersity cannot be combined with radii " &
+      //"from a starting file (file).", &
       spread_of_radii, goes_with="radius_distribution uniform gaussian lognormal"), &
     variable_t("species", "mass_scaling", "text", 1, "fallback", "'equal'", &
       "Dependence of the mass of a disk on its radius in a polydisperse species.", choices="equal area", &
       goes_with="radius_distribution uniform gaussian lognormal"), &
     variable_t("species", "relative_to", "text", 1, "optional", "'bed'", &
-      "Name of another species to which mass and radius of this species are relative: with relative_to = 'bed', mass = 25 is " &
-      //"25 times the mass of a disk of bed. The radii of the other species must not be from file. If the other species is " &
-      //"polydisperse, its mean radius is used.", otherwise="none; mass and radius are absolute values"), &
+      "Name of another species relative to which mass and radius of this species are given. For example, mass = 25 with " &
+      //"relative_to = 'bed' is 25 times the mass of a disk of the species 'bed'. The radii of the other species must not " &
+      //"come from a starting file (file). If the other species is polydisperse, its mean radius is used.", &
+      otherwise="none; mass and radius are absolute values"), &
     variable_t("species", "region", "real", 4, "optional", "0, 1, 0, 0.5", &
       "Rectangle in which the disks start: xlo, xhi, ylo, yhi. At the start each disk lies completely inside the rectangle; " &
-      //"later it may leave the rectangle.", unit="length", otherwise="the whole box"), &
+      //"later the disks may leave the rectangle.", unit="length", otherwise="the whole box"), &
     variable_t("species", "placement", "text", 1, "default", "'random'", &
-      "Method that generates the initial positions. If placement is not given, the method follows from grid, position or " &
-      //"file.", &
+      "Method that generates the initial positions. If placement is not given, but grid, position or file is given, this " &
+      //"variable determines the method.", &
       choices="random grid lattice dense explicit file grown"), &
     variable_t("species", "grid", "integer", 2, "required", "10, 10", &
-      "Numbers of columns and of rows of the rectangular grid. The product is the number of disks.", count_of_disks, &
+      "Numbers of columns and of rows of the rectangular grid. The product of the two numbers is the number of disks.", &
+      count_of_disks, &
       goes_with="placement grid"), &
     variable_t("species", "file", "text", 1, "required", "'runs/gas.h5'", &
       "Starting file: a text file with lines `x y [vx vy]` or with named columns (x y vx vy omega angle radius mass species), " &
-      //"or the output file (.h5) of another run, of which the last frame is used. Count, mass and radius are read from the " &
-      //"file if the input does not contain them. The path is relative to the folder in which the program is started.", &
+      //"or the output file (.h5) of another run, whose last frame is used. Count, mass and radius are read from the file if " &
+      //"the input does not contain them. The path is relative to the folder in which the program is started.", &
       goes_with="placement file grown"), &
     variable_t("species", "scale_positions", "logical", 1, "fallback", ".false.", &
-      "Scaling of the positions in file from the box of that run to this box. The scaling requires that file is the output " &
-      //"file of a run.", &
+      "Scaling of the positions in the starting file (file) from the box of the earlier run to the box of this run. The " &
+      //"starting file must be the output file (.h5) of a run.", &
       goes_with="placement file grown"), &
     variable_t("species", "position", "real", 0, "required", "0.2, 0.5, 0.8, 0.5", &
       "Positions of the disks: x1, y1, x2, y2, ..., one pair for each disk.", unit="length", goes_with="placement explicit"), &
     variable_t("species", "velocities", "text", 1, "default", "'rest'", &
-      "Method that generates the initial velocities. If velocities is not given, the method follows from velocity, speed, " &
-      //"temperature or file. In a periodic box without obstacles and gravity, generated velocities have zero total " &
-      //"momentum.", &
+      "Method that generates the initial velocities. If velocities is not given, but velocity, speed, temperature or file is " &
+      //"given, this variable determines the method. In a periodic box without obstacles and gravity, generated velocities " &
+      //"have zero total momentum.", &
       choices="rest equal_speed uniform maxwell explicit file"), &
     variable_t("species", "speed", "real", 1, "fallback", "1", &
-      "Speed of the disks at the start. With velocities = 'uniform' this is the largest value of |vx| and of |vy|.", &
+      "Speed of the disks at the start. With velocities = 'uniform' the value is the upper limit of |vx| and of |vy|.", &
       not_negative, "length/time", goes_with="velocities equal_speed uniform"), &
     variable_t("species", "temperature", "real", 1, "fallback", "1", &
       "Temperature kT of the Maxwell distribution from which the initial velocities are drawn. The temperature of the drawn " &
       //"velocities deviates from this value at random, unless exact_temperature is given.", not_negative, "energy", &
       goes_with="velocities maxwell"), &
     variable_t("species", "exact_temperature", "real", 1, "optional", "1", &
-      "Temperature kT to which the initial velocities are scaled exactly, relative to the mean velocity of the species; kT = " &
-      //"sum of m v**2 over 2N. Velocities from any method can be scaled, except those of disks at " &
-      //"rest.", not_negative, "energy", &
+      "Temperature kT that the species has exactly at the start. All velocities v relative to the centre of mass of the " &
+      //"species are multiplied by a common factor, so that the sum of m v**2 over the N disks of the species is 2N kT. The " &
+      //"variable applies to all methods (velocities) except 'rest', and needs at least two disks.", not_negative, "energy", &
       otherwise="none; velocities are not scaled"), &
     variable_t("species", "velocity", "real", 0, "required", "1, 0", &
       "Velocities of the disks at the start: vx1, vy1, vx2, vy2, ..., one pair for each disk, or a single pair for all " &
       //"disks.", unit="length/time", goes_with="velocities explicit"), &
     variable_t("species", "angular_velocity", "real", 1, "optional", "2", &
-      "Angular velocity of all disks of the species at the start, positive counter-clockwise.", unit="1/time", &
+      "Angular velocity of all disks of the species at the start, positive counter-clockwise. With a value other than 0 the " &
+      //"disks rotate, even if they are smooth.", unit="1/time", &
       otherwise="0, or from file with velocities = 'file'"), &
     variable_t("species", "rotational_temperature", "real", 1, "optional", "1", &
       "Temperature kT of the rotation at the start: angular velocities are Gaussian with variance kT/I, where I is the " &
@@ -102,75 +108,80 @@ module disk_variables
       //"along the line of centres is reversed and multiplied by this coefficient.", unit_interval, may_change=in_motion), &
     variable_t("contact", "wall_restitution", "real", 1, "optional", "1", &
       "Coefficient of restitution of collisions with sides and obstacles. The coefficient applies to all sides and obstacles " &
-      //"that have no restitution of their own (in &side, &obstacle or &wall) and are not " &
-      //"thermal.", unit_interval, may_change=in_motion, &
+      //"without a separate coefficient (restitution in &side, &obstacle or &wall), except thermal boundaries.", &
+      unit_interval, may_change=in_motion, &
       otherwise="contact.restitution"), &
     variable_t("contact", "restitution_law", "text", 1, "default", "'constant'", &
-      "Dependence of all coefficients of restitution, of disks and of boundaries, on the impact speed g (the relative " &
-      //"velocity along the normal).", choices=restitution_laws, may_change=in_motion), &
+      "Dependence of the coefficients of restitution of disks and boundaries on the impact speed g, which is the normal " &
+      //"component of the relative velocity.", choices=restitution_laws, may_change=in_motion), &
     variable_t("contact", "reference_speed", "real", 1, "required", "1", &
-      "Impact speed g0 above which the coefficients of restitution have the given values; slower collisions dissipate a " &
-      //"smaller fraction of the energy. Choose g0 above the impact speeds that occur.", positive, "length/time", &
+      "Impact speed g0 above which the coefficients of restitution have the values in the input. Slower collisions dissipate " &
+      //"a smaller fraction of the energy. Choose g0 above the impact speeds that occur.", positive, "length/time", &
       goes_with="restitution_law power viscoelastic", may_change=in_motion), &
     variable_t("contact", "wall_rule", "text", 1, "default", "'velocity'", &
-      "Collision rule of all sides and obstacles that have no rule of their own (in &side, &obstacle or &wall) and are not " &
-      //"thermal.", choices=wall_rules, may_change=in_motion), &
+      "Collision rule of all sides and obstacles without a separate rule (rule in &side, &obstacle or &wall), except thermal " &
+      //"boundaries.", choices=wall_rules, may_change=in_motion), &
     variable_t("contact", "contact_time", "real", 1, "default", "0", &
       "Contact duration t_c of the TC model, which prevents inelastic collapse: a collision is elastic if one of its partners " &
-      //"had another collision less than t_c ago. With 0 the model is off. Choose t_c far below the mean time between " &
-      //"collisions. The TC model excludes stop.at_rest.", not_negative, "time", may_change=in_motion), &
+      //"had another collision less than t_c ago. The value 0 switches the TC model off. Choose t_c far below the mean time " &
+      //"between collisions. The TC model cannot be combined with stop.at_rest.", not_negative, "time", may_change=in_motion), &
     variable_t("contact", "tangential_restitution", "real", 1, "default", "-1", &
       "Coefficient of tangential restitution of collisions of two disks: -1 for smooth surfaces, 0 if a collision stops the " &
-      //"slip of the surfaces, 1 if a collision reverses the slip. With a value above -1 the disks are rough, and " &
-      //"rotate.", tangential, may_change=in_motion), &
+      //"slip of the surfaces, 1 if a collision reverses the slip. With a value above -1 the disks are rough and rotate.", &
+      tangential, may_change=in_motion), &
     variable_t("contact", "friction", "real", 1, "optional", "0.3", &
       "Coulomb friction coefficient of collisions of two disks: upper limit of the ratio of the tangential impulse to the " &
       //"normal impulse. Friction needs rough disks (tangential_restitution > -1).", not_negative, may_change=in_motion, &
       otherwise="the tangential impulse has no limit"), &
     variable_t("contact", "inertia", "real", 1, "default", "0.5", &
       "Moment of inertia of a disk divided by its mass times its radius squared: 0.5 for a uniform disk, 1 for a ring. The " &
-      //"value has an effect only if disks rotate.", moment, may_change=in_motion), &
+      //"value has an effect only if disks rotate, which is the case with rough disks or boundaries, or if disks rotate at " &
+      //"the start.", moment, may_change=in_motion), &
     variable_t("contact", "wall_tangential_restitution", "real", 1, "optional", "0.5", &
-      "Coefficient of tangential restitution of collisions with sides and obstacles that have no value of their own: -1 for " &
-      //"smooth surfaces, 0 if a collision stops the slip of the surfaces, 1 if a collision reverses the " &
-      //"slip.", tangential, goes_with="wall_rule normal", &
+      "Coefficient of tangential restitution of collisions with all sides and obstacles without a separate value " &
+      //"(tangential_restitution in &side, &obstacle or &wall): -1 for smooth surfaces, 0 if a collision stops the slip of " &
+      //"the surfaces, 1 if a collision reverses the slip.", tangential, goes_with="wall_rule normal", &
       may_change=in_motion, otherwise="contact.tangential_restitution"), &
     variable_t("contact", "wall_friction", "real", 1, "optional", "0.3", &
-      "Coulomb friction coefficient of collisions with sides and obstacles that have no value of their own. Friction needs " &
-      //"rough boundaries (wall_tangential_restitution > -1).", not_negative, goes_with="wall_rule normal", &
+      "Coulomb friction coefficient of collisions with all sides and obstacles without a separate value (friction in &side, " &
+      //"&obstacle or &wall). Friction needs rough boundaries (wall_tangential_restitution > -1).", &
+      not_negative, goes_with="wall_rule normal", &
       may_change=in_motion, otherwise="contact.friction"), &
     variable_t("contact", "pair_restitution", "real", 0, "optional", "1, 0.9, 0.9, 0.8", &
-      "Coefficients of restitution for each pair of species, row by row of a symmetric matrix: species 1-1, 1-2, ..., 2-1, " &
-      //"2-2, ...; n*n values for n species, numbered in the order of the file. They replace contact.restitution between " &
-      //"disks.", unit_interval, may_change=in_motion, otherwise="contact.restitution for all pairs")]
+      "Coefficients of restitution for each pair of species, as a symmetric matrix in the order 1-1, 1-2, ..., 2-1, 2-2, ... " &
+      //"For n species, n*n values must be given; species are numbered in the order of the input file. These values replace " &
+      //"contact.restitution.", unit_interval, may_change=in_motion, otherwise="contact.restitution for all pairs")]
 
   type(variable_t), parameter :: drive_rows(*) = [ &
     variable_t("drive", "kind", "text", 1, "default", "'none'", &
-      "Kind of driving, which changes velocities (by kicks) at multiples of interval. Driving excludes stop.energy_fraction " &
-      //"and stop.at_rest.", choices=drive_kinds, may_change=in_motion), &
+      "Kind of driving. Driving changes the velocities of the disks at all multiples of the time interval; such a change is " &
+      //"called a kick. Driving cannot be combined with stop.energy_fraction or stop.at_rest.", &
+      choices=drive_kinds, may_change=in_motion), &
     variable_t("drive", "interval", "real", 1, "required", "0.01", &
-      "Time between two kicks. Choose it well below the mean time between collisions, unless the kicks themselves are " &
-      //"studied.", positive, "time", goes_with="kind noise andersen brownian active", may_change=in_motion), &
+      "Time between two kicks. Choose an interval well below the mean time between collisions, unless the kicks themselves " &
+      //"are studied.", positive, "time", goes_with="kind noise andersen brownian active", may_change=in_motion), &
     variable_t("drive", "strength", "real", 1, "required", "0.1", &
-      "Strength of the noise: growth per time of the variance of each velocity component, the same for all masses.", &
+      "Strength of the noise: rate at which the kicks increase the variance of each velocity component. The rate is equal for " &
+      //"disks of all masses.", &
       positive, "velocity**2/time", goes_with="kind noise", may_change=in_motion), &
     variable_t("drive", "keep_momentum", "logical", 1, "fallback", ".true.", &
-      "Conservation of the total momentum of the driven disks: the mean velocity that a kick would add to the disks is " &
-      //"subtracted from their velocities.", goes_with="kind noise", may_change=in_motion), &
+      "Conservation of the total momentum of the driven disks: each kick also subtracts the mean velocity that the noise adds " &
+      //"to the driven disks.", goes_with="kind noise", may_change=in_motion), &
     variable_t("drive", "fraction", "real", 1, "required", "0.1", &
-      "Probability that a kick changes the velocity of a disk. The probability divided by interval is the collision frequency " &
-      //"of the Andersen thermostat.", part_of_all, goes_with="kind andersen", may_change=in_motion), &
+      "Probability that a kick changes the velocity of a given disk. The probability divided by interval is the collision " &
+      //"frequency of the Andersen thermostat.", part_of_all, goes_with="kind andersen", may_change=in_motion), &
     variable_t("drive", "temperature", "real", 1, "required", "1", &
-      "Temperature kT of the Maxwell distribution from which a kick draws velocities.", positive, "energy", &
+      "Temperature kT of the Maxwell distribution from which a kick draws new velocities.", positive, "energy", &
       goes_with="kind andersen brownian active", may_change=in_motion), &
     variable_t("drive", "self_propulsion_speed", "real", 1, "required", "1", &
-      "Self-propulsion speed of an active disk: the velocity added along its orientation.", not_negative, "length/time", &
+      "Self-propulsion speed of an active disk: each kick adds a velocity of this magnitude along the orientation of the disk.", &
+      not_negative, "length/time", &
       goes_with="kind active", may_change=in_motion), &
     variable_t("drive", "rotational_diffusion", "real", 1, "fallback", "0", &
-      "Rotational diffusion coefficient D_r of the orientation of an active disk: the variance of its angle grows by 2 D_r " &
-      //"per time.", not_negative, "1/time", goes_with="kind active", may_change=in_motion), &
+      "Rotational diffusion coefficient D_r of the orientation of an active disk: the variance of the orientation angle grows " &
+      //"at the rate 2 D_r.", not_negative, "1/time", goes_with="kind active", may_change=in_motion), &
     variable_t("drive", "species", "text", 1, "fallback", "''", &
-      "Name of the only species that is driven. An empty text drives all species.", &
+      "Name of the only species that is driven. If the text is empty, all species are driven.", &
       goes_with="kind noise andersen brownian active", may_change=in_motion)]
 
   type(variable_t), parameter :: disk_rows(*) = [species_rows, contact_rows, drive_rows]

@@ -1,4 +1,4 @@
-!> Definitions for the table of `variables`: the type of its rows, and ranges and limits of numbers.
+!> Definitions for the table of all input variables: the type of the rows, and the ranges and limits of numbers.
 module variable_rows
   use kinds, only: real64
   implicit none
@@ -6,12 +6,12 @@ module variable_rows
 
   integer, parameter, public :: name_length = 37, help_length = 1000
   integer, parameter, public :: most_threads = 1024, most_disks = 100000000
-  real(real64), parameter, public :: smallest = 1.0e-100_real64    !! smallest magnitude of an input value other than 0
-  real(real64), parameter, public :: largest = 1.0e100_real64      !! largest magnitude; products of larger values could overflow
+  real(real64), parameter, public :: smallest = 1.0e-100_real64    !! smallest absolute value of a nonzero number in the input
+  real(real64), parameter, public :: largest = 1.0e100_real64  !! largest absolute value; larger products could overflow
 
-  !> When the value of a variable may differ from its value at the start of a run: never, on `--resume`, or in a running simulation.
-  !> Variables without effect on the trajectory may change on `--resume`. Variables that affect the motion of the disks, but not
-  !> their number, properties or initial state, may change in a running simulation.
+  !> Occasions on which the value of a variable may change after the start of a run: never, on `--resume`, or in a running
+  !> simulation. Variables that do not affect the trajectory may change on `--resume`. Variables that affect the motion of the
+  !> disks, but not their number, properties or initial state, may change in a running simulation.
   character(len=9), parameter, public :: never = "never", on_resume = "on resume", in_motion = "running"
 
   type, public :: range_t
@@ -21,7 +21,7 @@ module variable_rows
 
   !> Groups that describe obstacles.
   character(len=8), parameter, public :: obstacle_groups(2) = [character(len=8) :: "obstacle", "wall"]
-  !> Groups that describe boundaries: sides of the box and obstacles. The reference file contains them as comments only.
+  !> Groups that describe boundaries: sides of the box and obstacles. In the reference file, these groups are commented out.
   character(len=8), parameter, public :: wall_groups(*) = [character(len=8) :: "side", obstacle_groups]
 
   type(range_t), parameter, public :: anything = range_t(-largest, largest, "")
@@ -44,19 +44,20 @@ module variable_rows
     character(len=8) :: kind                 !! "integer", "real", "logical" or "text"
     integer :: size                          !! number of values; 0 if any number is allowed
     character(len=8) :: status               !! see below
-    character(len=24) :: value               !! the value as written in an input file: see below
-    character(len=help_length) :: help       !! help text in full sentences, of which the first names the quantity
+    character(len=24) :: value               !! default or example, as written in an input file; see below
+    character(len=help_length) :: help       !! help text in full sentences; the first sentence names the quantity
     type(range_t) :: range = anything        !! range of numbers
     character(len=16) :: unit = ""
-    !> Allowed texts, separated by blanks; empty if any text is allowed. The module `choices` contains their meanings.
+    !> Allowed texts, separated by blanks; empty if any text is allowed. The module `choices` contains the meanings of the allowed
+    !> texts.
     character(len=100) :: choices = ""
-    !> Condition under which the present variable has an effect: the name of another variable, followed by those of its allowed
-    !> texts with which the present variable has an effect.
+    !> Condition under which the variable has an effect: the name of a second variable, followed by one or more values of the second
+    !> variable. Example: "motion sine parabolic" means that the variable applies only if motion is 'sine' or 'parabolic'.
     character(len=60) :: goes_with = ""
-    !> Variables of the same group that must not be given together with the present variable.
+    !> Names of the variables in the same group that must not be given together with this variable, separated by blanks.
     character(len=80) :: excludes = ""
-    character(len=9) :: may_change = never   !! when the value may differ from the value at the start
-    character(len=100) :: otherwise = ""     !! the default in words, if the default is not a constant
+    character(len=9) :: may_change = never   !! when the value may change after the start of a run
+    character(len=100) :: otherwise = ""     !! description of the default if the default is not a constant
   end type variable_t
 
   ! status     value                           line in the reference file

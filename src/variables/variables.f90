@@ -1,5 +1,6 @@
-!> The table of all input variables. The reading and checking of inputs, `--print-defaults`, `--explain`, `/parameters` in the
-!> output file and the reference page follow from this table.
+!> The table of all input variables. Several parts of the program use this table: the reading and checking of inputs,
+!> `--print-defaults`, `--explain`, and the group `/parameters` of the output file. The reference page of the documentation is
+!> generated from the table.
 module variables
   use boundary_variables, only: boundary_rows
   use disk_variables, only: disk_rows
@@ -20,8 +21,8 @@ module variables
 
 contains
 
-  !> When the value of a variable may differ from its value at the start. The full name of the variable may contain the name of an
-  !> instance, as in `side.left.velocity`.
+  !> States when the value of a variable may differ from its value at the start of a run. The full name of the variable may contain
+  !> the name of a group, as in `side.left.velocity`.
   pure function change_of(name) result(when)
     character(len=*), intent(in) :: name
     character(len=len(never)) :: when
@@ -34,7 +35,7 @@ contains
     end do
   end function change_of
 
-  !> Whether a group may occur several times in a file. The variable `name` distinguishes the instances of such a group.
+  !> Whether a group may occur several times in an input file. Such groups are distinguished by their variable `name`.
   elemental function is_repeated(group)
     character(len=*), intent(in) :: group
     logical :: is_repeated
@@ -50,7 +51,7 @@ contains
     names = pack(table%name, table%group == group)
   end function variables_of
 
-  !> Row of a variable within its group, in the order of `variables_of`; 0 if the group does not contain the variable.
+  !> Index of a variable in its group, in the order of `variables_of`; 0 if the group does not contain the variable.
   pure function row_of(group, name) result(row)
     character(len=*), intent(in) :: group, name
     integer :: row
@@ -65,8 +66,8 @@ contains
     row = 0
   end function row_of
 
-  !> The full names of the variables with a given name in all groups, as in `obstacle.radius or species.radius`; empty if there is
-  !> none.
+  !> Full names of the variables with a given name in all groups, as in `obstacle.radius or species.radius`; empty if no group
+  !> contains such a variable.
   pure function full_names(name) result(text)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: text
@@ -80,8 +81,8 @@ contains
     end do
   end function full_names
 
-  !> Whether two variables of a group must not be given together. Two variables that determine the times of the same samples also
-  !> exclude each other.
+  !> Whether two variables of a group must not be given together. This applies also to two variables that set intervals for the same
+  !> samples.
   pure function excludes(one, other) result(yes)
     integer, intent(in) :: one, other        !! rows
     logical :: yes
@@ -100,7 +101,7 @@ contains
       k=1, size(table))])
   end function excluded_by
 
-  !> The first sentence of a help text.
+  !> First sentence of a help text.
   pure function first_sentence(help) result(sentence)
     character(len=*), intent(in) :: help
     character(len=:), allocatable :: sentence
@@ -108,8 +109,8 @@ contains
     sentence = help(:index(trim(help)//" ", ". "))
   end function first_sentence
 
-  !> Kind of samples whose times a variable sets, as `frames` for frames_every_time; empty for variables that do not set times of
-  !> samples.
+  !> Kind of samples for which a variable sets an interval, such as `frames` for frames_every_time. The result is empty for all
+  !> other variables.
   pure function track_of(name) result(track)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: track
@@ -117,7 +118,7 @@ contains
     track = name(:max(index(name, "_every_") - 1, 0))
   end function track_of
 
-  !> The words in a line.
+  !> Splits a line into words.
   pure function words_of(line) result(words)
     character(len=*), intent(in) :: line
     character(len=len(line)), allocatable :: words(:)
@@ -127,7 +128,7 @@ contains
     if (size(words) > 0) read (line, *) words
   end function words_of
 
-  !> Allowed values in words, as in `a number > 0` or `'wall' or 'periodic'`.
+  !> Text that states which values are allowed, as in `a number > 0` or `'wall' or 'periodic'`.
   pure function allowed(row) result(words)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: words
@@ -148,7 +149,7 @@ contains
     if (row%size > 1) words = written(row%size)//" "//words
   end function allowed
 
-  !> `'a', 'b' or 'c'`
+  !> Joins words to a list of alternatives, as in `'a', 'b' or 'c'`.
   pure function either(words) result(text)
     character(len=*), intent(in) :: words(:)
     character(len=:), allocatable :: text
