@@ -1,6 +1,6 @@
 #!/bin/sh
-# Writes the module that tells `--version` where the program comes from. Arguments: the flags of the compiler.
-# shellcheck disable=SC2016 # `make dist` puts the commit here
+# Writes a Fortran module with the origin of the program (commit, compiler and flags), which `--version` prints.
+# Arguments: the flags of the compiler. shellcheck disable=SC2016 # `make dist` puts the commit here
 commit='$Format:%h$'
 case $commit in
 *Format*)

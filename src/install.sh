@@ -6,8 +6,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 action=$1 build=${BUILD:-build} root=${DESTDIR:-}$PREFIX
 
-# All names are relative to $root. The list, of one name to a line, says what an install has put there: nothing else
-# is ever removed or replaced.
+# All names are relative to $root. The file $list contains the names of all installed files, one per line. Only files in
+# this list are ever removed or replaced.
 shared=share/ricochet
 list=$shared/installed
 documents=share/doc/ricochet
@@ -17,7 +17,8 @@ module=share/modulefiles/ricochet/$version
 package=$shared/post/ricochet
 completions=share/bash-completion/completions
 
-# Source of each installed name: a file, or "-> PLACE" for a link; nothing where it is made here.
+# Source of each installed file: a path, or "-> TARGET" for a symbolic link. The source is empty for files that this
+# script generates.
 declare -A behind
 plan() {
   local text command
@@ -51,7 +52,8 @@ put() {
   if [[ $1 == '-> '* ]]; then ln -sfn "${1#-> }" "$root/$2"; else install -T -m $mode "$1" "$root/$2"; fi
 }
 
-# Removes files, what Python has made of them, and folders of ours that are then empty.
+# Removes the files whose names are read from standard input, the compiled Python files (*.pyc) that belong to them, and
+# folders of this installation that are then empty.
 remove() {
   local name folder
   while read -r name; do

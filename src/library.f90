@@ -1,5 +1,5 @@
-!> The C interface for other programs. `ricochet.h` is the reference of this interface and describes each function. A handle is an
-!> open simulation. The functions print nothing, do not end the process, and share no data between handles.
+!> The C interface for other programs. The header file `ricochet.h` describes each function of this interface. A handle represents
+!> an open simulation. The functions print nothing, do not end the process, and share no data between handles.
 module library
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_int64_t, c_loc, &
@@ -32,16 +32,16 @@ module library
   private
   public :: advance_to, answer, begin, goal_of, renew_changed, session_of, session_t, text_of
 
-  integer(c_int), parameter :: going_on = 1          !! the only result of `advance` that is not an exit code
-  integer, parameter :: least_logged = 1000000        !! number of latest events that the log keeps at least
+  integer(c_int), parameter :: going_on = 1          !! result of `advance` if the simulation has not yet reached a limit
+  integer, parameter :: least_logged = 1000000        !! smallest number of latest events that a full log contains
 
   type :: session_t
     type(run_input_t) :: input
     type(simulation_t) :: sim
     class(evolution_t), allocatable :: evolution
     type(stop_rule_t) :: rule
-    integer(int64) :: iterations = 1                  !! number of iterations between two checks of the clock
-    logical :: logged = .false.                       !! events are logged
+    integer(int64) :: iterations = 1                  !! number of loop iterations between two readings of the clock
+    logical :: logged = .false.                       !! .true. if events are logged
     type(event_log_t) :: log                          !! the latest events; older events are deleted
   end type session_t
 
@@ -67,7 +67,7 @@ contains
     code = answer(error, message, room)
   end function open_simulation
 
-  !> Starts the engine of a new simulation and returns its handle; after an error the simulation is deallocated.
+  !> Starts the engine of a new simulation and returns the handle of the simulation. After an error the simulation is deallocated.
   function begin(session, threads, error) result(handle)
     type(session_t), pointer, intent(inout) :: session
     !> Number of threads; 0 for the value in the input or, if the input contains none, one.
@@ -119,7 +119,7 @@ contains
     if (allocated(error) .or. code /= going_on) code = answer(error, message, room)
   end function advance
 
-  !> The limits of an advance to the given values. If none of the values is a limit, the stop rule of the input applies.
+  !> Converts the arguments of `advance` to a stop rule. If no argument is a limit, the stop rule of the input applies.
   pure function goal_of(session, time, collisions, events) result(rule)
     type(session_t), intent(in) :: session
     real(real64), intent(in) :: time                  !! time since the start of the run [time]
@@ -132,7 +132,8 @@ contains
     if (time >= never) rule%limits%time = never
   end function goal_of
 
-  !> Advances a simulation until a rule is met, or until `patience` seconds have passed. In the latter case `code` is `going_on`.
+  !> Advances a simulation until a stop rule is met, or until `patience` seconds have passed. If the stop rule has not been met,
+  !> `code` is `going_on`.
   subroutine advance_to(session, rule, patience, code, error)
     type(session_t), intent(inout) :: session
     type(stop_rule_t), intent(in) :: rule
@@ -166,7 +167,7 @@ contains
     code = 0
   end subroutine advance_to
 
-  !> See ricochet.h. The changed input is stored as a new text. Later changes and saved files are based on this text.
+  !> See ricochet.h. The changed input replaces the stored input; later changes and saved files are based on the changed input.
   function change(handle, overrides, message, room) bind(C, name="ricochet_change") result(code)
     type(c_ptr), value :: handle
     character(kind=c_char), intent(in) :: overrides(*)
@@ -219,7 +220,8 @@ contains
     code = answer(error, message, room)
   end function change
 
-  !> Whether a changed input has the same values as the present one. A side that is not in the present input has the default values.
+  !> Whether a changed input has the same values as the present input. A side without a group in the present input has the default
+  !> values.
   function changes_nothing(session, lines, input) result(yes)
     type(session_t), intent(in) :: session
     type(text_t), intent(in) :: lines(:)              !! changes in the form GROUP.VARIABLE=VALUE
@@ -241,7 +243,7 @@ contains
     present%overrides = pack(lines, new)
     do k = 1, size(present%overrides)
       associate (override => present%overrides(k))
-        override%text = override%text(:index(override%text, "="))      ! an override without a value restores the default
+        override%text = override%text(:index(override%text, "="))      ! `NAME=` without a value restores the default
       end associate
     end do
     call read_groups(input_of(session%input%groups), present%overrides, present%groups, problems, complete)
@@ -250,7 +252,7 @@ contains
     if (yes) yes = same_values(present%groups, input%groups)
   end function changes_nothing
 
-  !> Sets the positions of sides whose motion changes, so that the new motion continues at the present position.
+  !> Sets the positions of all sides whose motion changes, so that each side starts its new motion at its present position.
   subroutine keep_sides(session, groups)
     type(session_t), intent(in) :: session
     type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
@@ -322,7 +324,7 @@ contains
     code = answer(error, message, room)
   end function give_velocities
 
-  !> The text that lists all changes so far.
+  !> Text that lists all changes of the simulation so far.
   function changes_of(session) result(list)
     type(session_t), intent(in) :: session
     character(len=:), allocatable :: list
@@ -342,7 +344,7 @@ contains
     call problems%report(path, error)
   end subroutine check_motion
 
-  !> Continues the simulation with a changed state, and adds this change to the list of changes.
+  !> Replaces the state of the simulation by a changed state, and adds the change to the list of changes.
   subroutine renew_changed(session, sim, what)
     type(session_t), intent(inout) :: session
     type(simulation_t), intent(in) :: sim
@@ -352,7 +354,7 @@ contains
     call renew(session, sim)
   end subroutine renew_changed
 
-  !> Continues the simulation with a changed state.
+  !> Replaces the state of the simulation by a changed state.
   subroutine renew(session, sim)
     type(session_t), intent(inout) :: session
     type(simulation_t), intent(in) :: sim
@@ -467,7 +469,7 @@ contains
           do k = 1, size(groups(g)%values)
             if (.not. groups(g)%values(k)%is_set()) cycle
             most = most_written
-            ! All values are included, because they describe the geometry that was read from a file.
+            ! All values are copied, because some describe geometry that was read from a file.
             if (any(obstacle_groups == groups(g)%name)) most = huge(most)
             call growing%add(groups(g)%value_line(k, most)//eol)
           end do
@@ -484,7 +486,7 @@ contains
     if (room > length) call give(words, text, room)
   end function copy_text
 
-  !> The simulation of a handle.
+  !> Returns the simulation that belongs to a handle.
   function session_of(handle) result(session)
     type(c_ptr), intent(in) :: handle
     type(session_t), pointer :: session
@@ -492,7 +494,7 @@ contains
     call c_f_pointer(handle, session)
   end function session_of
 
-  !> Copies the message of an error and returns its exit code; 0 if there is no error.
+  !> Copies the message of an error into a C buffer and returns the exit code of the error, or 0 if no error occurred.
   function answer(error, message, room) result(code)
     type(error_t), allocatable, intent(in) :: error
     character(kind=c_char), intent(inout) :: message(*)
@@ -506,7 +508,7 @@ contains
     call give(error%message, message, room)
   end function answer
 
-  !> Copies a text into a C buffer. The text is truncated if the buffer is too short.
+  !> Copies a text into a C buffer. If the buffer is too short, the text is truncated.
   subroutine give(text, buffer, room)
     character(len=*), intent(in) :: text
     character(kind=c_char), intent(inout) :: buffer(*)

@@ -1,4 +1,4 @@
-!> Functions of the C interface `ricochet.h` in addition to those in `library`: single events, and states of simulations.
+!> Functions of the C interface `ricochet.h` that concern single events, copies of simulations, and positions of disks.
 module library_events
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int64_t, c_ptr
   use changes, only: change_positions
@@ -14,7 +14,7 @@ module library_events
   implicit none
   private
 
-  !> Largest number of events, and of kicks of a disk, for which future collisions are searched.
+  !> Largest number of events, and of kicks of a disk, within which `next_events` searches for future collisions.
   integer(int64), parameter :: longest_look = 2000000
 
 contains
@@ -38,7 +38,7 @@ contains
     code = answer(error, message, room)
   end function copy
 
-  !> See ricochet.h. The log is emptied first, unless the input requests an event log.
+  !> See ricochet.h. The event log is emptied before the advance, unless the input requests an event log.
   function advance_event(handle, time, collisions, events, patience, message, room) bind(C, name="ricochet_advance_event") &
     result(code)
     type(c_ptr), value :: handle
@@ -74,8 +74,8 @@ contains
     if (n > 0) records(:, :n) = session%log%record(:, session%log%n - n + 1:session%log%n)
   end function last_events
 
-  !> See ricochet.h. The collisions are found by advancing a copy of the simulation, because before the next collision of a disk its
-  !> partner may collide with other disks, or a kick may change its velocity.
+  !> See ricochet.h. The function advances a copy of the simulation. Predictions for the present velocities would not be sufficient,
+  !> because other collisions or kicks may change the velocities first.
   function next_events(handle, most, records) bind(C, name="ricochet_next_events") result(n)
     type(c_ptr), value :: handle
     integer(c_int), value :: most

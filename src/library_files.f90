@@ -1,4 +1,4 @@
-!> Saving simulations to files and loading them from the files of runs. See `ricochet.h`.
+!> Functions that save simulations to files, and load simulations from the output files of runs. See `ricochet.h`.
 module library_files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_ptr
   use sampling_schedule, only: progress_t
@@ -19,7 +19,7 @@ module library_files
 
 contains
 
-  !> See ricochet.h. The file contains the first samples of a run of this input, and the present state as a checkpoint.
+  !> See ricochet.h. The file contains the first samples of a run with the present input, and a checkpoint of the present state.
   function save(handle, path, force, message, room) bind(C, name="ricochet_save") result(code)
     type(c_ptr), value :: handle
     character(kind=c_char), intent(in) :: path(*)
@@ -37,7 +37,7 @@ contains
     call check_name(text_of(path), error)
     if (.not. allocated(error)) call input_from_text(session%input%text, session%input%path, session%input%overrides, input, &
       error, stepped=.true.)
-    if (session%sim%changes > 0) then                 ! the initial state belongs to another input
+    if (session%sim%changes > 0) then                 ! the initial state belongs to the input before the changes
       first = session%sim
       input%changes = session%input%changes
     else if (.not. allocated(error)) then

@@ -12,8 +12,8 @@ program main
 
 contains
 
-  !> Answers a question or performs a run. All variables are local to this procedure and not to the main program, so that they are
-  !> deallocated.
+  !> Answers a question such as --help, or performs a run. The variables are declared in this procedure and not in the main program,
+  !> because variables of the main program would not be deallocated at its end.
   subroutine serve()
     type(command_t) :: command
     type(run_input_t) :: input

@@ -35,9 +35,9 @@
            return status;
        }
 
-   A handle is an open simulation. Any number of simulations may be open; each of them may be used by one thread at a
-   time. The functions print nothing and do not handle signals. They do not end the process, except when the system has
-   no memory left.
+   A handle represents an open simulation. Any number of simulations may be open, but only one thread at a time may use
+   the same simulation. The functions print nothing and do not handle signals. The functions do not end the process,
+   except when no memory is left.
 
    Lengths, times, masses and energies are in the units of the input. Disks are in the order of the input.
 
@@ -45,9 +45,9 @@
    An exit code is 0 for success, 2 for invalid input, 3 for a file that cannot be read or written, and 4 for a
    simulation that broke off. Negative values of counts and of `room` are treated as 0.
 
-   libricochet.so does not need HDF5. libricochet_files.so has the same functions and those at the end of this file, and
-   its ricochet_open also accepts species that start from the file of a run. Handles can be passed from one library to
-   the other. */
+   libricochet.so does not need HDF5. libricochet_files.so also contains the functions at the end of this file, and
+   its ricochet_open also accepts species that start from the output file of a run. A handle that one of the two libraries
+   has returned can be passed to functions of the other library. */
 #ifndef RICOCHET_H
 #define RICOCHET_H
 #include <stdint.h>
@@ -56,7 +56,7 @@ typedef struct ricochet ricochet;
 
 /* Opens a simulation in its initial state.
    text:       contents of an input file; the group &stop may be missing
-   overrides:  lines GROUP.VARIABLE=VALUE, which have precedence over the text; may be empty
+   overrides:  lines of the form GROUP.VARIABLE=VALUE, which take precedence over the text; may be empty
    threads:    number of threads; 0 for the value in the input or, if the input contains none, one
    code:       exit code
    Returns a handle, or NULL after a failure. */
@@ -68,36 +68,37 @@ ricochet *ricochet_copy(ricochet *, char *message, int room, int *code);
 /* Closes a simulation and frees its memory. NULL is allowed. */
 void ricochet_close(ricochet *);
 
-/* Advances a simulation until the first of three values is reached, each counted from the start of the run: a time, a number of
-   collisions of disks, or a number of events. INFINITY and INT64_MAX stand for no limit. Without any limit the stop rule of
-   the input applies, if the input contains one. The results do not depend on the number of calls in which a simulation is advanced.
+/* Advances a simulation until the first of three limits is reached: a time, a number of collisions of disks with disks, or a
+   number of events, all counted from the start of the run. INFINITY and INT64_MAX stand for no limit. If no argument is a limit,
+   the stop rule of the input applies, if the input contains a stop rule. The results do not depend on the number of calls with
+   which a simulation is advanced.
    Returns 0 when a limit is reached, 1 if `patience` seconds have passed before a limit is reached (call the function again), or
    an exit code: 2 if `time` is NAN, other codes if the simulation cannot be continued. */
 int ricochet_advance(ricochet *, double time, int64_t collisions, int64_t events, double patience, char *message, int room);
 
-/* Advances a simulation as ricochet_advance, but at most to the time of the next event, and executes all events at this time.
-   The function also returns 0 if no event occurred before one of the limits was reached. ricochet_last_events copies the events
+/* Advances a simulation like ricochet_advance, but at most to the time of the next event, and executes all events at this time.
+   The function also returns 0 if one of the limits was reached before an event occurred. ricochet_last_events copies the events
    that were executed. */
 int ricochet_advance_event(ricochet *, double time, int64_t collisions, int64_t events, double patience, char *message, int room);
 
 /* Copies the latest events.
    most:     largest number of events
    records:  for each event the same values as in ricochet_next_events
-   Returns the number of events. At least the last 1,000,000 events can be copied if output.event_log is true in the input.
-   Otherwise only the events of the last call of ricochet_advance_event can be copied. */
+   Returns the number of copied events. If output.event_log is true in the input, at least the last 1,000,000 events can be
+   copied. If output.event_log is false, only the events of the last call of ricochet_advance_event can be copied. */
 int ricochet_last_events(ricochet *, int most, double records[][6]);
 
 /* Time since the start of the run. */
 double ricochet_time(ricochet *);
 
-/* Stores the number of disks, the number of collisions of disks with disks, and the number of events, which includes collisions
-   with sides and obstacles. */
+/* Stores three numbers: the number of disks, the number of collisions of disks with disks, and the number of events. Events are
+   collisions of disks with disks, sides and obstacles. */
 void ricochet_count(ricochet *, int64_t counts[3]);
 
 /* Copies one property of all disks.
    name:    position, velocity, event_count, image, angular_velocity, orientation, radius, mass or species
    values:  array of WIDTH numbers for each disk
-   Returns the width: 2 for position, velocity and image, 1 for the other properties, or 0 if the disks do not have this
+   Returns WIDTH: 2 for position, velocity and image, 1 for the other properties, or 0 if the disks do not have this
    property. */
 int ricochet_column(ricochet *, const char *name, double *values);
 
@@ -120,15 +121,15 @@ int ricochet_set_velocities(ricochet *, const double *velocities, char *message,
 
 /* Sets the positions of all disks at the present time.
    positions:  x and y for each disk
-   It is an error if disks overlap each other, an obstacle or a side at these positions, or if the box is sheared. The change
-   of the total energy counts as work. Returns an exit code; if the code is not 0, nothing is changed. */
+   If disks overlap each other, an obstacle or a side at these positions, or if the box is sheared, the result is an error. The
+   change of the total energy counts as work. Returns an exit code; if the code is not 0, nothing is changed. */
 int ricochet_set_positions(ricochet *, const double *positions, char *message, int room);
 
 /* Copies a text that describes the simulation at the present time.
    what:  "input": an input file that includes overrides and changes
           "parameters": a line GROUP.VARIABLE = JSON for each variable that has a value
           "changes": a line TIME GROUP.VARIABLE=VALUE for each change
-          "note": a note about inelastic collapses, or about a gas that is too cold to continue; may be empty
+          "note": a note about inelastic collapses, or about disks that are too slow to continue; may be empty
    text:  buffer of `room` bytes
    Returns the length of the text in bytes, without the zero at the end. Nothing is copied unless `room` is larger
    than this length. */
@@ -138,8 +139,8 @@ int ricochet_text(ricochet *, const char *what, char *text, int room);
    most:     largest number of events
    records:  for each event the time, i and j, and the magnitude and two components of the momentum change of disk i, as in the
              event log of a run
-   Returns the number of events, which is smaller than `most` if no event occurs for a long time, or -1 for time-stepped
-   dynamics, which cannot predict events. */
+   Returns the number of predicted events, which is smaller than `most` if no event occurs for a long time. The result is -1
+   for time-stepped dynamics, which cannot predict events. */
 int ricochet_next_events(ricochet *, int most, double records[][6]);
 
 /* --- Only in libricochet_files.so --- */

@@ -1,4 +1,4 @@
-!> Performs one run, from the input file to the finished output.
+!> Performs one run, from reading the input file to completing the output.
 module run
   use, intrinsic :: iso_fortran_env, only: error_unit
   use sampling_schedule, only: progress_t
@@ -43,13 +43,14 @@ module run
     type(progress_line_t) :: line
     real(real64) :: started = 0.0_real64                   !! time when the program started, by the clock `seconds` [s]
     real(real64) :: rate = 0.0_real64                      !! collisions per processor time in this part of the run [1/s]
-    !> Number of events in this part of the run that the serial engine of a parallel run executed.
+    !> Number of events that the serial engine executed in this part of a parallel run.
     integer(int64) :: serial_events = 0
   end type run_t
 
 contains
 
-  !> Reads the input and performs the run. `error` also contains the exit status of a run that was stopped.
+  !> Reads the input and performs the run. If the run was stopped by a signal or by the wall-clock limit, `error` contains the exit
+  !> status.
   subroutine perform_run(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
@@ -92,7 +93,8 @@ contains
     call run%output%release()
   end subroutine perform_run
 
-  !> Creates the state of a new run and opens the output. With --check the procedure only reports that the input is valid.
+  !> Creates the state of a new run and opens the output. With the option --check, the procedure only reports that the input is
+  !> valid.
   subroutine begin(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
@@ -123,7 +125,8 @@ contains
     end associate
   end subroutine begin
 
-  !> Restores the state of a run and opens the output. With --check the procedure only reports that the run can be resumed.
+  !> Restores the state of a run and opens the output. With the option --check, the procedure only reports that the run can be
+  !> resumed.
   subroutine go_on(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
@@ -150,7 +153,7 @@ contains
     end associate
   end subroutine go_on
 
-  !> Prints warnings about settings that are valid but rarely sensible.
+  !> Prints warnings about settings that are valid but rarely useful.
   subroutine warn(run)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
@@ -175,10 +178,10 @@ contains
     call cpu_time(cpu(2))
     run%rate = (run%sim%tally%collisions - collisions)/max(cpu(2) - cpu(1), 1.0e-9_real64)
     run%serial_events = run%evolution%serial_events
-    deallocate (run%evolution)                             ! frees memory for the completion of the output
+    deallocate (run%evolution)                             ! frees memory, which the completion of the output may need
   end subroutine follow
 
-  !> Cost of this part of the run, for the output: see `write_end`.
+  !> Wall time, rate and number of serial events of this part of the run, as the argument `cost` of `output: write_end`.
   function cost_of(run) result(cost)
     type(run_t), intent(in) :: run
     real(real64) :: cost(3)
@@ -195,7 +198,7 @@ contains
     integer :: requests, requests_served
     logical :: stopping
     real(real64) :: now, next_checkpoint              ! [s]
-    real(real64) :: first_time                        ! time of the simulation at the start of this part of the run [time]
+    real(real64) :: first_time                        ! simulated time at the start of this part of the run [time]
 
     iterations = 1
     requests_served = 0
@@ -204,8 +207,8 @@ contains
     call run%line%start(run%sim, run%stop_rule, run%started)
     limits%time = run%sim%time()
     call run%output%tighten(limits)
-    ! If no event can occur any more, the run ends with a sample. If a run was stopped just after this sample and is resumed, this
-    ! call detects that no event can occur any more.
+    ! If no further event can occur, the run ends with a last sample. If the run was stopped just after that sample, this call
+    ! detects after a resume that no further event can occur.
     if (run%sim%events_done .and. limits%sampled >= run%sim%time()) call advance_once(run%evolution, run%sim, limits, error)
     do while (.not. (run%stop_rule%is_over(run%sim, run%evolution) .or. allocated(error)))
       limits = run%stop_rule%limits
@@ -226,18 +229,18 @@ contains
       if (stopping .or. requests > requests_served .or. now > next_checkpoint) then
         requests_served = requests
         call run%output%save(run%sim, error)
-        if (stop_requested()) stopping = .true.            ! the stop was requested during the write
+        if (stop_requested()) stopping = .true.            ! a stop may have been requested during the write
         if (stopping .and. .not. allocated(error)) call fail(error, exit_stopped, "stopped at time "// &
           written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to continue")
         if (allocated(error)) exit
-        next_checkpoint = seconds() + run%input%settings%output%checkpoint_every     ! the interval starts at the end of the write
+        next_checkpoint = seconds() + run%input%settings%output%checkpoint_every  ! the interval starts after the write
       end if
       call run%line%report(run%sim, run%stop_rule)
     end do
     call run%line%clear()
   end subroutine main_loop
 
-  !> The results as lines `key = value`.
+  !> The results of the run as lines of the form `key = value`.
   function summary(run) result(text)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
@@ -265,8 +268,8 @@ contains
     if (note(run) /= "") text = text//eol//"note = "//note(run)
   end function summary
 
-  !> A note about the results: collapses, and the reason why the run ended if no stop rule was met. The note is empty if there is
-  !> nothing to report.
+  !> A note about inelastic collapses, and about the reason why the run ended if no stop rule was met. The note is empty if neither
+  !> applies.
   function note(run) result(text)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text

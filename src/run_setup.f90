@@ -1,5 +1,5 @@
 !> Sets up a run from an input file: reads and checks the input, creates the initial state, creates the objects that the input
-!> selects, and starts the threads. Only this module depends on all searches and all kinds of dynamics.
+!> selects, and starts the threads. No other module depends on all kinds of neighbour search and dynamics.
 module run_setup
   use errors, only: error_t
   use event_driven, only: event_driven_t
@@ -29,8 +29,8 @@ module run_setup
 
 contains
 
-  !> Reads the file `path`, applies the overrides and checks everything. With `printed`, the part of the input that could be
-  !> interpreted is printed, even if the input is invalid.
+  !> Reads the input file `path`, applies the overrides and checks the input. If `printed` is .true., the part of the input that
+  !> could be interpreted is printed, even if the input is invalid.
   subroutine read_input(path, overrides, input, error, printed)
     character(len=*), intent(in) :: path
     type(text_t), intent(in) :: overrides(:)                        !! overrides in the form GROUP.VARIABLE=VALUE
@@ -66,12 +66,12 @@ contains
   !> Converts the groups of an input to settings. All problems are collected in one error.
   subroutine resolve_input(input, complete, problems, error, stepped)
     type(run_input_t), intent(inout) :: input
-    logical, intent(inout) :: complete                              !! .false.: parts of the text were skipped
-    type(problem_list_t), intent(inout) :: problems                 !! in: problems found so far
+    logical, intent(inout) :: complete                              !! .false. if parts of the text could not be read
+    type(problem_list_t), intent(inout) :: problems                 !! problems found so far; further problems are added
     type(error_t), allocatable, intent(out) :: error
     logical, intent(in), optional :: stepped                        !! see `resolve_settings`
 
-    if (complete) then                                    ! otherwise variables in skipped parts would be reported as missing
+    if (complete) then                                    ! variables in unreadable parts must not be reported as missing
       call resolve_settings(input%groups, input%settings, problems, stepped)
       call complete_settings(input%settings, input%groups, problems, complete)
       if (complete) call check_fit(input%settings, input%groups, problems)
@@ -79,7 +79,7 @@ contains
     call problems%report(input%path, error, input%overrides)
   end subroutine resolve_input
 
-  !> The initial state of a run, with disks sorted for memory access.
+  !> Creates the initial state of a run. The disks are sorted in memory by position, so that neighbours are close in memory.
   subroutine new_simulation(input, line, sim, error)
     type(run_input_t), intent(inout) :: input
     class(status_line_t), intent(inout) :: line
@@ -90,7 +90,8 @@ contains
     if (.not. allocated(error)) call renumber(sim)
   end subroutine new_simulation
 
-  !> Creates the dynamics that the input selects, with its search and queue.
+  !> Creates the object of the dynamics (event-driven, parallel or time-stepped) that the input selects, with its neighbour search
+  !> and event queue.
   subroutine choose_evolution(settings, evolution)
     type(settings_t), intent(in) :: settings
     class(evolution_t), allocatable, intent(out) :: evolution
@@ -123,10 +124,10 @@ contains
     end if
   end subroutine choose_evolution
 
-  !> Starts the threads of a run, which exist until it ends. A run that uses the serial engine has one thread.
+  !> Starts the threads of a run, which exist until the run ends. A run that uses the serial engine has one thread.
   subroutine start_threads(settings, warning)
     type(settings_t), intent(inout) :: settings
-    !> Warning about settings that are probably unintended; empty if there is nothing to report.
+    !> Warning about a probably unintended number of threads; empty if no warning applies.
     character(len=:), allocatable, intent(out) :: warning
     character(len=:), allocatable :: name
     integer :: cores
@@ -154,7 +155,7 @@ contains
 
   !> Determines the number of threads from the input or the environment. The default is one thread.
   subroutine ask(threads, name)
-    !> in: number of threads in the input, or 0 if it is not given; out: number of threads to use.
+    !> In: number of threads in the input, or 0 if the input contains no number. Out: number of threads to use.
     integer, intent(inout) :: threads
     character(len=:), allocatable, intent(out) :: name
     character(len=16) :: value
