@@ -98,7 +98,7 @@ def condition(group: str, entry: dict) -> str:
     [(choice, words)] = entry["goes_with"].items()
     text = f"`{choice}` = " + ", ".join(f"`'{word}'`" for word in words)
     if group == "species":
-        text += f" (if `{choice}` is not given, `'{words[0]}'` follows)"
+        text += f" (if `{choice}` is not given, this variable sets `{choice} = '{words[0]}'`)"
     return text
 
 
