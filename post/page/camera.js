@@ -1,7 +1,7 @@
-// ---------- the camera: the visible part of the box ----------
+// ---------- camera: zoom and visible part of the simulation box ----------
 
-// The canvas has the shape of the visible region: the box and the range of its moving sides. At zoom 1 it shows the whole region.
-// A periodic box continues beyond its sides.
+// The canvas has the shape of the region that the simulation box occupies during the film, including the motion of its sides. At
+// zoom 1 the canvas shows the whole region. At larger zoom the view of a periodic box can move across the sides of the box.
 const camera = { zoom: 1, x: 0, y: 0, follow: -1 };
 const page = { dots: 1, width: 0, height: 0, unit: 1, margin: 3 };  // of the canvas, in pixels
 const view = { unit: 1, x: 0, y: 0 };  // pixels per unit of length; position of the lower left corner of the canvas
@@ -27,8 +27,7 @@ function lookAtAll() {
   Object.assign(camera, { zoom: 1, x: film.lower[0] + film.edges[0] / 2, y: film.lower[1] + film.edges[1] / 2, follow: -1 });
 }
 
-// Zooms by a factor about the point (px, py) of the canvas: the position in the box that this point
-// shows does not change.
+// Zooms by a factor and keeps the position in the box that is shown at the point (px, py) of the canvas.
 function zoom(factor, px = page.width / 2, py = page.height / 2) {
   const x = backAcross(px), y = backUp(py);
   camera.zoom = Math.max(1, Math.min(mostZoom(), camera.zoom * factor));
@@ -44,8 +43,8 @@ function pan(dx, dy) {
   camera.y += dy / view.unit;
 }
 
-// Returns the smallest and the largest number of periods by which an object that extends from `low`
-// to `high` must be shifted to be visible.
+// Returns the range of numbers of periods by which copies of an object from `low` to `high` are shifted. Copies outside this range
+// are not visible.
 function firstCopy(axis, high) {
   return film.periodic[axis] ? Math.ceil(((axis ? view.y : view.x) - high) / film.edges[axis]) : 0;
 }

@@ -1,4 +1,4 @@
-// ---------- choices of the user ----------
+// ---------- settings that the user can change ----------
 
 const state = { playing: false, colour: '', traced: [], arrows: false, sofar: null, total: false };
 let pace;          // time of the film per second of real time, at speed 1
@@ -15,15 +15,15 @@ function begin() {
   prepareFilm();
 }
 
-// The pace is limited in two ways: the film lasts at least 15 seconds, and a disk of typical speed
-// crosses at most half of the box in a second.
+// The pace is limited by two conditions: the film lasts at least 15 seconds, and a disk of typical speed crosses at most half of
+// the box per second.
 function usualPace() {
   const most = Math.min((last() - first()) / 15 || Infinity, 0.5 * Math.max(...film.edges) / film.scales.speed[1]) || 1;
   const power = 10 ** Math.floor(Math.log10(most));
   return power * Math.floor(most / power);
 }
 
-// Prepares the controls and scales that depend on the frames available so far.
+// Prepares the controls and scales that depend on the frames received so far.
 function prepareFilm() {
   sums = null;
   const alike = s => kinds[s].count >= FEWEST && kinds[s].alike;
@@ -131,7 +131,7 @@ const back = () => step(frameTime(moment.frame) < moment.time ? moment.frame : m
 const next = () => { if (!source.goOn?.('step')) step(moment.frame + 1); };
 const toEvent = () => { if (!$('event').hidden && !source.goOn?.('event')) go(source.nextEvent()); };
 
-// The address of a paused film contains the time shown, so that the address can be sent as a link.
+// When the film is paused, the address of the page contains the time shown; the address can be used as a link to that time.
 let remembering;
 function remember() {
   clearTimeout(remembering);
@@ -144,7 +144,7 @@ function fromAddress() {
   return isFinite(time);
 }
 
-// ---------- mouse and fingers on the stage ----------
+// ---------- mouse and touch input on the picture of the disks ----------
 
 const pointers = new Map();  // fingers or mouse buttons that are down
 let moved = 0;               // distance that they have moved [pixels]
@@ -180,7 +180,7 @@ function pointerMoved(event) {
   look();
 }
 
-// Shows the trace of the disk nearest to a point of the canvas, or no trace if no disk is near.
+// Shows the path of the disk nearest to a point of the canvas, or no path if no disk is near that point.
 function pick(px, py) {
   let nearest = [], least = 12 * page.dots;
   for (let i = 0; i < disks; i++) {
@@ -205,7 +205,7 @@ function followOrNot() {
   look();
 }
 
-// ---------- events of the page ----------
+// ---------- event handlers of the page ----------
 
 function on(id, action) { $(id).addEventListener('click', action); }
 

@@ -1,6 +1,6 @@
 'use strict';
 
-// ---------- the film: state shared by files and workers ----------
+// ---------- data of the film, which comes from a file or from a worker process ----------
 
 const $ = id => document.getElementById(id);
 let film, disks, kinds;         // the facts of the film; the number of disks; the species
@@ -19,7 +19,7 @@ function bytes(text) {
   return array;
 }
 
-// Sets the box, the disks and their properties.
+// Stores the simulation box, the disks and the properties of the disks.
 function setScene(facts, blocks) {
   film = facts;
   kinds = film.species;
@@ -34,7 +34,7 @@ function setScene(facts, blocks) {
 const first = () => past[0].time, last = () => past.at(-1).time;
 const clamp = (value, low, high) => Math.max(low, Math.min(high, value));
 
-// Returns the number of elements of an ascending list that do not exceed a value (binary search).
+// Returns the number of elements of a sorted list that do not exceed a value, found by binary search.
 function upTo(values, value, number = one => one) {
   let low = 0, high = values.length;
   while (low < high) {
@@ -47,20 +47,20 @@ function upTo(values, value, number = one => one) {
 const frameAt = time => Math.max(0, upTo(past, time, frame => frame.time) - 1);  // the last frame that is not later
 const frameTime = k => past[clamp(k, 0, past.length - 1)].time;
 
-// Stores in a frame the numbers of periods that the disks have crossed since the first frame, x1 y1
-// x2 y2 .... `moved` returns the numbers of periods crossed since the previous frame.
+// Stores in a frame how many periods each disk has crossed since the first frame, in the order x1 y1 x2 y2 .... The function
+// `moved` returns the numbers of periods crossed since the previous frame.
 function cross(frame, moved) {
   const before = past.at(-1);
   if (film.periodic.some(Boolean)) frame.crossed = new Int16Array(2 * disks).map((_, k) => before ? before.crossed[k] + moved(before, k) : 0);
   return frame;
 }
 
-// ---------- motion between frames ----------
+// ---------- motion of the disks between frames ----------
 
-// Between two frames a disk moves from its position in the earlier frame, and its velocity changes
-// at the events of the log. Each flight is straight, or a parabola under gravity. Without an event
-// log disks are shown at their positions in the last frame. The frames of a worker need no event log,
-// because the intervals between these frames are short enough.
+// Positions between two frames are calculated from the positions in the earlier frame and from the velocity changes in the event
+// log. Between collisions a disk moves along a straight line, or along a parabola under gravity. Without an event log, each disk is
+// shown at its position in the latest frame before the present time. Frames from a worker process follow each other so closely that
+// no event log is needed.
 let ways;    // velocity changes: index of the first change after each frame (start); disk, fraction of the interval and new velocity of each change (turns)
 let events;  // events of the log: time (when), partners (i, j), number of collisions of two disks so far (pairs)
 
@@ -108,8 +108,8 @@ function move(time) {
   Object.assign(moment, { kinetic: kinetic.map(mean), potential: potential.map(mean) });
 }
 
-// Returns the positions of the left, right, bottom and top side at a given time. They are used for
-// drawing only; the engine computes the events.
+// Returns the positions of the left, right, bottom and top side of the box at a given time. These positions are used only for
+// drawing.
 function sidesAt(time) {
   return past[moment.frame].sides ?? film.sides.map(({ place, motion, amplitude, period, phase, velocity, start_time: start, end_time: end, way }, k) => {
     if (way?.[0].length > 1) {
@@ -129,9 +129,9 @@ function displacement(i) {
   return Math.hypot(UX[i] + x - origins[2 * i], UY[i] + y - origins[2 * i + 1]);
 }
 
-// Returns the flights of a disk between two times. Each flight consists of its start, its end, and
-// the offset of the control point of a parabola (0, 0 if straight). Without an event log the
-// flights are straight lines from frame to frame.
+// Returns the free flights of a disk between two times. Each flight has a start, an end, and the offset of the control point of a
+// parabola, which is (0, 0) for a straight line. Without an event log, the flights are straight lines between the positions in
+// successive frames.
 function flights(i, from, to) {
   const result = [], plus = (a, b) => a.map((one, axis) => one + b[axis]);
   for (let k = frameAt(from); k < past.length - 1 && past[k].time < to; k++) {
@@ -151,8 +151,8 @@ function flights(i, from, to) {
   return result;
 }
 
-// Calls `action` for the speed of each disk in all frames so far, or in a part of the frames if
-// there are very many. Returns the number of frames used.
+// Calls `action` for the speed of each disk in each frame received so far. If there are very many frames, only a part of the frames
+// is used. Returns the number of frames used.
 function eachSpeed(action) {
   const some = Math.ceil((moment.frame + 1) * disks / 2e6);
   let samples = 0;
@@ -161,7 +161,7 @@ function eachSpeed(action) {
   return samples;
 }
 
-// ---------- a film from a file ----------
+// ---------- film of a run that is stored in a file ----------
 
 const running = counts => counts.reduce((sums, one) => { sums.push(sums.at(-1) + one); return sums; }, [0]);
 

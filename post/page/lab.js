@@ -1,6 +1,6 @@
 'use strict';
 
-// ---------- the laboratory: a form and several films, each of which has its own worker ----------
+// ---------- laboratory: an input form and several films, each of which has its own worker process ----------
 
 const $ = id => document.getElementById(id);
 const lab = JSON.parse($('data').textContent);  // the table of variables by group, and the inputs to choose from
@@ -13,8 +13,7 @@ const state = {
   boxes: [],                 // kept runs { figure, frame, letter, words, run, shown }, and the present one at the end
   paused: false,
 };
-// Variables that can be changed in a running simulation. A change of any other variable starts a
-// new run.
+// The variables in this list can be changed while a simulation runs. A change of any other variable starts a new run.
 const acts = key => /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|surface_velocity|velocity|mass|force))/.test(key);
 const MEASURED = { 'all/kinetic_energy': 'mean kinetic energy', 'all/mean_speed': 'mean speed', virial_pressure: 'pressure', dissipated_energy: 'energy lost per time', collisions: 'collisions per time' };
 const MOST_KEPT = 3, FULL = 0.5;  // number of kept runs; packing fraction that random placement reaches easily
@@ -64,7 +63,8 @@ const changesInWords = () => Object.entries(wish().settings).map(([key, value]) 
 
 // ---------- sliders ----------
 
-// [variable or variable[component], label, from, to, 'log' or nothing]
+// Each slider is described by [variable or variable[component], label, smallest value, largest value, 'log' for a logarithmic
+// scale].
 function sliderOf([name, text, from, to, log]) {
   const [key, at] = name.replace(']', '').split('[');
   return { key, at: at === undefined ? -1 : +at, words: text, from, to, log: !!log };
@@ -72,8 +72,7 @@ function sliderOf([name, text, from, to, log]) {
 
 const textWith = ({ key, at }, text) => at < 0 ? text : split(valueOf(key)).map((one, k) => k === at ? text : one).join(',');
 
-// Returns the largest value of a slider at which the disks cover at most a given fraction of their
-// region.
+// Returns the largest slider value for which the packing fraction of the disks in their region does not exceed a limit.
 function mostOf({ key, to = Infinity }) {
   const [kind, name, variable] = key.split('.');
   if (kind !== 'species' || !['count', 'radius'].includes(variable) || textOf(`species.${name}.placement`)) return to;
@@ -90,7 +89,7 @@ function mostOf({ key, to = Infinity }) {
   return isFinite(most) ? Math.min(to, most) : to;
 }
 
-// Returns rounded values from one end of a slider to the other, without repetitions.
+// Returns different rounded values that cover the range of a slider.
 function valuesOf(spec, steps) {
   const { key, from, to, log } = spec, top = mostOf(spec), whole = variableOf(key).type === 'integer';
   const unit = whole ? 1 : 10 ** Math.floor(Math.log10((to - from) / 100));
@@ -98,7 +97,8 @@ function valuesOf(spec, steps) {
   return [...new Set(Array.from({ length: steps + 1 }, (_, k) => near(log ? from * (top / from) ** (k / steps) : from + k / steps * (top - from))))];
 }
 
-// The program checks the text that is typed. A decimal comma is replaced beforehand, because the program does not accept it.
+// The simulation program checks the text that the user types. The program accepts no decimal comma; therefore commas are replaced
+// by points first.
 function buildSlider(spec) {
   const { key, at } = spec, id = 'slide.' + key + at;
   const range = make('input', { type: 'range', min: 0, id }), field = make('input', { inputMode: 'text', spellcheck: false });
@@ -128,7 +128,7 @@ function mark(row, key) {
   row.lastChild.textContent = state.waiting[key]?.said ?? '';
 }
 
-// ---------- the form of all variables, from the table of the program ----------
+// ---------- form with all input variables, made from the program's table of variables ----------
 
 function buildEverything() {
   if (!$('everything').open) { $('groups').replaceChildren(); return; }
@@ -174,10 +174,10 @@ function addGroup(kind, name) {
   run();
 }
 
-// ---------- choosing an input ----------
+// ---------- choice of an input file ----------
 
-// The run starts before the form is complete, so that disks appear early. Kept runs of another input
-// are removed, because runs of different inputs cannot be compared in one plot.
+// The run starts before the form is complete, because the user should see the disks as soon as possible. Earlier runs of another
+// input file are removed, because runs of different input files cannot be compared in one plot.
 async function choose(name) {
   const input = lab.inputs.find(one => one.name === name);
   if (name !== state.input?.name) {
@@ -228,7 +228,7 @@ function newBox() {
   return box;
 }
 
-// Only one run starts at a time. Changes of values during a start take effect in the next run.
+// Only one run can be starting at any time. If values change during the start of a run, the changes take effect in the next run.
 const PLACING = 2000;  // time [ms] after which a placement of disks is given up for newer settings
 let busy = 0, again = false, timer, latest = {};
 function run() {
@@ -250,15 +250,15 @@ function run() {
   if (isThere(box)) begin(); else box.frame.addEventListener('load', begin, { once: true });
 }
 
-// Changes that a running simulation allows take effect at once, while the slider moves. All other
-// changes start a new run.
+// If a running simulation allows the change of a variable, the change takes effect while the slider moves. Otherwise the change
+// starts a new run.
 function changed(key) {
   if (busy || !acts(key) || !current()?.run) { run(); return; }
   latest[key] = state.settings[key] ?? givenAs(key);
   timer ??= setTimeout(() => { filmOf(current()).send({ do: 'change', settings: latest }); latest = {}; timer = undefined; }, 25);
 }
 
-// Handles the messages of the worker of a film.
+// Handles the messages that the worker process of a film sends.
 function hear(source, news) {
   const box = state.boxes.find(one => one.frame.contentWindow === source);
   if (!box) return;
@@ -285,8 +285,8 @@ function hear(source, news) {
 
 function ready() { busy = 0; if (again) run(); }
 
-// Shows each problem once, beside its variable or, if it has none, beside the variable that changed
-// last. The refused text remains in the form, the variable keeps its old value, and all other
+// Shows each error message once, beside the variable that caused the error. If the message names no variable, it is shown beside
+// the variable that changed last. The refused text stays visible in the form, but the variable keeps its old value. All other
 // changes take effect.
 function showProblems(problems) {
   const changes = () => Object.keys({ ...state.has, ...state.settings }).filter(differs), before = changes();
@@ -302,7 +302,7 @@ function showProblems(problems) {
   again ||= before.length > 0 && changes().length > 0;
 }
 
-// ---------- kept runs ----------
+// ---------- earlier runs that remain visible for comparison ----------
 
 function keep() {
   if (!current()?.run) return;
@@ -338,8 +338,8 @@ function tellShelf() {
   state.boxes.forEach(box => { box.figure.firstChild.textContent = `${box.letter}: ${whatIs(box)}`; });
 }
 
-// Arranges boxes of equal size side by side. The box of the newest run contains all plots, and
-// these plots include the curves of the kept runs.
+// Arranges the films of all runs side by side, with equal sizes. The plots appear beside the newest run and include the curves of
+// the earlier runs.
 function arrangeAll() {
   const boxes = shownBoxes(), many = boxes.length > 1, { clientWidth, clientHeight } = $('runs');
   const upright = clientWidth < 560, count = many ? boxes.length : 1, width = Math.floor(clientWidth / count);
@@ -368,7 +368,7 @@ function overlayAll() {
 }
 setInterval(() => { if (shownBoxes().length > 1) overlayAll(); }, 1000);
 
-// Repeats an action on one film in all other films.
+// Applies an action of the user on one film to all other films.
 function played(source, on) {
   if (source === filmOf(current())) state.paused = !on;
   for (const one of films()) if (one !== source && one.inside().film) one.play(on);
@@ -380,7 +380,7 @@ function paced(source) {
   for (const one of films()) if (one !== source) one.choices({ pace, speed });
 }
 
-// ---------- a scan: a curve of measured values for five values of one variable ----------
+// ---------- scan: measurement of one quantity for five values of an input variable ----------
 
 let scan, scanner;  // the measured quantity and values; the worker that measures
 function beginScan() {
@@ -410,7 +410,7 @@ function addToScan({ is, index, mean, error, problems }) {  // values that canno
   scanner.leave();
 }
 
-// ---------- events of the page ----------
+// ---------- event handlers of the page ----------
 
 function bare(on) {
   document.body.classList.toggle('bare', on);
@@ -418,7 +418,7 @@ function bare(on) {
   arrangeAll();
 }
 
-// All films use the theme (dark or light) of the page.
+// All films use the same colour theme (dark or light) as the page.
 function dress() {
   for (const one of state.boxes.filter(isThere).map(filmOf)) {
     one.document.documentElement.classList.toggle('larger', document.documentElement.classList.contains('larger'));
@@ -438,8 +438,8 @@ const actions = {
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());
 const keys = { r: 'run', p: 'pause', k: 'keep', s: 'settings', l: 'larger' };
 
-// Keyboard shortcuts of the laboratory do not depend on which element has the focus. The shortcuts of
-// a film apply to all films unless one of the films has the focus.
+// Keyboard shortcuts of the laboratory work whichever element has the keyboard focus. Keyboard shortcuts for films apply to the
+// film with the focus, or to all films if no film has the focus.
 function typed(event) {
   const { key, target } = event, own = target.ownerDocument === document;
   if (target.matches('input:not([type=range]), select') || event.ctrlKey || event.metaKey || event.altKey || $('inputs').open) return;

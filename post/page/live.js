@@ -1,9 +1,8 @@
-// ---------- unfinished runs ----------
+// ---------- film of a run that has not finished ----------
 
-// A page without a film repeatedly requests the film of an unfinished run from the server of
-// `player.py --live`, until the run has ended. The film plays at such a pace that it reaches the
-// newest frame when the next answer is expected, unless the user moves to another time. Inside the
-// laboratory the page shows the run of a worker.
+// If the page was made by `player.py --live`, it requests new frames from the server of that script until the run ends. The pace of
+// the film is chosen such that the newest frame is reached when the next answer is expected. The user can leave the newest frame
+// and move to any other time. In the laboratory, the page receives the frames from a worker process.
 const enclosed = JSON.parse($('film').textContent);
 const isPart = parent !== window && !enclosed;
 const live = { on: false, stamp: '', newest: true, heard: 0, pace: 0 };
@@ -40,7 +39,7 @@ function tellLive(end) {
     + (live.newest ? 'the film follows it.' : 'End follows it.') : '';
 }
 
-// Starts or stops following the newest frame.
+// Switches on or off that the film follows the newest frame.
 function follow(newest) {
   if (!live.on) return;
   live.newest = newest;
@@ -48,7 +47,7 @@ function follow(newest) {
   if (newest) { show(last(), true); play(true); }
 }
 
-// ---------- start of the page ----------
+// ---------- actions when the page is loaded ----------
 
 listen();
 document.documentElement.classList.toggle('part', isPart);

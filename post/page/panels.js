@@ -1,4 +1,4 @@
-// ---------- texts and numbers ----------
+// ---------- texts and numbers beside the picture ----------
 
 const short = value => (Math.abs(value) >= 1e5 || (value && Math.abs(value) < 1e-3)
   ? value.toExponential(2) : String(+value.toPrecision(4))).replace('-', '−');
@@ -19,7 +19,7 @@ function tell() {
     `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) at <b>${short(X[i])}, ${short(Y[i])}</b>`).join('<br>');
 }
 
-// Descriptions of the stage and of each plot, for screen readers.
+// Writes descriptions of the picture and of each plot for screen readers.
 const listed = words => words.filter(Boolean).join(', ');
 function describe() {
   const [width, height] = film.edges, each = kinds.map(({ name, count, sizes }) => `${count} ${name} (${sizes})`);
@@ -38,7 +38,7 @@ function describe() {
 const describeLaw = (name, { temperature, speed, motion }) => (temperature || speed || motion) && `${name} ${listed([
   temperature && `heats: kT = ${short(temperature)}`, speed && `slides with ${short(speed)}`, motion && `moves (${motion})`])}`;
 
-// A label with the colour of a species.
+// Returns a text label with a sample of the colour of a species.
 function chip(kind, text) {
   const element = Object.assign(document.createElement('span'), { className: 'chip', textContent: text });
   element.style.setProperty('--own', css(speciesColour(kind)));
@@ -47,8 +47,7 @@ function chip(kind, text) {
 
 const PATTERN_WORDS = ['', ', striped', ', striped upright', ', chequered'];
 
-// Returns the name of the pattern of a species, if the disks are large enough for a pattern at zoom
-// 1.
+// Returns the name of the fill pattern of a species if the disks at zoom 1 are large enough for a pattern.
 function patternOf(s) {
   const radius = Math.max(leastRadius(), page.unit * film.radii[sizeOf[speciesOf.indexOf(s)]]);
   return isStriped(s, radius) ? PATTERN_WORDS[s % PATTERN_WORDS.length] : '';
@@ -69,14 +68,14 @@ function drawLegend() {
   if (notes.length) legend.append(Object.assign(document.createElement('p'), { textContent: notes.join('; ') }));
 }
 
-// Writes a note below the controls if the picture is not to scale or not exact.
+// Writes a note below the controls if the picture is approximate or not to scale.
 function tellLimits() {
   const tiny = angles && film.radii.every(radius => Math.max(leastRadius(), radius * page.unit) < LEAST_TO_TURN * page.dots);
   $('between').textContent = [film.note && `Frames only: ${film.note}.`, enlarged() && 'Small disks are drawn larger than they are.',
     tiny && 'Zoom in to see how disks turn.'].filter(Boolean).join(' ');
 }
 
-// ---------- small plots ----------
+// ---------- axes and curves of the small plots ----------
 
 function prepare(canvas) {
   const pen = canvas.getContext('2d'), width = canvas.width / page.dots, height = canvas.height / page.dots;
@@ -86,8 +85,8 @@ function prepare(canvas) {
   return { pen, size, left: 42 * size, right: width - 4, top: 6, bottom: height - 26 * size };
 }
 
-// Draws axes from (x0, y0) to (x1, y1) with about three round numbers each. Returns the functions
-// that convert values to pixels.
+// Draws two axes for the values from (x0, y0) to (x1, y1), with about three tick labels on each axis. Returns the functions that
+// convert values to pixels.
 function axes(plot, [x0, x1], [y0, y1], words, name = short, nameOfY = name) {
   const { pen, size, left, right, top, bottom } = plot;
   const x = value => left + (value - x0) / (x1 - x0) * (right - left);
@@ -108,7 +107,7 @@ function axes(plot, [x0, x1], [y0, y1], words, name = short, nameOfY = name) {
   return { x, y };
 }
 
-// Round numbers between two values: multiples of 1, 2 or 5 times a power of ten.
+// Returns round numbers between two values; their spacing is 1, 2 or 5 times a power of ten.
 function round(low, high) {
   const least = (high - low) / 4, power = 10 ** Math.floor(Math.log10(least) + 1e-9), values = [];
   const step = power * [1, 2, 5, 10].find(k => k * power >= least * (1 - 1e-9));
@@ -116,8 +115,8 @@ function round(low, high) {
   return values;
 }
 
-// Plots lines { time, values, colour, dash, letter }. The axis of the values includes 0. Lines are
-// pale after the time `now`, and null values are gaps. Returns the map from times to pixels.
+// Plots curves { time, values, colour, dash, letter } against time. The vertical axis includes 0. The part of each curve after the
+// time `now` is pale, and null values leave gaps. Returns the function that converts times to pixels.
 function plotLines(canvas, lines, now) {
   const range = lines.map(({ time }) => [time[0], time.at(-1)]), start = Math.min(...range.map(([t]) => t));
   const end = Math.max(...range.map(([, t]) => t)), plot = prepare(canvas), { pen } = plot;
@@ -145,22 +144,22 @@ function plotLines(canvas, lines, now) {
   return x;
 }
 
-// ---------- speeds ----------
+// ---------- histogram of speeds ----------
 
 const FEWEST = 10;  // least number of disks of a species for a histogram
 let counted;        // species that have a histogram
 let sums;           // the histograms of all frames so far, and the number of the last of these frames
 
-// Defines the histogram bins from zero to a given maximum speed. If many disks are at rest the axis
-// is logarithmic, because on a linear axis the bar of the resting disks would hide all others.
+// Defines the histogram bins from zero to a given maximum speed. If many disks are at rest, the axis is logarithmic: on a linear
+// axis the bar of the resting disks would be much higher than all other bars.
 const RESTING = 0.02;  // fraction of disks at rest above which the axis is logarithmic
 function setBins(most, resting) {
   const rest = resting > RESTING && resting < 1;
   film.speeds = { rest, edges: Array.from({ length: 41 }, (_, k) => rest ? most * 10 ** (k / 10 - 4) : most * k / 40) };
 }
 
-// Returns the fraction of the disks of each species in each bin, at the time shown or in all frames
-// so far.
+// Returns the fraction of the disks of each species in each bin of the histogram. The fractions are taken at the time shown, or
+// over all frames received so far.
 function speedsNow() {
   const { edges, rest } = film.speeds, bins = edges.length - 1, width = edges[1] - edges[0];
   const bin = speed => rest ? speed > 0 ? Math.max(1, upTo(edges, speed)) : 0 : Math.floor(speed / width);
@@ -214,7 +213,7 @@ function drawHistogram() {
   pen.restore();
 }
 
-// If many disks are at rest, both axes are logarithmic and no Maxwell curve is drawn.
+// If many disks are at rest, both axes are logarithmic, and the Maxwell distribution is not drawn.
 function drawSpeedsAndRest(plot, counts) {
   const edges = film.speeds.edges.map(Math.log10), most = Math.log10(1.5 * Math.max(10, ...kinds.map(kind => kind.count)));
   const { pen } = plot, power = value => short(+(10 ** value).toPrecision(1));
@@ -229,7 +228,7 @@ function drawSpeedsAndRest(plot, counts) {
     + 'Bars: the number of disks at each speed; both axes grow by factors of ten.';
 }
 
-// ---------- energies and pressure, from the observables ----------
+// ---------- plots of energies and pressure against time ----------
 
 const ENERGIES = { kinetic: [], potential: [5, 3], rotational: [1.5, 2.5] }, DASHES = [[], [7, 2], [2, 2], [7, 2, 2, 2]];
 let cursorAt;      // the map from times to pixels
@@ -279,7 +278,7 @@ function tellEnergies() {
   }));
 }
 
-// ---------- measured values of a worker with their errors, and theoretical values ----------
+// ---------- table of measured values with errors, and theoretical values ----------
 
 function withError({ value, error }) {  // rounded to two digits of the error
   const last = Math.floor(Math.log10(error)) - 1, rounded = one => (Math.round(one / 10 ** last) * 10 ** last).toFixed(Math.max(0, -last)).replace('-', '−');
@@ -295,7 +294,7 @@ function tellNumbers() {
     + Object.entries({ temperature, 'mean speed': speed, pressure }).filter(([, one]) => one && one.value !== null).map(row).join('');
 }
 
-// ---------- list of the next events, if there are few disks ----------
+// ---------- list of the next events in a simulation of few disks ----------
 
 const meeting = ([, i, j]) => `disk ${i + 1} and ${j < 0 ? film.surfaces[-1 - j] : `disk ${j + 1}`}`;
 

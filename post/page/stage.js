@@ -1,4 +1,5 @@
-// ---------- the stage has three layers: ground (box, obstacles), disks, marks (traces, arrows, next events) ----------
+// ---------- picture of the simulation in three layers: the box with its obstacles, the disks, and marks (paths, arrows, next
+// events) ----------
 
 const layers = ['ground', 'disks', 'marks'].map($);
 const [ground, disksBrush, marks] = layers.map((layer, k) => layer.getContext('2d', { willReadFrequently: k === 1 }));
@@ -11,9 +12,8 @@ const dark = () => document.documentElement.dataset.theme === 'dark';
 const cssColour = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
 const css = rgb => `rgb(${rgb})`;
 
-// Colours of disks have a contrast of at least 3:1 to the background in both themes. The luminance
-// increases along each colour scale and differs between species, so that values and species can be
-// distinguished in greyscale.
+// In both colour themes the disks have a contrast of at least 3:1 to the background. The luminance increases along each colour
+// scale and differs between species. Therefore values and species can be distinguished in greyscale.
 const VIRIDIS = [[68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141], [39, 173, 129], [92, 200, 99], [170, 220, 50], [253, 231, 37]];
 const LIGHTS = { false: [0.02, 0.29, [0.11, 0.28, 0.04, 0.2, 0.07]], true: [0.14, 0.85, [0.27, 0.5, 0.14, 0.38, 0.2]] };
 const toLinear = part => part <= 10.3 ? part / 3294.6 : ((part / 255 + 0.055) / 1.055) ** 2.4;
@@ -35,8 +35,8 @@ function scaleColour(place) {
   return withLuminance(VIRIDIS[k].map((part, c) => part + (at - k) * (VIRIDIS[k + 1][c] - part)), low + (high - low) * place / 255);
 }
 
-// Functions that return the value of a quantity for a disk at the time shown, on a scale from 0 to
-// 1. The colouring by species needs no such function.
+// Each of these functions returns the value of one quantity for a disk at the time shown, scaled to the range from 0 to 1. Colours
+// by species are chosen without such a function.
 const quantities = {
   speed: i => Math.sqrt(VX[i] * VX[i] + VY[i] * VY[i]) / film.scales.speed[1],
   displacement: i => displacement(i) / film.scales.displacement[1],
@@ -70,24 +70,22 @@ function layOutStage() {
   groundShown = '';
 }
 
-// Returns the space for the stage in CSS pixels: beside the controls on a wide screen, above the
-// controls otherwise. On a telephone the histogram is between the disks and the controls.
+// Returns the space that is available for the picture, in CSS pixels. The picture is beside the controls on a wide screen, and
+// above the controls on a narrow screen. On a mobile phone the histogram of speeds is between the picture and the controls.
 function roomOfStage() {
   if (boxSize) return boxSize;
   const full = document.fullscreenElement === $('view'), bare = getComputedStyle($('view')).display === 'contents';
   const frame = bare ? $('main') : $('view'), style = getComputedStyle(frame);
   const inner = size => parseFloat(style[size]) || 0;
   const width = frame.clientWidth - inner('paddingLeft') - inner('paddingRight');
-  // clientHeight is used because innerHeight of a telephone increases while the page is wider than
-  // the screen.
+  // `clientHeight` is used because `innerHeight` of a mobile phone increases while the page is wider than the screen.
   const height = document.documentElement.clientHeight - (full ? 0 : $('top').offsetHeight) - inner('paddingTop') - inner('paddingBottom') - 2;
   if (cssColour('flat')) return { width: width - Math.max(260, 0.45 * width), height };
   const between = bare ? $('speeds').offsetHeight : 0;
   return { width, height: Math.max(full ? 100 : isPart ? 200 : 300, height - $('controls').offsetHeight - between - 16) };
 }
 
-// Small disks far apart would be invisible. They are drawn enlarged, and a note on the page states
-// this.
+// Disks that would be too small to be visible are drawn enlarged, and a note on the page tells the user that they are enlarged.
 const leastRadius = () => clamp(0.06 * Math.sqrt(film.edges[0] * film.edges[1] / disks) * page.unit, 1.1, 3 * page.dots);
 const enlarged = () => film.radii.some(radius => radius * page.unit < leastRadius());
 
@@ -101,9 +99,9 @@ function drawStage() {
   drawMarks();
 }
 
-// Sets the style of a side or an obstacle. Thermal boundaries have a colour: hot, or cold if
-// another boundary is hotter. Sliding boundaries have moving dashes. Returns true if the boundary
-// is thermal or slides.
+// Sets the line style of a side of the box or of an obstacle. The hottest thermal boundaries have the colour for hot, and all other
+// thermal boundaries the colour for cold. Sliding boundaries are drawn with moving dashes. Returns true if the boundary is thermal
+// or slides.
 const actsOn = law => !!(law && (law.temperature || law.surface_velocity));
 const laws = () => [...film.sides, ...film.laws.obstacle, ...film.laws.wall];
 const slides = () => laws().some(law => law?.surface_velocity);
@@ -145,7 +143,7 @@ function drawGround() {
       ground.stroke(new Path2D(`M${across(a + dx)},${up(b + dy)}L${across(c + dx)},${up(d + dy)}`));
     }));
   });
-  // Periodic sides are dashed. Thermal and sliding sides have a coloured band outside the box.
+  // Periodic sides of the box are drawn as dashed lines. Thermal and sliding sides are drawn with a coloured band outside the box.
   copies([x0, x1], [y0, y1], (dx, dy) => {
     const left = across(x0 + dx), right = across(x1 + dx), bottom = up(y0 + dy), top = up(y1 + dy);
     [[left, bottom, left, top], [right, bottom, right, top], [left, bottom, right, bottom], [left, top, right, top]].forEach(([a, b, c, d], k) => {
@@ -164,8 +162,7 @@ function drawGround() {
   ground.setLineDash([]);
 }
 
-// Returns left, top, right and bottom of the visible part of the box and its periodic images
-// [pixels].
+// Returns the left, top, right and bottom edge of the visible part of the box and of its periodic images [pixels].
 function seenBox() {
   const [x0, y0] = film.lower, [width, height] = film.edges, [wrapX, wrapY] = film.periodic;
   return [wrapX ? 0 : Math.max(0, across(x0)), wrapY ? 0 : Math.max(0, up(y0 + height)),
@@ -182,11 +179,11 @@ function inBox(brush, action) {
   brush.restore();
 }
 
-// ---------- disks ----------
+// ---------- drawing of the disks ----------
 
-// Disks are drawn pixel by pixel into an array, which is far faster than thousands of arcs. The
-// disks of a species are plain or, if they are large enough, striped: horizontally (1), vertically
-// (2) or both (3). The background is visible between the stripes.
+// The disks are drawn pixel by pixel into an array, which is much faster than to draw thousands of arcs on the canvas. Disks of
+// different species are distinguished by stripes if the disks are large enough. Pattern 0 is plain, 1 has horizontal stripes, 2
+// vertical stripes, and 3 both. The background is visible between the stripes.
 const SMALLEST_PATTERN = 3.5, PATTERNS = [0, 1, 2, 3];
 const isStriped = (kind, radius) => PATTERNS[kind % PATTERNS.length] > 0 && radius >= SMALLEST_PATTERN * page.dots;
 const bare = share => share - Math.floor(share) > 0.66;  // the last third of each period of the stripes is transparent
@@ -221,8 +218,8 @@ function drawDisk(x, y, radius, colour, stripes, [left, top, right, bottom]) {
   }
 }
 
-// Returns the new value of a pixel `old` at the rim of a disk that covers a part of the pixel (0 to
-// 255). The colours of several disks are mixed, and the covered parts are added.
+// Returns the new value of a pixel at the rim of a disk. The disk covers a fraction of the pixel, which is expressed by a number
+// from 0 to 255. If several disks cover parts of the pixel, their colours are mixed and the covered fractions are added.
 function painted(old, colour, covered) {
   const there = old >>> 24;
   if (there === 0) return colour & 0xffffff | covered << 24;
@@ -232,7 +229,7 @@ function painted(old, colour, covered) {
   return redBlue | green | total << 24;
 }
 
-// ---------- marks ----------
+// ---------- drawing of marks: arrows, paths and next events ----------
 
 function drawMarks() {
   const wanted = state.traced.length || state.arrows || film.exact || angles;
@@ -249,8 +246,7 @@ function drawMarks() {
   if (state.arrows) drawArrowKey();
 }
 
-// Shows the orientation of each disk by a line from its centre to its rim, if the disk is large
-// enough.
+// Draws a line from the centre of each disk to its rim, which shows the orientation of the disk. Small disks have no such line.
 const LEAST_TO_TURN = 2;
 function drawRadii() {
   marks.strokeStyle = ink.stage;
@@ -268,8 +264,8 @@ function drawRadii() {
   marks.stroke();
 }
 
-// Draws the recent path of a disk. The older part of the path is pale, and paths are dotted without
-// an event log.
+// Draws the recent path of a disk. The older part of the path is pale. Without an event log the path is approximate and therefore
+// dotted.
 function drawTrace(i) {
   const [old, recent] = [300, 30].map(k => frameTime(moment.frame - k));
   for (const [from, to, colour, width] of [[old, recent, ink.soft, 0.9], [recent, moment.shown, ink.ink, 1.6]]) {
@@ -281,8 +277,7 @@ function drawTrace(i) {
   ring(X[i], Y[i], Math.max(radii[sizeOf[i]], 3 * page.dots) + 2 * page.dots);
 }
 
-// Draws the free flights of the partners of the next event, and the partners' positions at the
-// event.
+// Draws the free flights of the disks that take part in the next event, and the positions of these disks at the event.
 function drawNextEvent() {
   const [when, ...both] = source.coming().next[0] ?? [], after = when - moment.time, g = film.gravity;
   marks.strokeStyle = ink.accent;
@@ -304,7 +299,7 @@ function ring(x, y, radius) {
   });
 }
 
-// Draws flights. A flight through a periodic side is drawn in each periodic image of the box.
+// Draws free flights of a disk. If a flight crosses a periodic side, it is drawn in each visible periodic image of the box.
 function drawPath(list, colour, width) {
   marks.strokeStyle = colour;
   marks.lineWidth = width * page.dots;
@@ -323,7 +318,7 @@ function drawPath(list, colour, width) {
   marks.stroke();
 }
 
-// The arrow of a typical speed is as long as the mean distance between disks.
+// The arrow for a typical speed has the same length as the mean distance between neighbouring disks.
 const arrowScale = () => Math.sqrt(film.edges[0] * film.edges[1] / Math.max(10, disks)) * view.unit / film.scales.speed[1] / Math.sqrt(camera.zoom);
 
 function drawArrows() {
@@ -351,7 +346,7 @@ function drawArrows() {
   }
 }
 
-// Draws the scale of the arrows in the upper left corner: an arrow of a round speed.
+// Draws a reference arrow in the upper left corner, and beside the arrow the speed that corresponds to its length.
 function drawArrowKey() {
   const speed = +film.scales.speed[1].toPrecision(1), size = speed * arrowScale(), { dots } = page, words = `speed ${short(speed)}`;
   marks.font = `${12 * dots}px system-ui, sans-serif`;
@@ -363,7 +358,7 @@ function drawArrowKey() {
   marks.fillText(words, x + 6 * dots, y);
 }
 
-// Draws the number of each disk inside the disk, or beside it if the disk is too small.
+// Draws the number of each disk inside the disk, or beside the disk if the disk is too small.
 function drawNumbers() {
   const code = codesNow(state.colour), least = 7 * page.dots;
   marks.textAlign = 'center';

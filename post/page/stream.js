@@ -1,14 +1,13 @@
-// ---------- a run of the laboratory: frames from a worker ----------
+// ---------- run of the laboratory: frames that a worker process sends ----------
 
-// The page draws the newest frame. Earlier frames are kept up to a limit of memory, so that the
-// user can go back. After going back, the film first plays the kept frames; then the worker
-// continues.
+// The page draws the newest frame of the simulation. It keeps earlier frames up to a limit of memory, because the user can go back
+// in time. After the user has gone back, the film first plays the stored frames; then the worker process continues the simulation.
 const PAST_ROOM = 6e7, HEAD = 6, MOST_CURVE = 3000;  // memory for frames [bytes]; numbers before the positions of a message; samples of a plot
 const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, numbers: {}, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
 
 function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSON.stringify(wish)); }
 
-// Starts a worker for a request and handles its messages.
+// Opens a connection to a worker process, sends a request, and handles the messages of the worker.
 function talk(wish, heard) {
   const socket = Object.assign(new WebSocket(new URL('ws', location.href.replace(/^http/, 'ws'))), { binaryType: 'arraybuffer', leave() { this.onclose = null; this.close(); } });
   socket.onopen = () => socket.send(JSON.stringify(wish));
@@ -20,8 +19,7 @@ function talk(wish, heard) {
 function starts(on) { document.documentElement.classList.toggle('starting', on); }
 const isStarting = () => document.documentElement.classList.contains('starting');
 
-// Starts the run that the laboratory requests. The connection is that of the earlier runs of this
-// film.
+// Starts the run that the user of the laboratory requests. All runs of this film use the same connection to a worker process.
 function start(run) {
   const same = stream.wish?.input === run.input, wish = { do: 'start', ...run, pace: same ? stream.sent : null, playing: !parent.isPaused() };
   if (!same) [stream.sent, usual] = [0, usual || !!stream.wish];
@@ -34,7 +32,7 @@ function start(run) {
   });
 }
 
-// Stops a worker that does not place its disks in time. The next run uses a new worker.
+// Stops the worker process if the placement of disks takes too long. The next run uses a new worker process.
 function leave() { stream.socket.leave(); }
 
 const hear = {
@@ -88,7 +86,7 @@ function open({ facts, blocks, run }) {
   source = fromWorker;
 }
 
-// Adapts the scale of speeds when a gas has been heated or cooled, or when resting disks begin to move.
+// Adapts the scale of speeds when the disks have become much faster or slower, or when resting disks begin to move.
 function fitScales(mean) {
   const [, top] = film.scales.speed, rest = VX.filter((vx, i) => vx === 0 && VY[i] === 0).length / disks;
   if ((rest > RESTING && rest < 1) === film.speeds.rest && !(mean > 0.8 * top) && !(mean && mean < 0.1 * top && !film.speeds.rest)) return;
@@ -109,7 +107,7 @@ function take(buffer) {
   const head = new Float64Array(buffer, 0, HEAD), pairs = from => new Float32Array(buffer, 8 * HEAD + 8 * from * disks, 2 * disks);
   const frame = { time: head[0], collisions: head[1], sides: [...head.slice(2)], place: pairs(0), velocity: pairs(1) };
   if (film.turning) frame.angle = new Float32Array(buffer, 8 * HEAD + 16 * disks, disks);
-  // No disk crosses half of the box between two frames, because the interval between them is short.
+  // The interval between two frames is so short that no disk moves farther than half of the box.
   cross(frame, ({ place }, k) => film.periodic[k % 2] ? Math.round((place[k] - frame.place[k]) / film.edges[k % 2]) : 0);
   const isFirst = !past.length, follows = stream.live && moment.time === past.at(-1)?.time;
   if (past.at(-1)?.time === frame.time) past.pop();  // at a start or a change the same time occurs again
@@ -129,7 +127,8 @@ function take(buffer) {
   if (!state.playing) drawn();
 }
 
-// The page confirms each frame, so that the worker is never more than two frames ahead.
+// The page confirms each frame after drawing it. The worker process waits for confirmations, and is at most two frames ahead of the
+// page.
 function drawn() { for (; stream.fresh > 0; stream.fresh--) send({ do: 'got' }); }
 
 const fromWorker = {
@@ -150,7 +149,7 @@ const fromWorker = {
     if (stream.live) send({ do: 'play' });
   },
   rest() { send({ do: 'pause' }); if (stream.live) show(last(), true); },  // the newest frame is shown
-  // A step beyond the last frame is computed by the worker.
+  // If the user steps beyond the last stored frame, the worker process calculates the next frame.
   goOn(what) {
     play(false);
     if (what === 'step' && moment.time !== last()) return false;
@@ -174,9 +173,9 @@ const fromWorker = {
   },
 };
 
-// ---------- a film inside the laboratory ----------
+// ---------- film as a part of the laboratory ----------
 
-// These functions are called by the laboratory for each of its films.
+// The page of the laboratory calls these functions for each of its films.
 function inside() { return { film, source, state, moment, kinds, stream, overlaid }; }
 
 function overlay(list) {
@@ -195,7 +194,7 @@ function choices(wish) {
   return { pace, speed: $('pace').value, state: { colour, arrows, sofar, total } };
 }
 
-// Plays again from the first kept frame when another run starts beside this run.
+// When another run starts beside this run, this film plays again from its first stored frame.
 function replay() {
   if (!film) return;
   show(first(), true);
@@ -204,8 +203,7 @@ function replay() {
   play(true);
 }
 
-// Shows the film as one of several boxes with a stage of the given size or, without `size`, as the
-// whole page.
+// Shows the film as one of several films with pictures of the given size. Without `size`, the film fills the whole page.
 let boxSize = null;
 function arrange(size, bare) {
   boxSize = size;
@@ -214,7 +212,7 @@ function arrange(size, bare) {
   layout();
 }
 
-// Plots the measured values of a scan with their errors against the variable, on a canvas of the laboratory.
+// Plots the measured values of a scan with error bars against the input variable that is scanned.
 function plotScan(canvas, { log, points, values }) {
   const scaled = value => log ? Math.log10(value) : value, ends = points.flatMap(([, mean, error]) => [mean - error, mean + error]);
   Object.assign(canvas, { width: canvas.clientWidth * page.dots, height: canvas.clientHeight * page.dots });
