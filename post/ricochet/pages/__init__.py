@@ -1,1 +1,1 @@
-"""Web pages of running simulations and of the laboratory: servers and worker processes."""
+"""Web servers and worker processes for the pages that show running simulations."""

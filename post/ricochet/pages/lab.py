@@ -1,8 +1,9 @@
-"""The laboratory: the server of its pages, and the worker processes that simulate for them.
+"""Web server of the laboratory, which starts a worker process for each simulation of a page.
 
-Each run and each scan has a WebSocket and a worker process (`ricochet.worker`), which ends when the
-socket is closed.  A spare worker is always ready, so that a page need not wait until Python has
-started.  If the laboratory is killed, the kernel ends its workers.
+Each run and each scan of a page has its own WebSocket and its own worker process
+(`ricochet.worker`).  The worker process ends when the WebSocket is closed.  A spare worker process
+is always ready, because the start of Python takes noticeable time.  If the server is killed, the
+operating system ends all worker processes.
 """
 
 import asyncio
@@ -27,17 +28,17 @@ DIED = b"It has ended: it needs more memory than it may have here (fewer disks d
 NAME = re.compile(r"[\w.-]{1,200}")  # name of a variable or a group
 
 
-# --- inputs as parsed by the program ---
+# --- contents of input files ---
 
 
 def printed(*words: str | Path) -> object:
-    """Return the JSON that the program prints; problems with the input are ignored."""
+    """Return the JSON output of the simulation program, without its error messages."""
     done = subprocess.run([find_program(), *words], capture_output=True, text=True, check=False)
     return json.loads(done.stdout or "[]")
 
 
 def form(path: Path) -> dict:
-    """Return the description of an input file and its values, group by group."""
+    """Return the description of an input file, and the values of each group in the file."""
     head = path.read_text(errors="replace").split("\n&")[0]
     groups = [
         {
@@ -51,7 +52,7 @@ def form(path: Path) -> dict:
 
 
 def setting(value: object) -> str:
-    """Return a value in the format of --set."""
+    """Return a value in the format of the option `--set` of the simulation program."""
     if isinstance(value, list):
         return ",".join(map(setting, value))
     return value if isinstance(value, str) else value_text("", value).removesuffix(".0")
@@ -61,10 +62,10 @@ def setting(value: object) -> str:
 
 
 class Lab:
-    """The inputs, the table of variables, and all worker processes of the laboratory."""
+    """The input files, the table of input variables, and the worker processes of the laboratory."""
 
     def __init__(self, inputs: list[Path], folders: list[Path], command: list[str]) -> None:
-        """Store input files, folders from which inputs may read, and the command of a worker."""
+        """Store the input files, the folders that they may refer to, and the worker command."""
         self.inputs = {path.stem: path for path in inputs}
         self.folders = [folder.resolve() for folder in folders]
         self.command = command
@@ -88,12 +89,12 @@ class Lab:
         return worker
 
     def prepare(self) -> None:
-        """Start a worker in advance."""
+        """Start the spare worker process, unless one exists."""
         if not (self.spare or self.closed):
             self.spare = asyncio.create_task(self.start_worker())
 
     async def worker(self) -> Process:
-        """Return the spare worker, and start the next one."""
+        """Return the spare worker process, and start another spare worker process."""
         self.prepare()
         task, self.spare = self.spare, None
         if task is None:
@@ -106,7 +107,7 @@ class Lab:
         return await self.worker()
 
     async def end(self, worker: Process) -> None:
-        """End a worker."""
+        """End a worker process, by force if it does not end within `GRACE` seconds."""
         terminate(worker)
         try:
             async with asyncio.timeout(GRACE):
@@ -117,7 +118,7 @@ class Lab:
         self.workers.discard(worker)
 
     async def close(self) -> None:
-        """End all workers."""
+        """End all worker processes."""
         self.closed = True
         if self.spare:
             with suppress(OSError, asyncio.CancelledError):
@@ -127,7 +128,7 @@ class Lab:
     # --- runs ---
 
     async def socket(self, request: web.Request) -> web.StreamResponse:
-        """Handle the socket of a run; the run lasts as long as the socket is open."""
+        """Handle the WebSocket of a run; the run ends when the WebSocket is closed."""
         if self.runs >= RUNS:
             raise RunError(f"{RUNS} runs are open, which is the largest number: close a page")
         self.runs += 1
@@ -143,7 +144,7 @@ class Lab:
         return socket
 
     async def pass_requests(self, worker: Process, socket: web.WebSocketResponse) -> None:
-        """Pass requests of a page to its worker until the page leaves or the worker has ended."""
+        """Pass requests of a page to its worker process until the WebSocket is closed."""
         answers = asyncio.create_task(self.pass_answers(worker, socket))
         try:
             async for message in socket:
@@ -161,7 +162,7 @@ class Lab:
             answers.cancel()
 
     async def pass_answers(self, worker: Process, socket: web.WebSocketResponse) -> None:
-        """Pass answers of a worker to its page, and close the socket when the worker ends."""
+        """Pass answers of a worker process to its page, and close the WebSocket at the end."""
         with suppress(asyncio.IncompleteReadError, ConnectionError):
             while True:
                 kind, length = struct.unpack(">cI", await worker.stdout.readexactly(5))
@@ -170,9 +171,9 @@ class Lab:
         await socket.close(message=ENDED if self.closed else DIED)
 
     def allowed(self, query: dict) -> dict:
-        """Check a request of a page and return it with the text of its input.
+        """Check a request of a page, and return the request together with the input text.
 
-        Raises LookupError, TypeError or ValueError if the request is malformed.
+        The method raises LookupError, TypeError or ValueError if the request is malformed.
         """
         if query["do"] not in ("start", "scan"):
             return query
@@ -191,7 +192,7 @@ class Lab:
         return query | {"text": text}
 
     def allow(self, file: str) -> None:
-        """Raise an error for a starting file outside the folders of the inputs."""
+        """Raise an error if a file that the input names is outside the allowed folders."""
         path = Path(re.fullmatch(r"""(['"]?)([^'"]*)\1""", file.strip())[2]).resolve()
         if not any(path.is_relative_to(folder) for folder in self.folders):
             raise RunError(
@@ -200,21 +201,25 @@ class Lab:
 
 
 async def send(socket: web.WebSocketResponse, message: dict) -> None:
-    """Send a message to a page if its socket is still open."""
+    """Send a message to a page if the WebSocket is still open."""
     with suppress(ConnectionError):
         await socket.send_json(message)
 
 
 def terminate(worker: Process) -> None:
-    """End a worker; a worker that is writing a file first removes the file."""
+    """Ask a worker process to end.
+
+    If the worker is writing a temporary file, it removes the file before it ends.
+    """
     with suppress(ProcessLookupError):
         worker.terminate()
 
 
 def is_alive(worker: Process) -> bool:
-    """Return whether a worker has not ended.
+    """Return whether a worker process is still running.
 
-    The return code is not sufficient, because it is set some time after the process has ended.
+    The return code alone is not reliable, because `asyncio` sets it with a delay after the process
+    has ended.
     """
     with suppress(ProcessLookupError):
         os.kill(worker.pid, 0)
@@ -223,7 +228,7 @@ def is_alive(worker: Process) -> bool:
 
 
 def refusal(problem: object) -> dict:
-    """Return the answer to a request that is refused."""
+    """Return the message that tells a page why its request was refused."""
     lines = [{"place": "", "text": str(problem)}]
     return {"is": "problems", "change": False, "problems": lines}
 

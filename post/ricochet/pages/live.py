@@ -1,7 +1,7 @@
-"""A web server for browsers on this computer, and the page of an unfinished run.
+"""Web server for browsers on the same computer, and the page that shows an unfinished run.
 
-Requests from pages of other addresses are refused, so that pages of other hosts cannot read
-anything through a name that points to this computer (DNS rebinding).
+The server refuses requests from pages of other web sites.  Such pages might otherwise read data
+through a host name that is resolved to this computer (DNS rebinding).
 """
 
 import asyncio
@@ -33,12 +33,12 @@ HEADERS = {
 SERVER = web.AppKey("server", dict)
 
 
-# --- a server ---
+# --- web server ---
 
 
 @web.middleware
 async def guarded(request: web.Request, handler: Callable) -> web.StreamResponse:
-    """Answer requests only from pages of this server and from users who enter the address."""
+    """Refuse every request that does not come from a page of this server or from the user."""
     port = request.app[SERVER]["port"]
     hosts = {f"{name}:{port}" for name in (ADDRESS, "localhost")}
     if port == 80:
@@ -60,9 +60,9 @@ async def guarded(request: web.Request, handler: Callable) -> web.StreamResponse
 
 
 def application(paths: Mapping[str, Callable], frames: str = "'none'") -> web.Application:
-    """Return a web application with a function for each path.
+    """Return a web application that calls a function for each path.
 
-    `frames` lists the origins of pages that may embed pages of this server in a frame.
+    `frames` lists the origins of web pages that may embed pages of this server in an HTML frame.
     """
     app = web.Application(middlewares=[guarded], client_max_size=LONGEST)
     app[SERVER] = {"heard": set()}  # connections that have sent a request
@@ -77,7 +77,7 @@ def application(paths: Mapping[str, Callable], frames: str = "'none'") -> web.Ap
 
 
 async def close_silent(app: web.Application, server: web.Server) -> None:
-    """Close connections without requests, so that many of them cannot exhaust the server."""
+    """Close connections that send no requests, because many of them would exhaust the server."""
     active, clock = app[SERVER]["heard"], asyncio.get_running_loop().time
     since: dict = {}
     while True:
@@ -92,9 +92,9 @@ async def close_silent(app: web.Application, server: web.Server) -> None:
 
 @asynccontextmanager
 async def serving(app: web.Application, port: int = 0):
-    """Answer requests; yield the address and an event that is set by Ctrl-C, TERM and HUP.
+    """Run the server; yield its address and an event that Ctrl-C, TERM and HUP set.
 
-    Raises RunError if the port is taken.
+    The function raises RunError if another program uses the port.
     """
     for name in ("aiohttp", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # requests are not logged
@@ -120,7 +120,7 @@ async def serving(app: web.Application, port: int = 0):
 
 
 def page_of(text: str) -> Callable:
-    """Return a function that answers requests with a page."""
+    """Return a function that answers every request with the given page."""
 
     async def answer(_: web.Request) -> web.Response:
         return web.Response(text=text, content_type="text/html")
@@ -128,18 +128,18 @@ def page_of(text: str) -> Callable:
     return answer
 
 
-# --- an unfinished run ---
+# --- page of an unfinished run ---
 
 
 class Live:
-    """The newest film of a run that may be unfinished.
+    """Film of a run that may still continue.
 
-    The file is opened for each request without locks, and only committed data are read, so that the
-    running simulation is not disturbed.
+    The output file is opened without a lock for each request, and only completely written data are
+    read.  Therefore the running simulation is not disturbed.
     """
 
     def __init__(self, run: Run, make_film: Callable[[Run], dict]) -> None:
-        """Store the run and the function that makes a film of the run."""
+        """Store the run and the function that converts the run to a film."""
         self.final = run.path.with_suffix("") if run.path.suffix == ".part" else run.path
         self.part, self.make_film = Path(f"{self.final}.part"), make_film
         self.lock_file = Path(f"{self.final}.lock")  # held by the program while it writes
@@ -150,7 +150,7 @@ class Live:
 
     @property
     def end(self) -> str:
-        """Reason why the run has ended; empty while it continues."""
+        """Reason why the run has ended; empty while the run continues."""
         if not self.part.exists():
             return "has ended" if self.final.exists() else ""
         if abandoned(self.lock_file):
@@ -158,10 +158,10 @@ class Live:
         return "" if self.lock_file.exists() else "has stopped"
 
     def answer(self, known: str) -> tuple[bytes, bool]:
-        """Return the film if it is newer than that of the page, and whether the run has ended."""
+        """Return the film unless the page has it already, and whether the run has ended."""
         with self.lock:
             end = self.end
-            # The program may be renaming the file; then the next request will succeed.
+            # If the simulation program is just renaming the file, the next request will succeed.
             with suppress(RunError, FileNotFoundError):
                 run = read_run(self.part if self.part.exists() else self.final)
                 stamp = f"{run.n_frames} {end}"
@@ -173,7 +173,7 @@ class Live:
             return b"" if known == self.stamp else self.body, ends
 
     async def film(self, request: web.Request) -> web.StreamResponse:
-        """Answer a request of a page."""
+        """Answer a request of a page for the newest film."""
         self.last_request = asyncio.get_running_loop().time()
         body, ends = await asyncio.to_thread(self.answer, request.query.get("known", ""))
         response = web.Response(body=body, content_type="application/json")
@@ -184,10 +184,11 @@ class Live:
 
 
 def abandoned(lock: Path) -> bool:
-    """Return whether the program was killed: a lock file exists, but no process holds the lock.
+    """Return whether the simulation program was killed.
 
-    A free lock is acquired for a moment only.  If the file system has no locks, the result is
-    False.
+    A killed program leaves a lock file on which no process holds a lock.  To test the lock, this
+    function acquires and releases it.  If the file system does not support locks, the function
+    returns False.
     """
     import fcntl  # imported here because it does not exist on Windows, where files can be read
 
@@ -210,10 +211,11 @@ def serve(
     make_film: Callable[[Run], dict],
     open_page: Callable[[str], object] | None = None,
 ) -> str:
-    """Show the run until it has ended, or until Ctrl-C or TERM; return the reason of the end.
+    """Show a run until it ends or a signal arrives, and return why the server stopped.
 
-    `open_page` is called with the address of the page.  Raises RunError if the file cannot be
-    shown, or if the program was killed.
+    The server stops when the run has ended, or after Ctrl-C or the signal TERM.  The function calls
+    `open_page` with the address of the page.  It raises RunError if the file cannot be shown, or if
+    the simulation program was killed.
     """
     if run.path.suffix != ".part":
         raise RunError(f"{run.path}: has finished; leave out --live")
@@ -228,7 +230,7 @@ def serve(
 
 
 async def serve_until_end(live: Live, page: str, open_page: Callable[[str], object] | None) -> None:
-    """Serve the page until it has received the end of the run, or until a signal."""
+    """Serve the page until it has shown the end of the run, or until a signal arrives."""
     app = application({"/": page_of(page), "/film": live.film})
     async with serving(app) as (address, stop):
         if open_page:

@@ -1,17 +1,19 @@
-"""Worker process of the laboratory, which simulates and sends frames to a page.
+"""Worker process of the laboratory, which simulates and sends frames to a web page.
 
-Requests are lines of JSON on standard input.  An answer on standard output consists of a letter,
-the length in four bytes, and a text in JSON (letter t) or a frame (letter b).  Each text is an
-object with a member called "is", which contains its kind: scene (constant part of a picture),
-numbers, events (next events), state, problems, file, scan.  The worker waits while there are two
-frames that the page has not yet confirmed as drawn (request `got`).
+The worker process reads requests from standard input; each request is one line of JSON.  Each
+answer on standard output begins with a letter and with its length in four bytes.  The letter b
+denotes a frame, and the letter t a JSON object.  The member "is" of a JSON object names the kind of
+the answer: "scene" (the constant part of the picture), "numbers", "events" (the next events),
+"state", "problems", "file" or "scan".  The page confirms with the request "got" that it has drawn a
+frame.  The worker process waits while two frames are unconfirmed.
 
-A frame contains, in this order and in the byte order of the machine: time, collisions per disk and
-the positions of the left, right, bottom and top side as 8-byte floats; then as 4-byte floats x and
-y of all disks, their velocities, and their angles if they rotate.
+A frame consists of binary numbers in the byte order of the computer.  The first six numbers have 8
+bytes: the time, the number of collisions per disk, and the positions of the left, right, bottom and
+top side.  All following numbers have 4 bytes: the positions x, y of all disks, their velocities,
+and the angles of rotating disks.
 
-A change is applied at a time at which all events are complete, so that the script written by
-`script` repeats the run bit for bit.
+Changes are applied only at times at which no event is partly processed.  Therefore the Python
+script that the function `script` returns can repeat the run bit for bit.
 """
 
 import base64
@@ -63,10 +65,10 @@ PR_SET_PDEATHSIG = 1  # option PR_SET_PDEATHSIG of prctl
 
 
 class Session:
-    """A simulation and the pace at which it advances for a page."""
+    """The simulation that a page shows, and the pace at which the simulation advances."""
 
     def __init__(self, describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
-        """Store the function that returns the constant part of a picture: values and arrays."""
+        """Store the function that returns the constant part of a picture as values and arrays."""
         self.describe_scene = describe_scene
         self.simulation: Simulation | None = None
         self.playing, self.ended, self.reason = False, False, ""
@@ -81,7 +83,7 @@ class Session:
     # --- requests ---
 
     def start(self, request: dict) -> None:
-        """Start a new simulation instead of the present one if its input is accepted."""
+        """Replace the present simulation by a new one if the new input is valid."""
         pace = max(0.0, float(request["pace"] or 0.0))
         try:
             other = Simulation._of(request["text"], setting_lines(request["settings"]))
@@ -99,7 +101,7 @@ class Session:
         self.send_scene(changed=False)
 
     def send_scene(self, changed: bool) -> None:
-        """Send the present scene after a start or a change."""
+        """Send the constant part of the picture after a start or a change of the simulation."""
         run = self.run = snapshot_run(self.simulation)
         self.settles = run.nature.in_equilibrium
         self.samples.clear()
@@ -119,17 +121,17 @@ class Session:
         self.send_state()
 
     def change(self, request: dict) -> None:
-        """Change variables of the running simulation."""
+        """Change input variables of the running simulation."""
         settings = request["settings"]
         self.apply("change", settings, lambda: self.simulation._change(setting_lines(settings)))
 
     def heat(self, request: dict) -> None:
-        """Multiply all velocities by a factor."""
+        """Multiply the velocities of all disks by the requested factor."""
         factor = float(request["factor"])
         self.apply("heat", factor, lambda: scale_velocities(self.simulation, factor))
 
     def apply(self, what: str, value: object, change: Callable[[], object]) -> None:
-        """Apply a change at a time that a repeated run can reach exactly."""
+        """Apply a change at a time that a repetition of the run can reach exactly."""
         try:
             now = self.simulation._settle()
             change()
@@ -155,21 +157,21 @@ class Session:
         self.send_state()
 
     def set_pace(self, request: dict) -> None:
-        """Set the simulated time per second."""
+        """Set the simulated time per second of real time."""
         self.pace = max(0.0, float(request["pace"]))
 
     def got(self, _: dict) -> None:
-        """Count a frame that the page has drawn."""
+        """Record that the page has drawn one more frame."""
         self.unconfirmed = max(0, self.unconfirmed - 1)
 
     def step(self, request: dict) -> None:
-        """Advance by a given time, then pause."""
+        """Advance the simulation by the requested time, and then pause."""
         if not (more := float(request["time"])) >= 0:
             raise ValueError("a step cannot go back in time")
         self.playing, self.goal = False, (self.simulation.time + more, NEVER, NEVER)
 
     def event(self, request: dict) -> None:
-        """Advance by one event, then pause."""
+        """Advance the simulation by one event, and then pause."""
         coming = [] if self.run.time_step else self.simulation.next_events(1)
         if not coming and not self.run.time_step:
             self.pause(request)  # no further event can occur
@@ -178,7 +180,7 @@ class Session:
         self.last_event = coming[0] if coming else None
 
     def keep(self, request: dict) -> None:
-        """Send a file of the run: `input`, `script` or `output`."""
+        """Send a file that the user requests: the `input`, a `script` or the `output`."""
         name, part = self.request["input"], request["part"]
         try:
             end = self.simulation.time if self.ended else self.simulation._settle()
@@ -197,7 +199,10 @@ class Session:
         send_json({"is": "file", "name": name + ENDINGS[part], "body": letters})
 
     def output_file(self, name: str) -> bytes:
-        """Return the output file; signals are blocked until its folder is removed."""
+        """Return the contents of an output file.
+
+        The signal TERM is deferred until the temporary folder of the file has been removed.
+        """
         ends: list[int] = []  # not blocked: a thread of a library would receive it
         before = signal.signal(signal.SIGTERM, lambda number, _: ends.append(number))
         try:
@@ -208,15 +213,15 @@ class Session:
             if ends:
                 sys.exit()
 
-    # --- advancing and sending ---
+    # --- progress of the simulation, and messages to the page ---
 
     def is_advancing(self) -> bool:
-        """Return whether the simulation should advance now."""
+        """Return whether the simulation is to advance at this moment."""
         ready = self.simulation and not self.ended and self.unconfirmed < FRAMES_AHEAD
         return bool(ready and (self.goal or (self.playing and self.pace > 0)))
 
     def advance(self) -> None:
-        """Advance to the time of the next frame, but at most for `SLICE` seconds."""
+        """Advance towards the time of the next frame, for at most `SLICE` seconds of real time."""
         now = time.perf_counter()
         passed, self.due = min(now - self.due, 0.1), now
         stepping = self.goal
@@ -261,7 +266,7 @@ class Session:
             self.last_event = None
 
     def send_state(self) -> None:
-        """Send the state of the simulation, and its changes so far."""
+        """Send the state of the simulation, and a list of the changes made by the user."""
         changes = [
             (when, name, value)
             for when, what, values, _ in self.actions
@@ -273,7 +278,7 @@ class Session:
         send_json({"is": "state", "changes": changes} | state)
 
     def send_numbers(self) -> None:
-        """Send the present energies, and means with errors since the last change."""
+        """Send the present energies, and mean values with errors since the last change."""
         self.numbers_sent = time.perf_counter()
         run, value = self.run, observed(self.simulation)
         now = value["time"]
@@ -303,7 +308,7 @@ class Session:
 
 @dataclass(frozen=True)
 class SnapshotRun(Run):
-    """The present state of a simulation as a run with one frame and the present observables."""
+    """A run that consists of the present state of a simulation: one frame and its observables."""
 
     simulation: Simulation
 
@@ -315,7 +320,7 @@ class SnapshotRun(Run):
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """The corners of the box with a margin beyond pistons."""
+        """Corners of the box, with a margin outside each piston."""
         way = np.zeros(4)
         way[[*self.piston_positions]] = PISTON_MARGIN * self.edges.max()
         lower, upper = Run.bounds.func(self)
@@ -327,7 +332,7 @@ class SnapshotRun(Run):
 
 
 def snapshot_run(simulation: Simulation) -> SnapshotRun:
-    """Return the present state of a simulation as a run."""
+    """Return a run with one frame that contains the present state of a simulation."""
     parameters = simulation.parameters
     box, kinds = parameters["box"], parameters["species"]
     lower, upper = (np.asarray(box[name], dtype=float) for name in ("lower", "upper"))
@@ -358,15 +363,15 @@ def snapshot_run(simulation: Simulation) -> SnapshotRun:
 
 
 def observed(simulation: Simulation) -> dict[str, float]:
-    """Return the time and the present observables; vectors are represented by one component."""
+    """Return the time and the observables; of a vector, only the first component."""
     seen = simulation._observed().items()
     return {name: part[0].item() for name, part in seen} | {"time": simulation.time}
 
 
 def sampled(count: int, value: dict) -> tuple[float, ...]:
-    """Return the quantities from which means are computed: time, energy, virial, area.
+    """Return the present time, kinetic energy per disk, virial and accessible area.
 
-    The observable `virial_pressure` follows from these quantities.
+    The mean pressure between two times is calculated from these four quantities.
     """
     time, kinetic, virial = (value[name] for name in ("time", "all/kinetic_energy", "virial"))
     whole = count * kinetic + (virial / (2 * time) if time else 0.0)
@@ -374,7 +379,7 @@ def sampled(count: int, value: dict) -> tuple[float, ...]:
 
 
 def pressure_between(samples: np.ndarray, count: int) -> SeriesMean:
-    """Return the mean pressure between the first and the last sample; sides may move."""
+    """Return the mean pressure between the first and last sample, also if sides move."""
     (kinetic, virial, area), apart = samples[1:4], np.diff(samples[0])
     gain = count * kinetic[1:] * apart + np.diff(virial) / 2
     return correlated_mean(gain / area[1:], apart)
@@ -383,9 +388,9 @@ def pressure_between(samples: np.ndarray, count: int) -> SeriesMean:
 def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
     """Return temperature, mean speed and pressure with errors and theoretical values.
 
-    For a run that relaxes to equilibrium the values are means over the samples in equilibrium, with
-    errors that include the autocorrelation.  For other runs they are present values, and the
-    pressure is the mean between the first and the last sample.
+    If the run relaxes to equilibrium, the values are means over all samples in equilibrium.  The
+    errors of these means account for the autocorrelation of the samples.  For all other runs,
+    temperature and mean speed are present values without errors, and no pressure is returned.
     """
     time, kt, speed = samples[[0, 4, 5]]
     found = {
@@ -426,7 +431,7 @@ def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
 
 
 def setting_lines(settings: dict[str, str]) -> list[str]:
-    """Return GROUP.VARIABLE=VALUE of each setting in the format of --set."""
+    """Return each setting as a text GROUP.VARIABLE=VALUE, the format of the option `--set`."""
     lines = [f"{name}={value}" for name, value in settings.items()]
     if any("\n" in line or "\r" in line for line in lines):
         raise ValueError("a value must not contain line ends")
@@ -434,7 +439,7 @@ def setting_lines(settings: dict[str, str]) -> list[str]:
 
 
 def problems(reason: Exception) -> list[dict]:
-    """Return the messages of the program, each with the variable to which it refers."""
+    """Return the error messages of the program, each with the variable that caused it."""
     found = []
     for line in str(reason).splitlines():
         place = line.removeprefix("--set ").partition("=")[0] if line.startswith("--set ") else ""
@@ -444,17 +449,17 @@ def problems(reason: Exception) -> list[dict]:
 
 
 def refuse(reason: Exception, change: bool = False) -> None:
-    """Send the problems of a request."""
+    """Send the page the reasons why a request was refused."""
     send_json({"is": "problems", "change": change, "problems": problems(reason)})
 
 
 def scale_velocities(simulation: Simulation, factor: float) -> None:
-    """Multiply all velocities of a simulation."""
+    """Multiply the velocities of all disks of a simulation by a factor."""
     simulation.velocity = factor * simulation.velocity
 
 
 def script(name: str, text: str, actions: list[tuple], end: float) -> str:
-    """Return a script that repeats the run with all its changes, up to a time."""
+    """Return a Python script that repeats the run, with all its changes, up to the time `end`."""
     lines = [f'"""The run of {name} in the laboratory with all its changes, bit for bit."""', ""]
     quoted = repr(text) if "\\" in text or '"""' in text else f'"""{text}"""'
     lines += ["from ricochet import Simulation", "", f"INPUT = {quoted}", ""]
@@ -471,13 +476,13 @@ def script(name: str, text: str, actions: list[tuple], end: float) -> str:
 
 
 def send(kind: bytes, body: bytes) -> None:
-    """Write one answer."""
+    """Write one answer to standard output."""
     sys.stdout.buffer.write(kind + struct.pack(">I", len(body)) + body)
     sys.stdout.buffer.flush()
 
 
 def send_json(message: dict) -> None:
-    """Write one answer as JSON."""
+    """Write one answer to standard output in JSON."""
     try:
         text = json.dumps(message, allow_nan=False)
     except ValueError:  # NaN and infinity are sent as null
@@ -486,7 +491,11 @@ def send_json(message: dict) -> None:
 
 
 def requests(wait: float | None) -> list[dict]:
-    """Return the requests that have arrived; `wait` is the longest wait in s, None for no limit."""
+    """Return all requests that have arrived.
+
+    If no request has arrived, the function waits for one.  The argument `wait` is the longest time
+    to wait [s]; None means without limit.
+    """
     if select.select([0], [], [], wait)[0]:
         data = os.read(0, 1 << 20)
         if not data:
@@ -500,7 +509,10 @@ def requests(wait: float | None) -> list[dict]:
 
 
 def scan(request: dict) -> None:
-    """Simulate several values of one variable; send the result or problem of each value."""
+    """Simulate several values of an input variable, and send the result for each value.
+
+    If a value cannot be simulated, the error message is sent instead.
+    """
     for index, value in enumerate(request["values"]):
         try:
             lines = setting_lines(request["settings"] | {request["variable"]: value})
@@ -512,10 +524,11 @@ def scan(request: dict) -> None:
 
 
 def measure(text: str, lines: list[str], name: str) -> tuple[float, float | None]:
-    """Measure the time average of an observable, or the rate of one of `COUNTED`, with its error.
+    """Return the time average of an observable and its error.
 
-    The samples are half a collision per disk apart, and the second half of `SCAN_SAMPLES` samples
-    is used. An error is returned only if the run relaxes to equilibrium.
+    If the observable is a count (in `COUNTED`), the function returns the rate at which the count
+    grows.  The interval between samples is half a collision per disk.  The average is taken over
+    the second half of the samples.  An error is returned only if the run relaxes to equilibrium.
     """
     samples, began = [], time.perf_counter()
     with Simulation._of(text, lines) as simulation:
@@ -540,7 +553,7 @@ def measure(text: str, lines: list[str], name: str) -> tuple[float, float | None
 
 
 def work(describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
-    """Answer requests until the laboratory closes the connection."""
+    """Answer requests of the page until the server of the laboratory closes the connection."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # handled by the laboratory
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
