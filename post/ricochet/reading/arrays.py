@@ -1,18 +1,19 @@
-"""Types of arrays and of indices that functions of the package accept or return."""
+"""Types of the arrays and indices that functions of this package accept and return."""
 
 from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 
-#: Index that selects frames: a number (from the end if it is negative), a slice, or a list.
+#: Index that selects frames: a number, a slice or a list.  Negative numbers count from the last
+#: frame.
 Index = int | slice | Sequence[int] | np.ndarray
 #: Argument of a formula: a number or an array of numbers.
 Number = TypeVar("Number", float, np.ndarray)
 
 
 def as_index(index: Index) -> int | slice | np.ndarray:
-    """Return an index in a form that NumPy accepts for one axis, also from a tuple or range."""
+    """Convert a number, slice, list, tuple or range to an index that NumPy accepts for one axis."""
     if isinstance(index, int | np.integer | slice):
         return index if isinstance(index, slice) else int(index)
     array = np.asarray(index)
@@ -20,13 +21,13 @@ def as_index(index: Index) -> int | slice | np.ndarray:
 
 
 def chosen(count: int, index: Index) -> list[int]:
-    """Return the numbers (from 0) that an index selects among `count` items."""
+    """Return the positions, counted from 0, that an index selects in a list of `count` items."""
     found: list[int] = np.atleast_1d(np.arange(count)[as_index(index)]).tolist()
     return found
 
 
 def in_place(function: np.ufunc, name: str) -> Any:
-    """Return an in-place operator that does not modify a read-only array."""
+    """Return an in-place operator that returns a new array if its operand is read-only."""
 
     def operator(self: "Snapshot", other: Any) -> np.ndarray:
         if self.flags.writeable:
@@ -38,10 +39,11 @@ def in_place(function: np.ufunc, name: str) -> Any:
 
 
 class Snapshot(np.ndarray):
-    """An array of a simulation at one time, which is read-only because it is a copy.
+    """Read-only copy of an array of a simulation, such as the velocities at one time.
 
-    `box.velocity *= 2` is `box.velocity = box.velocity * 2`: the in-place operators return a new
-    array, which the simulation accepts.  Results of expressions are ordinary arrays.
+    The in-place operators return a new array.  Therefore the statement `box.velocity *= 2` has the
+    same effect as `box.velocity = box.velocity * 2`, which changes the velocities of the
+    simulation.  Expressions with such an array return ordinary arrays.
     """
 
     __iadd__ = in_place(np.add, "__iadd__")
@@ -54,11 +56,11 @@ class Snapshot(np.ndarray):
     __imatmul__ = in_place(np.matmul, "__imatmul__")
 
     def __array_wrap__(self, array: Any, context: Any = None, return_scalar: bool = False) -> Any:
-        """Return the result of a function of NumPy as an ordinary array or number."""
+        """Convert the result of a NumPy function to an ordinary array or number."""
         return array[()] if return_scalar else np.asarray(array)
 
     def __setitem__(self, index: Any, value: Any) -> None:
-        """Raise an error, because an assignment would change only a copy."""
+        """Raise an error, because the assignment would not change the simulation."""
         if not self.flags.writeable:
             raise ValueError(
                 "read-only: this array is a copy of the simulation's; change a copy of it, and "
@@ -68,7 +70,7 @@ class Snapshot(np.ndarray):
 
 
 def snapshot(values: np.ndarray) -> Snapshot:
-    """Return an array as a read-only array of a simulation."""
+    """Convert an array to a read-only `Snapshot`."""
     found = values.view(Snapshot)
     found.flags.writeable = False
     return found

@@ -1,4 +1,7 @@
-"""Conversion of runs to types of other packages; for pandas see `Run.to_dataframe`."""
+"""Conversion of runs to data types of other packages.
+
+Conversion for pandas and xarray is implemented by `Run.to_dataframe` and `Run.to_xarray`.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -11,11 +14,12 @@ if TYPE_CHECKING:
 
 
 def mdanalysis_universe(run: Run) -> "MDAnalysis.Universe":
-    """Return the run as a Universe of MDAnalysis, a package that must be installed.
+    """Convert a run to a `Universe` of the package MDAnalysis, which must be installed.
 
-    MDAnalysis supports three dimensions only: z = 0 is added.  Lengths and times are not converted;
-    the time between frames is the mean interval.  Selections use the names of species, such as
-    `u.select_atoms("type projectile")`; the analysis classes work on `u.trajectory`.
+    Because MDAnalysis requires three dimensions, all disks have z = 0. Lengths and times are stored
+    without conversion of units.  MDAnalysis assumes equally spaced frames; the time between frames
+    is set to the mean interval. The type of an atom is the name of the species, as in
+    `u.select_atoms("type projectile")`.  All analysis classes of MDAnalysis can use `u.trajectory`.
 
     Parameters
     ----------

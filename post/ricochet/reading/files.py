@@ -1,4 +1,4 @@
-"""Open HDF5 files of runs, and prepare paths of results."""
+"""Open the HDF5 files of runs, and prepare the paths of figures and tables."""
 
 import multiprocessing
 import shutil
@@ -17,16 +17,22 @@ PRIORITY = 10  # order of the removal of folders among the actions at the end of
 
 
 class RunError(Exception):
-    """Error for a file that cannot be used; the message contains the file and the reason."""
+    """Error for a file that cannot be used.
+
+    The message contains the path of the file and the reason.
+    """
 
 
 class Unsound(Exception):
-    """Error for invalid content of a file; `open_file` adds the path."""
+    """Error for invalid contents of a file.
+
+    `open_file` adds the path of the file to the message.
+    """
 
 
 @contextmanager
 def open_file(path: Path) -> Iterator[h5py.File]:
-    """Open an HDF5 file for reading; errors caused by its content become a RunError."""
+    """Open an HDF5 file for reading, and raise RunError if its contents cannot be used."""
     with hdf5_file(path) as file:
         try:
             yield file
@@ -39,7 +45,7 @@ def open_file(path: Path) -> Iterator[h5py.File]:
 
 
 def hdf5_file(path: Path) -> h5py.File:
-    """Open an HDF5 file, which a simulation may still be writing."""
+    """Open an HDF5 file for reading, also while a simulation is writing the file."""
     if not path.exists():
         part = Path(f"{path}.part")
         hint = f", but there is {part} of an unfinished run" if part.exists() else None
@@ -62,12 +68,12 @@ def hdf5_file(path: Path) -> h5py.File:
 
 
 def did_you_mean(word: str, others: Iterable[str]) -> str:
-    """Return a suggestion if one of the other words is similar, otherwise an empty text."""
+    """Return a question that suggests the most similar word, or an empty text."""
     return "".join(f"; did you mean {near}?" for near in get_close_matches(word, others, 1))
 
 
 def tree(group: h5py.Group) -> dict[str, Any]:
-    """Return the attributes and datasets of an HDF5 group as a dictionary of plain values."""
+    """Return the attributes, datasets and subgroups of an HDF5 group as a nested dictionary."""
     values = {name: plain(value) for name, value in group.attrs.items()}
     for name, item in group.items():
         values[name] = tree(item) if isinstance(item, h5py.Group) else plain(item[()])
@@ -75,7 +81,7 @@ def tree(group: h5py.Group) -> dict[str, Any]:
 
 
 def plain(value: object) -> object:
-    """Return bytes as text and numbers of NumPy as numbers of Python."""
+    """Convert bytes to text, and NumPy scalars to numbers of Python."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace").rstrip()
     if isinstance(value, np.ndarray) and value.dtype.kind == "S":
@@ -84,9 +90,10 @@ def plain(value: object) -> object:
 
 
 def destination(path: Path) -> Path:
-    """Make the folder of a result and return the path of the result.
+    """Create the folder of a result, and check whether the result may be written.
 
-    An existing file may be replaced only if it is an ordinary file without HDF5 data.
+    The function returns `path`.  An existing file may be replaced only if it is an ordinary file
+    that contains no HDF5 data.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.is_symlink() or (path.exists() and not path.is_file()):
@@ -99,14 +106,15 @@ def destination(path: Path) -> Path:
 
 
 class TemporaryFolder:
-    """Folder of a run without output, removed with the last object that reads its file.
+    """Temporary folder for the output file of a run that the user does not keep.
 
-    If a worker process returns a run, the receiving process removes its files.  If a run is sent to
-    workers, its files are removed when this process ends.
+    The folder is removed when no object refers to it any longer.  If a worker process returns a run
+    to its parent process, the parent process removes the folder.  If a run is sent to worker
+    processes, the folder is removed when the sending process ends.
     """
 
     def __init__(self, path: Path | None = None):
-        """Make a folder, or take over the folder of a worker process."""
+        """Create a folder, or become responsible for the folder of a worker process."""
         self.path = Path(tempfile.mkdtemp(prefix="ricochet-")) if path is None else path
         self.removal = Finalize(self, shutil.rmtree, (self.path, True), exitpriority=PRIORITY)
 
@@ -115,7 +123,7 @@ class TemporaryFolder:
         self.removal()
 
     def keep(self) -> None:
-        """Remove the folder when this process ends, and not before."""
+        """Keep the folder until this process ends, and then remove it."""
         if self.removal.still_active():
             self.removal.cancel()
             Finalize(None, shutil.rmtree, (self.path, True), exitpriority=PRIORITY)
@@ -124,12 +132,16 @@ class TemporaryFolder:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Transfer the responsibility for removing the folder."""
+        """Pickle the folder, and determine which process will remove the folder."""
         in_worker = multiprocessing.parent_process() is not None
         self.removal.cancel() if in_worker else self.keep()
         return received, (self.path, in_worker)
 
 
 def received(path: Path, sent_by_worker: bool) -> TemporaryFolder | None:
-    """Return the folder of a run that another process has sent, if this one has to remove it."""
+    """Return the folder of a run that a worker process has sent.
+
+    The result is None if the run comes from the parent process, because the parent process will
+    remove the folder.
+    """
     return TemporaryFolder(path) if sent_by_worker else None

@@ -1,7 +1,7 @@
-"""Values of a run: quantities of each disk in the frames, and time series of observables.
+"""Types for quantities of the disks in all frames, and for time series of observables.
 
-Objects of both kinds behave as arrays in expressions and in functions of NumPy: `run.velocity * 2`,
-`run.observable("all/temperature").mean()`.
+Objects of both types can be used like arrays in expressions and in NumPy functions, for example
+`run.velocity * 2`, `run.observable("all/temperature").mean()`.
 """
 
 from collections.abc import Iterator
@@ -19,48 +19,49 @@ WHOLE = (type(None), type(...), bool, np.bool_)  # a first index of these does n
 
 
 class NoSuchFrame(RunError, IndexError):
-    """Error for an index beyond the frames of a run."""
+    """Error for the number of a frame that does not exist."""
 
 
 class Values(NDArrayOperatorsMixin):
-    """Arithmetic for objects that NumPy can convert to an array; the results are arrays."""
+    """Base class that implements arithmetic with NumPy arrays as results."""
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        """Return the values as an array."""
+        """Return all values as an array."""
         raise NotImplementedError
 
     def __array_ufunc__(self, function: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
-        """Evaluate a function of NumPy with the arrays instead of these objects."""
+        """Convert the operands to arrays, and call the NumPy function."""
         if any(isinstance(item, Values) for item in options.get("out", ())):
             return NotImplemented
         arrays = [np.asarray(item) if isinstance(item, Values) else item for item in inputs]
         return getattr(function, method)(*arrays, **options)
 
     def mean(self, axis: Any = None, **options: Any) -> Any:
-        """Return the mean along an axis, or of all values, as `numpy.mean` does."""
+        """Return the mean of all values or along an axis; see `numpy.mean`."""
         return np.asarray(self).mean(axis, **options)
 
     def std(self, axis: Any = None, **options: Any) -> Any:
-        """Return the standard deviation along an axis, or of all values, as `numpy.std` does."""
+        """Return the standard deviation of all values or along an axis; see `numpy.std`."""
         return np.asarray(self).std(axis, **options)
 
     def sum(self, axis: Any = None, **options: Any) -> Any:
-        """Return the sum along an axis, or of all values, as `numpy.sum` does."""
+        """Return the sum of all values or along an axis; see `numpy.sum`."""
         return np.asarray(self).sum(axis, **options)
 
     def min(self, axis: Any = None, **options: Any) -> Any:
-        """Return the minimum along an axis, or of all values, as `numpy.min` does."""
+        """Return the minimum of all values or along an axis; see `numpy.min`."""
         return np.asarray(self).min(axis, **options)
 
     def max(self, axis: Any = None, **options: Any) -> Any:
-        """Return the maximum along an axis, or of all values, as `numpy.max` does."""
+        """Return the maximum of all values or along an axis; see `numpy.max`."""
         return np.asarray(self).max(axis, **options)
 
 
 class Series(Values):
-    """Time series of an observable: values (T, ...) at times (T,) that differ from those of frames.
+    """Time series of an observable: an array of times (T,) and an array of values (T, ...).
 
-    Indices, functions of NumPy and expressions apply to the values: `series[-1]` is the last value.
+    The times of an observable are in general not the times of the frames.  Indices, NumPy functions
+    and arithmetic use the values: for example, `series[-1]` is the last value.  The statement
     `time, value = series` assigns both arrays.
 
     Parameters
@@ -78,22 +79,22 @@ class Series(Values):
     """
 
     def __init__(self, time: np.ndarray, value: np.ndarray):
-        """Combine times and values; the arguments are described in the class docstring."""
+        """Create a time series from the given times and values."""
         self.time, self.value = time, value
 
     def __len__(self) -> int:
         return len(self.time)
 
     def __iter__(self) -> Iterator[np.ndarray]:
-        """Yield the times and the values, for `time, value = series`."""
+        """Yield the array of times, then the array of values."""
         return iter((self.time, self.value))
 
     def __getitem__(self, index: Any) -> Any:
-        """Return the values that an index of NumPy selects."""
+        """Return the values that a NumPy index selects."""
         return self.value[index]
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        """Return the values."""
+        """Return a NumPy array of the values."""
         return np.array(self.value, dtype=dtype, copy=copy)
 
     def __repr__(self) -> str:
@@ -103,25 +104,26 @@ class Series(Values):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """The shape of the values."""
+        """Shape of the array of values."""
         return self.value.shape
 
     @property
     def ndim(self) -> int:
-        """The number of axes of the values."""
+        """Number of axes of the array of values."""
         return self.value.ndim
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """The type of the values."""
+        """NumPy type of the values."""
         return self.value.dtype
 
 
 @dataclass(frozen=True, eq=False)
 class Frames(Values):
-    """A quantity of each disk in all frames, read from the file on indexing; [:] reads all frames.
+    """A quantity of each disk in all frames, which is read from the output file when needed.
 
-    An expression or a function of NumPy reads all frames.
+    An index such as `[-1]` reads only the selected frames.  The index `[:]`, expressions and NumPy
+    functions read all frames.
     """
 
     path: Path
@@ -133,11 +135,11 @@ class Frames(Values):
         return self.shape[0]
 
     def __iter__(self) -> Iterator[np.ndarray]:
-        """Yield the frames, which are read one at a time."""
+        """Yield one frame after another; each frame is read when it is needed."""
         return (self[k] for k in range(len(self)))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        """Return all frames, for functions of NumPy."""
+        """Return the quantity in all frames as a NumPy array."""
         if copy is False:
             raise ValueError(
                 f"{self.path}: {self.name} is read from the file, which requires a copy"
@@ -146,16 +148,16 @@ class Frames(Values):
 
     @property
     def ndim(self) -> int:
-        """The number of axes."""
+        """Number of axes of the quantity in all frames."""
         return len(self.shape)
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """The type of the numbers that indexing returns."""
+        """NumPy type of the numbers that an index returns."""
         return self.read(np.arange(0)).dtype
 
     def __getitem__(self, index: Any) -> np.ndarray:
-        """Return the values of an index as in NumPy; only the selected frames are read."""
+        """Return the values that a NumPy index selects; only the selected frames are read."""
         first, *rest = index if isinstance(index, tuple) and index else (index,)
         try:
             if type(first) in WHOLE or np.ndim(first) > 1:
@@ -170,7 +172,7 @@ class Frames(Values):
             raise NoSuchFrame(f"{self.path}: {self.name} ({shape}): {problem}") from None
 
     def read(self, chosen: np.ndarray) -> np.ndarray:
-        """Read the given frames in the given order."""
+        """Read the chosen frames from the file, in the order of their numbers in `chosen`."""
         steps = np.unique(np.diff(chosen))
         with open_file(self.path) as file:
             if self.name not in file[DISKS]:

@@ -1,12 +1,12 @@
-"""The physical properties of a run, called traits, and the theories that apply to a run.
+"""Traits of a run: physical properties that determine which theories apply to the run.
 
     run.nature                      # Nature({'inelastic', 'walls', ...}), the differences from
                                     # equal smooth elastic disks in an empty periodic box
     run.nature.closed               # whether only collisions change the energy
     allow(run, "Haff's law", "inelastic", "mixture")   # an error for any other trait
 
-A pure function determines the traits from the parameters and the energy balance of a run.  The same
-function is used for finished and unfinished output files and for simulations in memory.
+The function `nature_of` determines the traits from the parameters and the energy balance of a run.
+This function is used for output files and for simulations in memory.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ import numpy as np
 from .files import RunError
 
 ROUNDING = 1e-6  # fraction of the energy below which losses are rounding errors
-#: The traits of a run, and for each trait the words of a message.
+#: Every trait, and the words that describe the trait in an error message.
 TRAITS = {
     "changed": "was changed during the run",
     "collapsed": "passed an inelastic collapse, after which rounding errors determine its state",
@@ -43,7 +43,7 @@ TRAITS = {
     "walls": "has walls",
     "mixture": "has disks of different mass or radius",
 }
-#: Traits of runs whose energy changes by processes other than dissipation in collisions.
+#: Traits of runs whose energy changes other than by dissipation in collisions.
 SOURCES = {
     "changed",
     "sheared",
@@ -54,53 +54,56 @@ SOURCES = {
     "sliding_surfaces",
 }
 SOURCES |= {"thermostatted", "thermal_walls"}
-#: Traits with velocity changes between collisions.
+#: Traits of runs in which velocities also change between collisions.
 KICKED = {"noise_driven", "active", "thermostatted"}
-#: Traits of runs whose velocities do not relax to Maxwell's distribution.
+#: Traits of runs whose velocities do not relax to a Maxwell distribution.
 UNSETTLED = {*SOURCES, "unequal_temperatures", "inelastic", "soft_contacts", "round_container"} - {
     "thermostatted",
     "thermal_walls",
     "piston",
 }
-#: Traits of runs whose velocities relax to Maxwell's distribution.
+#: Traits of runs whose velocities relax to a Maxwell distribution.
 SETTLED = TRAITS.keys() - UNSETTLED
 
 
 class Refused(RunError):
-    """Error for a run to which a theory does not apply; the message contains the reason."""
+    """Error for a run to which a theory does not apply.
+
+    The message contains the reason.
+    """
 
 
 class Nature(frozenset[str]):
-    """The traits of a run: a set of keys of `TRAITS`."""
+    """Set of all traits of a run; the traits are keys of `TRAITS`."""
 
     @property
     def closed(self) -> bool:
-        """Whether the energy changes by dissipation in collisions only."""
+        """True if the energy of the disks changes only by dissipation in collisions."""
         return not self & SOURCES
 
     @property
     def driven(self) -> bool:
-        """Whether something other than collisions changes the energy of the disks."""
+        """True if processes other than dissipation in collisions change the energy of the disks."""
         return not self.closed
 
     @property
     def cooling(self) -> bool:
-        """Whether the disks only lose energy, so that there is no steady state."""
+        """True if the disks only lose energy and therefore do not reach a steady state."""
         return self.closed and "inelastic" in self
 
     @property
     def keeps_energy(self) -> bool:
-        """Whether the total energy is conserved."""
+        """True if the total energy of the disks is conserved."""
         return self.closed and "inelastic" not in self
 
     @property
     def keeps_kinetic_energy(self) -> bool:
-        """Whether the translational kinetic energy, and so kT, is conserved on average."""
+        """True if the translational kinetic energy, and therefore kT, is conserved on average."""
         return self.keeps_energy and not self & {"gravity", "rough", "rotating"}
 
     @property
     def in_equilibrium(self) -> bool:
-        """Whether velocities relax to Maxwell's distribution of a uniform temperature."""
+        """True if the velocities relax to the Maxwell distribution of a uniform temperature."""
         return not self & UNSETTLED
 
 
@@ -112,10 +115,11 @@ def nature_of(
     turning: bool,
     collapsed: bool,
 ) -> Nature:
-    """Return the nature of a run from its parameters and from the balance of its energy.
+    """Return the traits of a run, determined from its parameters and its energy balance.
 
-    `lost` is the dissipated energy over the largest kinetic energy so far.  `rotating` means that
-    disks rotate, `collapsed` that an inelastic collapse occurred.
+    `lost` is the ratio of the dissipated energy to the largest kinetic energy of the run.
+    `turning` is true if the disks can rotate, and `collapsed` is true if an inelastic collapse
+    occurred.
     """
     contact, drive = parameters.get("contact", {}), parameters.get("drive", {})
     box, kind = parameters.get("box", {}), drive.get("kind", "none")
@@ -131,8 +135,8 @@ def nature_of(
         baths.add(float(drive["temperature"]))
     beta = float(contact.get("tangential_restitution", -1.0))
     pairs = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
-    # A dissipative collision rule of disks is a trait from the start, that of a wall only after a
-    # loss.
+    # If collisions of two disks dissipate energy, the run has the trait "inelastic" from the start.
+    # If only walls dissipate energy, the run has this trait after the first loss of energy.
     slips = beta > -1 and (beta < 1 or contact.get("friction") is not None)
     inelastic = len(mass) > 1 and (pairs.min() < 1 or slips)
     found = {
@@ -176,7 +180,7 @@ def nature_of(
 
 
 def drifts(parameters: Mapping[str, Any]) -> bool:
-    """Return whether no force acts on the centre of mass along at least one axis."""
+    """Return whether the centre of mass is free of external forces along at least one axis."""
     if "obstacle" in parameters or "wall" in parameters:
         return False
     box = parameters.get("box", {})
@@ -185,7 +189,7 @@ def drifts(parameters: Mapping[str, Any]) -> bool:
 
 
 def held_round(parameters: Mapping[str, Any]) -> bool:
-    """Return whether a round container that does not touch the sides encloses all disks."""
+    """Return whether all disks are in a round container that lies inside the sides of the box."""
     box, rows = parameters.get("box", {}), rows_of(parameters.get("obstacle", {}))
     if len(rows) != 1 or not rows[0].get("inside") or "wall" in parameters:
         return False
@@ -195,18 +199,21 @@ def held_round(parameters: Mapping[str, Any]) -> bool:
 
 
 def rows_of(group: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return a dictionary for each obstacle or wall from the columns of variables in the file."""
+    """Convert a dictionary of columns to a list of dictionaries, one for each obstacle or wall."""
     columns = {name: column for name, column in group.items() if np.ndim(column) > 0}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def known(value: Any) -> bool:
-    """Return whether a variable of an obstacle or wall was given; if not, the file has NaN or 0."""
+    """Return whether the input specifies this value, which is None, NaN or 0 if not specified."""
     return value is not None and bool(np.isfinite(value)) and float(value) > 0
 
 
 def allow(run: Any, law: str, *traits: str) -> None:
-    """Raise an error for a run with any trait except these; `law` is a part of the message."""
+    """Raise an error if the run has a trait that is not in the list `traits`.
+
+    `law` is the end of the error message.
+    """
     for trait, reason in TRAITS.items():
         if trait in run.nature and trait not in traits:
             raise Refused(f"{getattr(run, 'path', 'the simulation')}: {reason}; {law}")

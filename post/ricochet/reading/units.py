@@ -1,14 +1,15 @@
-"""Names of the units of an input for the labels of axes.
+"""Names of units, which appear in the labels of axes.
 
-An input consists of numbers without units.  The author of an input chooses the units, for example
-metres or diameters.  The names of units change labels only, never numbers.
+The numbers in an input file have no units.  The author of the file decides which unit of length a
+number refers to, for example a metre or the diameter of a disk.  The names of units change only
+labels in figures and no numbers.
 """
 
 from typing import NamedTuple
 
 from .files import did_you_mean
 
-#: Powers of length, time and mass in each quantity; density and stress are two-dimensional.
+#: Exponents of length, time and mass in the unit of each quantity, in two dimensions.
 POWERS = {
     "number": (0, 0, 0),  # dimensionless
     "length": (1, 0, 0),
@@ -27,7 +28,7 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Units(NamedTuple):
-    """Names of the units of length, time, mass and energy; empty where unknown."""
+    """Names of the units of length, time, mass and energy; the name of an unknown unit is empty."""
 
     length: str = ""
     time: str = ""
@@ -35,15 +36,15 @@ class Units(NamedTuple):
     energy: str = ""  # if empty, composed of the other three units
 
     def label(self, words: str, quantity: str = "") -> str:
-        """Return the label of an axis, such as 'time (s)', or 'time (reduced units)'.
+        """Return the label of an axis, for example 'time (s)' or 'time (reduced units)'.
 
-        `quantity` is a key of `POWERS`; by default it is equal to the words.
+        `quantity` is a key of `POWERS`.  If `quantity` is empty, `words` is used as the key.
         """
         unit = self.name(quantity or words)
         return f"{words} ({unit})" if unit else words
 
     def name(self, quantity: str) -> str:
-        """Return the unit of a key of `POWERS`, or 'reduced units' if a part of it is unknown."""
+        """Return the unit of a quantity, or 'reduced units' if the name of a unit is unknown."""
         if quantity == "energy" and self.energy:
             return self.energy
         powers = zip(POWERS[quantity][::-1], self[2::-1], strict=True)  # mass is written first
@@ -55,7 +56,7 @@ UNNAMED = Units()
 
 
 def product(parts: list[tuple[int, str]]) -> str:
-    """Return powers of units as text: 'cm/s', 'kg m²/s²', '1/cm²'; '' if there are none."""
+    """Return a product of powers of units as text, such as 'cm/s', 'kg m²/s²' or '1/cm²'."""
 
     def factors(sign: int) -> str:
         own = [(abs(power), name) for power, name in parts if sign * power > 0]
@@ -70,7 +71,7 @@ def product(parts: list[tuple[int, str]]) -> str:
 
 
 def units_of(text: str) -> Units:
-    """Parse names of units such as 'length=cm,time=s', or raise ValueError."""
+    """Convert a text such as 'length=cm,time=s' to names of units, or raise ValueError."""
     found: dict[str, str] = {}
     for part in text.split(","):
         quantity, equals, name = (word.strip() for word in part.partition("="))
