@@ -4,40 +4,43 @@
     python post/driven.py runs/demon/*.h5 --show share -o demon.png
     python post/driven.py runs/constant_pressure/*.h5 --show width -o width.png
 
---show temperature: kT about the mean velocity u. For all N disks kT is m <(v - u)^2> / 2 times N /
-(N - 1). The table also contains the components kT_x and kT_y, and kT of each species. The dashed
-line is for equal disks with white-noise driving in a periodic box, where driving and dissipation
-balance (van Noije and Ernst 1998). For equal elastic disks in a box with one side that moves at a
-constant velocity, the line is instead the adiabat of the equation of state including the layers at
-the walls (`hard_disks.adiabat`), which applies to slow compression and expansion. This comparison
-requires several runs. Once the side is at rest, the temperature of a single run is constant, so
-that no error can be determined from its fluctuations.
+--show temperature: temperature kT of the velocities relative to the mean velocity u.  For all N
+disks, kT = m <(v - u)^2> / 2 times N / (N - 1).  The table also contains the components kT_x and
+kT_y, and the temperature of each species.  For equal disks with white-noise driving in a periodic
+box, the dashed line is the temperature at which driving and dissipation balance (van Noije and
+Ernst 1998).  If one side of the box moves at a constant velocity and the disks are equal and
+elastic, the dashed line shows the adiabat instead.  The adiabat follows from the equation of state,
+including the layers at the walls (`hard_disks.adiabat`), and applies to slow compression and
+expansion.  This comparison requires several runs: when the side is at rest, the temperature of a
+single run is constant, and no error can be determined from its fluctuations.
 
---show width: width of the box with a piston (motion = 'piston'). The dashed lines are a prediction
-for equal elastic disks: the mean width, and the mean plus and minus a standard deviation, from the
-equation of state at constant enthalpy (docs/theory.md). The script also prints the measured
-standard deviation and the largest relative changes of two conserved quantities: the enthalpy, and
-the momentum of disks and piston.
+--show width: width of a box with a piston (motion = 'piston').  For equal elastic disks, the dashed
+lines show the predicted mean width and the range of one standard deviation around it.  The
+prediction follows from the equation of state at constant enthalpy (docs/theory.md).  The script
+also prints the measured standard deviation of the width, and the largest relative changes of two
+conserved quantities: the enthalpy, and the total momentum of the disks and the piston.
 
---show share: fraction of the disks in the left half of the box. The dashed lines show the steady
-fractions of a dilute gas above a sawtooth floor, in two halves that are connected by a hole above
-the floor (after Eggers 1999).
+--show share: fraction of the disks in the left half of the box.  The dashed lines show predicted
+steady fractions for a dilute gas above a vibrating floor, in a box whose two halves are connected
+by a hole (after Eggers 1999).  The floor moves with a sawtooth motion.
 
 --show height: mean height of the disks of each species.
 
---show viscosity: -P_xy over the shear rate of a sheared box (box.shear_rate). P_xy is an average
-between samples of the observables and includes the kinetic and the collisional part. The disks may
-be inelastic.
+--show viscosity: viscosity of a sheared box (box.shear_rate), which is -P_xy divided by the shear
+rate.  The component P_xy of the pressure tensor includes the kinetic and the collisional part, and
+is averaged over the time between two samples of the observables.  The disks may be inelastic.
 
---show cluster: fraction of the disks in the largest cluster. Disks belong to one cluster if the
-gaps between them are below a tenth of the mean diameter.
+--show cluster: fraction of the disks in the largest cluster.  Two disks belong to the same cluster
+if the gap between them is smaller than a tenth of the mean diameter.
 
-There is a curve for each run, and a colour for each input and species.  Each point is a mean over a
-sixtieth of the time or, for the width, over a thousandth.  The script prints the mean over the
-second half of the time with its error, and the ratio of this mean to the theory.  For `share` it is
-the mean fraction in the half that contains more disks.  This half is determined from another part
-of the run, so that the choice does not bias the mean. Pictures show the end of the first run of
-each input, or the start and the end of a single input; the smallest disks are enlarged.
+The figure contains a curve for each run; the colours denote inputs and species.  Each point is an
+average over 1/60 of the duration of the run, or over 1/1000 of the duration for `width`.  The
+script prints the mean over the second half of the run with its error, and the ratio of this mean to
+the theoretical value.  For `share` the script prints the mean fraction of the disks in the half of
+the box that contains more disks.  Which half contains more disks is determined from another part of
+the run, because otherwise the mean would be biased.  The pictures show the last frame of the first
+run of each input.  If all runs have the same input, the pictures show the first and the last frame.
+Very small disks are drawn enlarged.
 """
 
 from collections.abc import Callable
@@ -63,7 +66,7 @@ Curves = dict[str, tuple[np.ndarray, np.ndarray]]  # time and value by species, 
 
 
 def temperature(run: Run) -> Curves:
-    """Return the temperature about the mean velocity at the times of the observables."""
+    """Return the time series of the temperature relative to the mean velocity."""
     if run.n_disks < 2:
         raise Refused(
             f"{run.path}: holds one disk; a temperature requires at least two, as it is "
@@ -79,7 +82,7 @@ def temperature(run: Run) -> Curves:
 
 
 def components(run: Run) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return kT_x and kT_y of all disks, relative to their mean velocity, against time."""
+    """Return the time series of kT_x and kT_y of all disks, relative to their mean velocity."""
     time, tensor = run.observable("kinetic_tensor")
     motion = 0 if run.shear_rate else run.observable("momentum").value ** 2 / run.mass.sum()
     kt = (tensor[:, [0, 3]] - motion) / (run.n_disks - 1)
@@ -87,7 +90,7 @@ def components(run: Run) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 
 def keeps_energy(run: Run) -> bool:
-    """Return whether the kinetic energy is constant in the second half of the time."""
+    """Return whether the kinetic energy is constant in the second half of the run."""
     time, energy = run.observable("all/kinetic_energy")
     late = energy[time >= (time[0] + time[-1]) / 2]
     return bool(np.ptp(late) < ROUNDING * np.max(late, initial=0))
@@ -105,7 +108,7 @@ def noise_law(run: Run) -> float | None:
 
 
 def temperature_law(run: Run) -> np.ndarray | float | None:
-    """Return the steady temperature of driven disks, or the adiabat at the times of observables."""
+    """Return the predicted temperature: of the steady state, or on the adiabat at each time."""
     side = only_moving(run, "constant_velocity")
     if side is None:
         return noise_law(run)
@@ -124,13 +127,16 @@ def only_moving(run: Run, motion: str) -> int | None:
 
 
 def widths(run: Run, side: int) -> np.ndarray:
-    """Return the widths (S,) of the box along the motion of a side at the times of observables."""
+    """Return the widths (S,) of the box at the times of the S samples of the observables.
+
+    The width is measured along the direction in which the side moves.
+    """
     lower, upper = run.corners_at(run.observable("total_energy").time)
     return (upper - lower)[:, side // 2]
 
 
 def adiabat(run: Run, side: int, widths: np.ndarray) -> np.ndarray:
-    """Return the temperature on the adiabat at the widths (W,) over that at the first width."""
+    """Return the temperatures on the adiabat, divided by the temperature at the first width."""
     height, walled = float(run.edges[1 - side // 2]), not run.periodic[1 - side // 2]
     return hard_disks.adiabat(widths, height, run.n_disks, float(run.radius[0]), walled)
 
@@ -143,14 +149,14 @@ def width(run: Run) -> Curves:
 
 
 class Room(NamedTuple):
-    """Mean and standard deviation of the fluctuating width of a box."""
+    """Predicted mean and standard deviation of the fluctuating width of a box."""
 
     mean: float
     deviation: float
 
 
 def width_law(run: Run) -> Room | None:
-    """Return the predicted width of a fluid at constant enthalpy; the piston starts at rest."""
+    """Return the predicted width of a box at constant enthalpy, for a piston initially at rest."""
     side = only_moving(run, "piston")
     if side is None or not run.sides[side]["force"] > 0:
         return None
@@ -167,7 +173,7 @@ def width_law(run: Run) -> Room | None:
 
 
 def balances(run: Run) -> tuple[float, float]:
-    """Return the largest relative changes of the enthalpy and of the total momentum."""
+    """Return the largest relative changes of the enthalpy and of the total momentum in a run."""
     k = min(run.piston_positions)
     side = run.sides[k]
     time, energy = run.observable("total_energy")
@@ -181,18 +187,18 @@ def balances(run: Run) -> tuple[float, float]:
 
 
 def share(run: Run) -> Curves:
-    """Return the fraction of the disks in the left half at the times of frames."""
+    """Return the fraction of the disks in the left half of the box in each frame."""
     middle = run.lower[0] + run.edges[0] / 2
     return {"": (run.time, np.mean(run.position[:][..., 0] < middle, axis=1))}
 
 
 def fuller(share: np.ndarray) -> np.ndarray:
-    """Return the fractions (T,) of disks in the fuller half, given the fractions in one half.
+    """Return the fractions (T,) of disks in the half of the box that contains more disks.
 
-    For frames in the first third of the time, the fuller half is determined from the last third;
-    for frames in the last third, it is determined from the first third.  If the same frames
-    determined it, the fraction would exceed 1/2 by chance alone.  The middle third separates the
-    first third from the last, so that these are independent.
+    The argument contains the fractions in the left half.  For frames in the first third of the run,
+    the half with more disks is determined from the last third, and vice versa.  If the half were
+    determined from the same frames, its fraction would exceed 1/2 by chance.  The middle third is
+    not used, because the first and last third must be statistically independent.
     """
     third = max(1, len(share) // 3)
     ends = share[:third], share[-third:]
@@ -201,7 +207,7 @@ def fuller(share: np.ndarray) -> np.ndarray:
 
 
 def demon_law(run: Run) -> float | None:
-    """Return the predicted steady fraction in the fuller of two halves that a wall separates."""
+    """Return the predicted steady fraction of disks in the half that contains more disks."""
     floor = run.parameters.get("side", {}).get("bottom", {})
     middle = run.lower[0] + run.edges[0] / 2
     parting = [wall for wall in run.walls if np.allclose(wall[:, 0], middle)]
@@ -219,7 +225,7 @@ def demon_law(run: Run) -> float | None:
 
 
 def height(run: Run) -> Curves:
-    """Return the mean height of each species above the floor at the times of frames."""
+    """Return the mean height of each species above the floor in each frame."""
     y = run.position[:][..., 1] - run.lower[1]
     several = len(run.names) > 1
     return {
@@ -228,14 +234,14 @@ def height(run: Run) -> Curves:
 
 
 def cluster(run: Run) -> Curves:
-    """Return the fraction of the disks in the largest cluster at the times of frames."""
+    """Return the fraction of the disks in the largest cluster in each frame."""
     gap = GAP * 2 * float(run.radius.mean())
     shares = [largest_cluster(run, frame, gap) / run.n_disks for frame in range(run.n_frames)]
     return {"": (run.time, np.array(shares))}
 
 
 def viscosity(run: Run) -> Curves:
-    """Return -P_xy over the shear rate."""
+    """Return the time series of the viscosity, which is -P_xy divided by the shear rate."""
     if "sheared" not in run.nature:
         raise Refused(f"{run.path}: is not sheared; --show viscosity requires box.shear_rate")
     if "random_walk" in run.nature:
@@ -247,8 +253,9 @@ def viscosity(run: Run) -> Curves:
     return {"": (time[1:], -stress / (run.shear_rate * np.prod(run.edges)))}
 
 
-#: Quantities that can be drawn: text and dimension of the label; functions that return the curves,
-#: the prediction, and the values whose mean is compared with the prediction.
+#: Each quantity that can be drawn, with the text and unit of its axis label and three functions.
+#: The functions return the curves, the prediction, and the values whose mean is compared with the
+#: prediction.
 QUANTITIES = {
     "width": (("width of the box", "length"), width, width_law, np.asarray),
     "temperature": (("kT", "energy"), temperature, temperature_law, np.asarray),
@@ -265,20 +272,23 @@ QUANTITIES = {
 
 
 def on_average(laws: list) -> np.ndarray | float | Room | None:
-    """Average over runs that differ by their seed and therefore in their initial energy."""
+    """Return the mean prediction of runs that differ in their seed and their initial energy."""
     rooms = all(isinstance(law, Room) for law in laws)
     return Room(*map(float, np.mean(laws, axis=0))) if rooms else laws[0]
 
 
 def levels(law: np.ndarray | float | Room | None, compared: Callable) -> list:
-    """Return the values at which the lines of a prediction are drawn."""
+    """Return the values at which horizontal lines show a prediction."""
     if isinstance(law, Room):
         return [law.mean, law.mean - law.deviation, law.mean + law.deviation]
     return [] if law is None else [law, 1 - law] if compared is fuller else [law]
 
 
 def by_input(runs: list[Run]) -> dict[str, list[Run]]:
-    """Group runs that differ only by their seed; the key states the differences between groups."""
+    """Group runs that differ only by their seed.
+
+    The key of each group describes how the group differs from the other groups.
+    """
     own = [{"N": run.n_disks, "ξ": run.restitution, **drawing.numbers_of(run)} for run in runs]
     names = [name for name in own[0] if len({numbers.get(name) for numbers in own}) > 1]
     groups: dict[str, list[Run]] = {}
@@ -291,7 +301,7 @@ def by_input(runs: list[Run]) -> dict[str, list[Run]]:
 def draw_curves(
     axes: plt.Axes, tracks: dict[tuple[str, str], list], laws: dict, fine: bool
 ) -> None:
-    """Draw measured curves solid and predictions dashed."""
+    """Draw measured values as solid lines and predictions as dashed lines."""
     for (key, curves), colour in zip(tracks.items(), drawing.colours(len(tracks)), strict=True):
         label = ", ".join(filter(None, key)) or "measured"
         for k, (time, value) in enumerate(curves):
@@ -311,7 +321,7 @@ def draw_curves(
 def draw(
     groups: dict[str, list[Run]], tracks: dict, laws: dict, label: tuple[str, str], fine: bool
 ) -> plt.Figure:
-    """Draw the curves and the pictures."""
+    """Draw the curves, and below them the pictures of the disks."""
     runs = [run for own in groups.values() for run in own]
     pictures = [(own[0], -1, name) for name, own in groups.items()][:MOST_PICTURES]
     if len(groups) == 1:

@@ -1,20 +1,22 @@
-"""Write an interactive film: one HTML file, which any browser opens without a network.
+"""Write an interactive film: an HTML file that any browser can open without a network.
 
     python post/player.py runs/gas.h5 -o gas.html
     python post/player.py runs/crater.h5 --colour displacement
-    python post/player.py runs/brownian.h5 --disks 2001       with the trace of one disk python
-    post/player.py runs/gas.h5.part --live             while the run continues
+    python post/player.py runs/brownian.h5 --disks 2001       with the path of one disk
+    python post/player.py runs/gas.h5.part --live             while the run continues
 
 The film shows disks, walls and obstacles to scale.  If the run has an event log, disks move along
 their exact paths between frames, and colours, energies and numbers of collisions change at each
-event.  Without an event log the film shows frames only.  The controls play, step to the next frame
-or event, set the speed, and zoom.  Disks are coloured by species, speed, displacement or
-collisions.  A click on a disk shows its trace, and the camera follows the disk.  Panels show
-speeds, energies and, for up to 20 disks, the next events.  Without --count a film has as many
-evenly spread frames as fit into 30 MB.
+event.  Without an event log the film shows only the frames.  With the controls of the page the user
+can play the film, step to the next frame or event, change the speed of the film, and zoom.  Colours
+show the species, speed, displacement or number of collisions of each disk.  If the user clicks on a
+disk, the page shows its path and the picture follows the disk.  Plots show the speeds and the
+energies.  For up to 20 disks a list shows the next events.  Without --count, the film contains as
+many evenly spread frames as fit into 30 MB.
 
---live serves a page that follows a running simulation on this computer until the run ends, and
-prints its address.  --open opens the film, or the page of --live, in the browser.
+With --live, the script starts a web server and prints its address.  The page at this address shows
+a running simulation on this computer until the run ends.  With --open, the script opens the film or
+the page in the browser.
 """
 
 import base64
@@ -57,11 +59,11 @@ MOST_AT_ONCE = 200000  # number of disks, over all frames, that are read togethe
 
 
 def frames_that_fit(run: Run, room: float) -> int:
-    """Return the number of frames that fit into the file.
+    """Return the number of frames that fit into a file of the given size.
 
-    Each disk requires two position and two velocity components of 16 bits each, 8 bits for its
-    collisions, and 32 bits for its angle. Up to half of the file is reserved for collisions between
-    frames.
+    In each frame, a disk requires 16 bits for each component of its position and velocity, 8 bits
+    for its number of collisions, and 32 bits for its angle.  Up to half of the file is reserved for
+    the event log.
     """
     more = (run.event_count is not None) + (run.image is not None)
     more += 4 * ("orientation" in run.disk_data)
@@ -72,18 +74,18 @@ def frames_that_fit(run: Run, room: float) -> int:
 
 
 def quantities(run: Run) -> list[str]:
-    """Return the quantities other than the species by which disks can be coloured."""
+    """Return the quantities, other than the species, that colours of disks can show."""
     return ["speed", "displacement"] + ["collisions"] * (run.event_count is not None)
 
 
 def in_room(run: Run, place: np.ndarray) -> np.ndarray:
-    """Return positions in units of the visible region: the box and its moving sides."""
+    """Return positions in units of the visible region, which contains the box at all times."""
     lower, upper = run.bounds
     return (place - lower) / (upper - lower)
 
 
 def sides(run: Run) -> list[dict]:
-    """Return position, motion, temperature and surface velocity of each side."""
+    """Return the position, motion, temperature and surface velocity of each side of the box."""
     places = [end[axis] for axis in (0, 1) for end in (run.lower, run.upper)]
     found = [
         {"place": float(side.get("position", at))}
@@ -97,24 +99,25 @@ def sides(run: Run) -> list[dict]:
 
 
 def thinned(count: int, most: int) -> np.ndarray:
-    """Return the numbers 0 to `count` - 1, or at most a given number of them, evenly spread."""
+    """Return at most `most` evenly spread integers between 0 and `count` - 1."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
 
 def laws_of(run: Run, group: str) -> list[dict]:
-    """Return temperature and surface velocity of each obstacle or wall."""
+    """Return the temperature and surface velocity of each obstacle or wall."""
     rows = rows_of(run.parameters.get(group, {}))
     laws = [{k: float(row[k]) for k in LAWS[-2:] if known(row.get(k))} for row in rows]
     return [laws[k] for k in groups_of_rows(run.parameters, group)]
 
 
 def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
-    """Return the arrays that change from frame to frame for all disks; they are read in parts.
+    """Return the arrays with the data of all disks in each frame.
 
-    Positions are stored as 16-bit integers in units of the visible region, velocities in units of
-    the largest component in the frame.  For few disks both are stored with all digits.  Collisions
-    are stored as values from 0 to 255 on a scale up to `top`.  The numbers of periods crossed along
-    x and y since the last frame are stored in four bits each.
+    Positions are stored as 16-bit integers in units of the visible region.  Velocities are stored
+    as 16-bit integers in units of the largest velocity component in the frame.  If there are few
+    disks, positions and velocities are stored with full precision.  Numbers of collisions are
+    stored as values from 0 to 255, where 255 corresponds to `top`.  The numbers of periods that a
+    disk has crossed along x and y since the previous frame are stored in four bits each.
     """
     found: dict[str, bytearray] = defaultdict(bytearray)
     at_once = max(1, MOST_AT_ONCE // run.n_disks)
@@ -142,11 +145,11 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
 
 
 def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[str, np.ndarray]]:
-    """Return collisions per disk in each frame, events and paths, if the log is not too long.
+    """Return collisions per disk in each frame, events and paths, unless the log is too long.
 
-    An event consists of its time and its two partners.  The paths consist of the number of velocity
-    changes in each interval between frames and, for each velocity change, the disk, the fraction of
-    the interval that has passed, and the new velocity.
+    For each event, the function returns the time and the two partners.  The paths are described by
+    the number of velocity changes in each interval between frames.  For each velocity change they
+    contain the disk, the time as a fraction of the interval, and the new velocity.
     """
     exact, facts = run.n_disks <= FEW_DISKS, {"known": False, "events": False}
     try:
@@ -175,7 +178,7 @@ def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[st
 
 
 def species(run: Run) -> list[dict]:
-    """Return the properties that all disks of a species share, for each species."""
+    """Return for each species the properties that are common to all its disks."""
     colours = [c if c != "#000000" else "#8a8a8a" for c in map(to_hex, COLOURS)]
     return [
         {
@@ -191,7 +194,7 @@ def species(run: Run) -> list[dict]:
 
 
 def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Return at most 256 different radii, and for each disk the index of its radius."""
+    """Return at most 256 different radii, and the index of the radius of each disk."""
     radii = np.unique(run.radius)
     if len(radii) > MOST_RADII:
         radii = np.geomspace(radii[0], radii[-1], MOST_RADII)
@@ -199,10 +202,10 @@ def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
 
 
 def curves(run: Run) -> dict:
-    """Return time, energy of each species, and pressure, at the resolution of a plot.
+    """Return the energy of each species and the pressure against time, for small plots.
 
-    The values are observables, which are sampled more often than frames.  Missing values are None;
-    the pressure is None before the first collision.
+    The values are taken from the observables, because observables are written more often than
+    frames.  Missing values are None; the pressure is None before the first collision.
     """
     series, found = {}, {}
     for name in (
@@ -232,9 +235,9 @@ def curves(run: Run) -> dict:
 
 
 def scene(run: Run) -> tuple[dict, dict]:
-    """Return the constant data of a film: box, obstacles, species, properties of disks.
+    """Return the data of a film that do not change: box, obstacles, species and disks.
 
-    `run` may be any object with the attributes of `Run` that are used here.
+    `run` is a `Run`, or another object with the attributes of `Run` that this function uses.
     """
     radii, own = radii_of(run)
     facts = {
@@ -271,12 +274,13 @@ def film(
     traced: list[int],
     room: float = ROOM,
 ) -> tuple[dict, dict]:
-    """Return the values for the page, and the arrays that change as a dictionary name -> bytes."""
+    """Return the values and the arrays of a film; each array is stored as bytes."""
     tops = {name: scale_top(run, frames, name) for name in quantities(run)}
     told, blocks = told_by_log(run, frames, room / 2 // TURN)
     blocks = {name: block.tobytes() for name, block in blocks.items()}
     blocks |= moving(run, frames, tops.get("collisions", 1))
-    # Reference positions of the displacements, continuous until the first frame of the film.
+    # Displacements are measured from these positions, which are continuous across periodic sides up
+    # to the first frame of the film.
     origin = run.unwrapped(0) + run.position[frames[0]] - run.unwrapped(frames[0])
     blocks["origins"] = in_room(run, origin).astype("<f4").tobytes()
     facts, own = scene(run)
@@ -292,12 +296,15 @@ def film(
 
 
 def texts(facts: dict, blocks: dict) -> dict:
-    """Return the film as text for a page or for the server of --live."""
+    """Return the values and arrays of a film as text for a web page."""
     return {"facts": facts, "blocks": {k: base64.b64encode(v).decode() for k, v in blocks.items()}}
 
 
 def page(run: Run, film: dict | None) -> str:
-    """Return the complete page; without a film, the server of --live sends a film."""
+    """Return the complete web page of a film.
+
+    If `film` is None, the page requests the film from the server that the option --live starts.
+    """
     title = str(run.parameter("run", "title", "")) or run.path.stem
     commit = run.provenance.get("git_commit", "unknown")
     words = {
@@ -310,12 +317,15 @@ def page(run: Run, film: dict | None) -> str:
 
 
 def view() -> str:
-    """Return the page as a part of the laboratory, which controls it."""
+    """Return the page of a film that is a part of the page of the laboratory."""
     return paged(None, dict.fromkeys(("title", "caption", "warning", "source"), ""))
 
 
 def paged(film: dict | None, words: dict[str, str]) -> str:
-    """Return the page with these texts; a page without a film may request one from its server."""
+    """Return the page of a film with the given texts.
+
+    A page that contains no film requests the film from its server.
+    """
     style = text_of("style.css")
     script = "\n".join(text_of(f"{name}.js") for name in SCRIPTS)
     fillings = {name: html.escape(text) for name, text in words.items()} | {
@@ -330,7 +340,8 @@ def paged(film: dict | None, words: dict[str, str]) -> str:
 def lab_page(data: dict) -> str:
     """Return the page of the laboratory.
 
-    `data` contains its number, the table of variables and the inputs.
+    `data` contains the table of input variables, the input files, and a number that identifies the
+    laboratory.
     """
     style, script = text_of("style.css") + text_of("lab.css"), text_of("lab.js")
     more = "connect-src 'self'", "img-src data:", "frame-src 'self'"
@@ -339,7 +350,7 @@ def lab_page(data: dict) -> str:
 
 
 def chooser(paths: list[Path]) -> list[dict]:
-    """Return title, text, sliders and picture of each input for the laboratory."""
+    """Return the title, description, sliders and picture of each input file for the laboratory."""
     known = json.loads((INPUTS / "chooser.json").read_text(encoding="utf-8"))
     found = []
     for path in paths:
@@ -354,29 +365,29 @@ def chooser(paths: list[Path]) -> list[dict]:
 
 
 def picture_of(path: Path) -> str:
-    """Return the picture of an input as a data URL."""
+    """Return the picture of an input file as a data URL."""
     drawn = (INPUTS / "pictures" / f"{path.stem}.png").read_bytes()
     return f"data:image/png;base64,{base64.b64encode(drawn).decode()}"
 
 
 def filled(name: str, fillings: dict[str, str]) -> str:
-    """Return a page with its placeholders replaced."""
+    """Return the text of a page after replacing its placeholders."""
     blank = re.compile("{{(" + "|".join(fillings) + ")}}")
     return blank.sub(lambda found: fillings[found[1]], text_of(name))
 
 
 def text_of(name: str) -> str:
-    """Return the text of a file from which the page is composed."""
+    """Return the text of a file that is a part of the page."""
     return (PAGE / name).read_text(encoding="utf-8")
 
 
 def enclosed(data: object) -> str:
-    """Return data as JSON that is safe inside a script element (without the start of a tag)."""
+    """Return data as JSON without `<`, which would be unsafe inside an HTML script element."""
     return json.dumps(data, allow_nan=False).replace("<", "\\u003c")
 
 
 def policy(style: str, script: str, *more: str) -> str:
-    """Return the content security policy, which allows only the page's own code, and `more`."""
+    """Return a content security policy that allows only the code of this page, and `more`."""
     rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'", *more]
     for tag, own in (("script", script), ("style", style)):
         digest = base64.b64encode(hashlib.sha256(own.encode()).digest()).decode()
@@ -385,14 +396,14 @@ def policy(style: str, script: str, *more: str) -> str:
 
 
 def chosen_film(run: Run, args: Namespace, room: float) -> tuple[list[int], tuple[dict, dict]]:
-    """Return the film that the command-line options request, and its frames."""
+    """Return the film and the frame numbers that the command-line options request."""
     frames = chosen_frames(run, args.frames, args.count or frames_that_fit(run, room))
     traced = chosen_disks(run, args.disks or [])
     return frames, film(run, frames, chosen_colour(run, args.colour), traced, room)
 
 
 def whole(run: Run, colour: str | None = None) -> str:
-    """Return the page with a film of the whole run, with the default of --colour."""
+    """Return the page with a film of the whole run, using default options."""
     args = Namespace(frames=None, count=None, colour=colour, disks=None)
     return page(run, texts(*chosen_film(run, args, ROOM)[1]))
 

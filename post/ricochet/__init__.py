@@ -5,10 +5,10 @@
     run = ricochet.read_run("runs/gas.h5")
     curve = ricochet.structure.pair_correlation(run)
 
-The modules are sorted into sub-packages, which `README.md` in this folder describes.  Every module
-is also an attribute of the package: `from ricochet import structure` imports
-`ricochet.analysis.structure`.  Modules are loaded at their first use, so that `import ricochet`
-loads neither Matplotlib nor a web server.
+The modules are in sub-packages, which `README.md` in this folder describes.  Each module can also
+be imported by a short name: the statement `from ricochet import structure` imports
+`ricochet.analysis.structure`.  A module is loaded when it is first used.  Therefore `import
+ricochet` alone loads neither Matplotlib nor a web server.
 """
 
 import sys
@@ -86,7 +86,7 @@ else:
     sys.meta_path.append(ALIASES)
 
     def __getattr__(name: str) -> object:
-        """Return the module with this short name."""
+        """Return the module that has the given short name."""
         if name in ALIASES.modules:
             return import_module(f"{__name__}.{name}")
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,7 +1,8 @@
-"""Short names of the modules: `ricochet.structure` is `ricochet.analysis.structure`.
+"""Short module names, such as `ricochet.structure` for `ricochet.analysis.structure`.
 
-With a short name, users need not know the sub-package of a module.  A short name refers to the same
-module object, not to a copy, so that classes and state exist only once.
+With a short name, users do not have to know the sub-package of a module.  A short name and the full
+name refer to the same module object.  Therefore classes and variables of the module exist only
+once.
 """
 
 import sys
@@ -17,22 +18,22 @@ FOLDERS = ("reading", "running", "predictions", "analysis", "figures", "pages")
 
 
 def modules() -> dict[str, str]:
-    """Return a dictionary from short names to full names of the modules in sub-packages."""
+    """Return the full name of each module; the keys of the dictionary are the short names."""
     paths = (path for folder in FOLDERS for path in sorted((HERE / folder).glob("[!_]*.py")))
     return {path.stem: f"{__package__}.{path.parent.name}.{path.stem}" for path in paths}
 
 
 class Aliases(MetaPathFinder, Loader):
-    """Import finder for short names, which Python calls after all other finders."""
+    """Import finder for short module names; Python calls it after all other finders."""
 
     def __init__(self) -> None:
-        """Determine the short names and the modules to which they refer."""
+        """Collect the short and full names of all modules."""
         self.modules = modules()
 
     def find_spec(
         self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Return the import specification of a short name of this package, or None."""
+        """Return the import specification of a short module name, or None for any other name."""
         package, _, short = name.rpartition(".")
         if package != __package__ or short not in self.modules:
             return None

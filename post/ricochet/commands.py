@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""The commands ricochet-player, ricochet-lab, ..., one for each script of post/.
+"""Commands such as ricochet-player and ricochet-lab, one for each script in post/.
 
-`make install` installs this file under the names of the commands; pip generates commands that call
-`main`.  A script uses the simulation program in the folder of the command, if that folder contains
-one and RICOCHET names no other program.
+`make install` copies this file to the names of the commands.  Commands that pip installs call the
+function `main`.  The scripts use the simulation program in the folder of the command, if that
+folder contains the program and the environment variable RICOCHET is not set.
 """
 
 import os
@@ -12,14 +12,15 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-#: pip installs the scripts inside the package; in a source tree they are in the folder above.
+#: If the package was installed by pip, the scripts are inside the package.  In a source tree they
+#: are in the folder that contains the package.
 SCRIPTS = HERE / "post" if (HERE / "post").is_dir() else HERE.parent
-#: Commands that are no scripts of `post/`, with their paths in a clone (after `pip install -e .`).
+#: Commands that are not Python scripts, with their paths in a source tree.
 IN_CLONE = {"ricochet": "build/ricochet", "ricochet-ensemble": "runs/ensemble.sh"}
 
 
 def main() -> None:
-    """Run the script that has the name of the command."""
+    """Run the script or program that has the name of the command."""
     command = Path(sys.argv[0]).absolute()
     if command.stem in IN_CLONE:
         path = HERE / "bin" / command.stem

@@ -1,6 +1,7 @@
-"""Report missing packages, and how to install them.
+"""Check whether the required packages are installed, and report missing packages.
 
-The scripts import `ricochet` before other packages, so that no script needs its own check.
+All scripts import `ricochet` before other packages.  Therefore the scripts themselves do not have
+to check.
 """
 
 import sys

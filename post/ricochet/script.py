@@ -1,6 +1,6 @@
-"""Command-line options, reports and exit codes that the scripts in post/ share.
+"""Command-line options, reports and exit codes that are common to the scripts in post/.
 
-Figures are drawn without a display and in the style of `style.mplstyle`.
+Figures are drawn without a display; their style is defined in `style.mplstyle`.
 """
 
 import argparse
@@ -37,7 +37,7 @@ Table = dict[str, Iterable] | list[dict]  # columns by name, or a list of rows
 
 
 def frame_list(text: str) -> tuple[int | slice, ...]:
-    """Parse frame numbers and ranges (first:end:step, as in Python), '0,10,-1' or '100:200'."""
+    """Convert a list of frame numbers and ranges, such as '0,10,-1' or '100:200', to indices."""
 
     def chosen(part: str) -> int | slice:
         if ":" not in part:
@@ -54,7 +54,7 @@ def frame_list(text: str) -> tuple[int | slice, ...]:
 
 
 def disk_list(text: str) -> list[int]:
-    """Parse numbers of disks such as '1,5,9'."""
+    """Convert a text such as '1,5,9' to a list of disk numbers."""
     try:
         return [int(part) for part in text.split(",")]
     except ValueError:
@@ -63,14 +63,14 @@ def disk_list(text: str) -> list[int]:
 
 
 def positive(text: str) -> int:
-    """Parse a positive integer."""
+    """Convert a text to a positive integer."""
     if not text.isdecimal() or int(text) == 0:
         raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
     return int(text)
 
 
 def not_negative(text: str) -> float:
-    """Parse a number that is not negative."""
+    """Convert a text to a number that is not negative."""
     value = float(text)
     if not 0 <= value < float("inf"):
         raise argparse.ArgumentTypeError(f"'{text}' is not a number of at least 0")
@@ -78,14 +78,15 @@ def not_negative(text: str) -> float:
 
 
 def unit_names(text: str) -> Units:
-    """Parse names of units such as 'length=cm,time=s'."""
+    """Convert a text such as 'length=cm,time=s' to names of units."""
     try:
         return units_of(text)
     except ValueError as problem:
         raise argparse.ArgumentTypeError(str(problem)) from None
 
 
-#: Options that several scripts share: name, type, symbol of the value, help text.
+#: Options that several scripts accept: name, conversion of the value, symbol of the value, help
+#: text.
 OPTIONS = {
     "frames": (frame_list, "LIST", "frames to use, such as 0,10,-1 or 100:200 or ::5"),
     "count": (positive, "N", "largest number of frames, which are evenly spread"),
@@ -101,14 +102,14 @@ OPTIONS = {
 }
 
 
-#: Former names of options, with their present names.
+#: Option names of earlier versions, with the present names.
 RENAMED = {"--skip": "--equilibration", "--apart": "--min-separation", "--wave": "--wavenumber"}
-#: Alternative spellings of options.
+#: Alternative spellings of option names.
 SPELLINGS = {"colour": ["--color"]}
 
 
 class Parser(argparse.ArgumentParser):
-    """Parser that accepts no abbreviations and suggests similar options for unknown ones."""
+    """Command-line parser that suggests a similar option if an option is unknown."""
 
     def parse_args(self, args: Sequence[str] | None = None, namespace=None) -> argparse.Namespace:
         words = joined(sys.argv[1:] if args is None else args)
@@ -130,10 +131,10 @@ class Parser(argparse.ArgumentParser):
 
 
 def finished(paths: list[Path]) -> list[Path]:
-    """Return the finished runs and warn about unfinished ones; without finished runs, return all.
+    """Return the paths of finished runs, and print a warning about unfinished runs.
 
-    Member runs of a sweep that have no file yet are counted, too, if all files of the sweep are
-    given.
+    If no run has finished, all paths are returned.  If all files of a sweep are given, its member
+    runs without a file are also counted as unfinished.
     """
     whole = [path for path in paths if path.suffix != ".part"]
     if not whole:
@@ -151,7 +152,7 @@ def finished(paths: list[Path]) -> list[Path]:
 
 
 def distinct(runs: list[Run]) -> list[Run]:
-    """Return the runs without duplicates; duplicates are runs with identical final states."""
+    """Return the runs without duplicates, which are runs with identical final states."""
     found: dict[bytes, list[Run]] = {}
     for run in runs:
         parts = run.time[-1:], run.position[-1], run.velocity[-1], run.mass, run.radius
@@ -163,7 +164,10 @@ def distinct(runs: list[Run]) -> list[Run]:
 
 
 def joined(words: Iterable[str]) -> list[str]:
-    """Join a list such as '-10:' to its option, because argparse would read it as an option."""
+    """Join each list such as '-10:' to the option before it, as argparse requires.
+
+    Otherwise argparse would interpret the list as an option.
+    """
     result: list[str] = []
     for word in words:
         if re.fullmatch(r"-\d+[,:][-\d,:]*", word) and result and result[-1].startswith("--"):
@@ -178,11 +182,12 @@ def command_line(
 ) -> Parser:
     """Return a parser whose help is the docstring `doc` of the script.
 
-    The script accepts a single run (`one`) or any number of runs, and `output` is the default
-    output file.  Duplicates of a run are left out unless they are allowed (`repeated`), and
-    unfinished runs are left out unless the runs form pairs (`paired`).  There is an option --csv if
-    the script writes numbers.  The keyword arguments name the shared `OPTIONS` of the script and
-    their defaults (None: no default).
+    The script accepts a single run if `one` is true, and any number of runs otherwise.  `output` is
+    the default name of the output file.  Duplicate runs are ignored unless `repeated` is true.
+    Unfinished runs are ignored unless the script sets the default `paired` to true.  If `csv` is
+    true, the script has the option --csv.  Each further keyword argument names one of the
+    `OPTIONS`; the value of the argument is the default of the option, where None means that the
+    option has no default.
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
@@ -209,7 +214,11 @@ def command_line(
 
 
 def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | None) -> list[int]:
-    """Return the frames of --frames [all], at most --count of them, evenly spread."""
+    """Return the frame numbers that the options --frames and --count select.
+
+    Without --frames, all frames are selected.  If `count` is smaller than the number of selected
+    frames, only `count` evenly spread frames are returned.
+    """
     frames: list[int] = []
     for part in which if which is not None else [slice(None)]:
         if isinstance(part, int) and not -run.n_frames <= part < run.n_frames:
@@ -223,10 +232,10 @@ def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | No
 
 
 def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
-    """Return the frames of --frames that are in the steady state and --min-separation apart.
+    """Return the frames of --frames in the steady state, at least --min-separation apart.
 
-    Without such a frame, the last frame is returned.  A warning is added to the notes of `args` if
-    the frames are fewer than requested or too early.
+    If no frame satisfies these conditions, the last frame is returned.  A warning is added to
+    `args.notes` if there are fewer frames than requested, or if the frames are too early.
     """
     frames, start = (
         chosen_frames(run, args.frames, None),
@@ -250,7 +259,7 @@ def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
 
 
 def chosen_disks(run: Run, ids: list[int]) -> list[int]:
-    """Return the indices (from 0) of the disks of --disks, which are numbered from 1."""
+    """Convert disk numbers, which begin with 1, to indices, which begin with 0."""
     for number in ids:
         if not 1 <= number <= run.n_disks:
             raise RunError(f"{run.path}: no disk {number}, there are {run.n_disks}")
@@ -258,7 +267,7 @@ def chosen_disks(run: Run, ids: list[int]) -> list[int]:
 
 
 def recorded(run: Run, name: str) -> float:
-    """Return a positive number that finished runs store in their provenance."""
+    """Return a positive number from the `provenance` group of a finished run."""
     value = float(run.provenance.get(name, 0))
     if value <= 0:
         what = name.replace("_", " ")
@@ -269,22 +278,22 @@ def recorded(run: Run, name: str) -> float:
 
 
 def grouped(runs: Iterable[Run], key: Callable[[Run], float]) -> list[tuple[float, list[Run]]]:
-    """Return the runs in groups of equal value of `key`, in ascending order."""
+    """Group the runs by the value of the function `key`, and sort the groups by this value."""
     ordered = sorted(runs, key=key)
     return [(value, list(group)) for value, group in groupby(ordered, key=key)]
 
 
 def by_restitution(runs: Iterable[Run]) -> list[tuple[Restitution, list[Run]]]:
-    """Return the runs in groups of equal restitution and restitution law."""
+    """Group the runs by their coefficient of restitution and its dependence on velocity."""
     return grouped(runs, lambda run: run.contact_law)
 
 
 def by_packing(runs: Iterable[Run]) -> list[tuple[float, list[Run]]]:
-    """Return the runs in groups of equal packing fraction."""
+    """Group the runs by their packing fraction."""
     return grouped(runs, lambda run: round(packing(run), 6))
 
 
-# --- the report ---
+# --- printed tables, warnings and figures ---
 
 
 def report(
@@ -294,10 +303,11 @@ def report(
     data: Table | None = None,
     notes: Sequence[str] = (),
 ) -> None:
-    """Print the tables, save the figure, and write `data` (default: first table) to --csv.
+    """Print the tables, save the figure, and write a table to the file of --csv.
 
-    `notes` are warnings about the numbers.  They are printed to stderr and on the figure, together
-    with warnings about runs that ended early.
+    The file of --csv contains the table `data` or, if `data` is None, the first table.  `notes` are
+    warnings about the numbers.  All warnings are written to stderr and on the figure, including
+    warnings about runs that ended early.
     """
     if any(tables):
         print("\n\n".join(text_of(table) for table in tables if table), flush=True)
@@ -318,9 +328,10 @@ def report(
 
 
 def once(notes: Iterable[str], names: set[str]) -> list[str]:
-    """Return the notes without repetitions.
+    """Return the warnings without repetitions.
 
-    Notes that differ only in names and numbers are merged into one note with their count.
+    If several warnings differ only in names of runs and in numbers, only the first warning and the
+    number of such warnings are returned.
     """
     kinds: dict[str, list[str]] = {}
     for note in notes:
@@ -334,9 +345,10 @@ def once(notes: Iterable[str], names: set[str]) -> list[str]:
 def measured(
     name: str, estimate: Estimate | SeriesMean | None, at: int | tuple = ()
 ) -> dict[str, float | None]:
-    """Return two cells of a row: a mean and its error, from a point of a curve or a number.
+    """Return two cells of a table row: the mean and the error of an estimate.
 
-    Without an estimate, both cells are None.
+    If the estimate is a curve, `at` is the index of a point of the curve.  If the estimate is None,
+    both cells are None.
     """
     parts = (None, None) if estimate is None else (estimate.mean, estimate.error)
     values = [part if part is None else float(np.asarray(part)[at]) for part in parts]
@@ -346,13 +358,16 @@ def measured(
 def over_runs(
     name: str, members: Sequence[SeriesMean], notes: list[str], about: str
 ) -> dict[str, float | None]:
-    """Return the cells of a mean over runs, and add its diagnostics to the notes."""
+    """Return the table cells of a mean over runs, and add warnings about it to `notes`."""
     notes += diagnostics(about, members)
     return measured(name, combine_runs(members))
 
 
 def spread(results: dict[str, dict]) -> dict[str, np.ndarray]:
-    """Return the columns of arrays and estimates with errors, with the endings added to names."""
+    """Convert groups of results to table columns; estimates become two columns.
+
+    The key of each group is appended to the names of its columns.
+    """
     columns = {}
     for end, found in results.items():
         for name, values in found.items():
@@ -364,7 +379,7 @@ def spread(results: dict[str, dict]) -> dict[str, np.ndarray]:
 
 
 def points(names: Sequence[str], curves: dict[tuple, Curve]) -> list[dict]:
-    """Return a row for each point of the curves: key of the curve, x, y and error."""
+    """Return a table row for each point of the curves: key of the curve, x, y and error of y."""
     return [
         dict(zip(names, (*key, *map(float, point)), strict=True))
         for key, curve in curves.items()
@@ -373,7 +388,7 @@ def points(names: Sequence[str], curves: dict[tuple, Curve]) -> list[dict]:
 
 
 def without_error(tables: Sequence[Table]) -> list[str]:
-    """Return the reason why numbers have no error, as a list of at most one sentence."""
+    """Return a list that contains one warning if some numbers have no error."""
     names = [
         name.removesuffix("_error")
         for table in map(columns, tables)
@@ -387,19 +402,19 @@ def without_error(tables: Sequence[Table]) -> list[str]:
 
 
 def is_nan(value: object) -> bool:
-    """Return whether a value is the float NaN."""
+    """Return whether a value of any type is a floating-point NaN."""
     return isinstance(value, float) and bool(np.isnan(value))
 
 
 def columns(table: Table) -> dict[str, Iterable]:
-    """Return a table as a dictionary of columns; its rows must have the same keys."""
+    """Convert a table to a dictionary of columns; all rows must have the same keys."""
     if isinstance(table, dict):
         return table
     return {name: [row[name] for row in table] for name in (table[0] if table else ())}
 
 
 def write_csv(path: Path, table: Table) -> None:
-    """Write a table with one header line and with all digits of the numbers."""
+    """Write a table as a CSV file with a header line and full numerical precision."""
     table = columns(table)
     with destination(path).open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -408,7 +423,7 @@ def write_csv(path: Path, table: Table) -> None:
 
 
 def text_of(table: Table) -> str:
-    """Return a table as aligned text with six digits."""
+    """Return a table as text with aligned columns and six digits for each number."""
     table = columns(table)
     rows = [
         ["-" if v is None else f"{v:.6g}" if isinstance(v, float) else str(v) for v in row]
@@ -422,13 +437,14 @@ def text_of(table: Table) -> str:
     return "\n".join(lines)
 
 
-# --- how a script ends ---
+# --- errors and exit codes ---
 
 
 def launch(main: Callable[[], None]) -> None:
-    """Run a script and turn exceptions into a line on stderr and exit code 2, or 1 for `Refused`.
+    """Run the main function of a script, and report exceptions in one line on stderr.
 
-    Unexpected errors are reported in the same way; `python -X dev` shows their traceback.
+    The exit code is 1 for the exception `Refused` and 2 for all other exceptions.  The command
+    `python -X dev` shows the traceback of an unexpected exception.
     """
     name = Path(sys.argv[0]).name
     if not sys.flags.dev_mode:
@@ -449,6 +465,6 @@ def launch(main: Callable[[], None]) -> None:
 
 
 def give_up(name: str, reason: str, code: int = 2) -> NoReturn:
-    """Print one line and exit with 1 if a theory does not apply to a run, otherwise with 2."""
+    """Print an error message in one line, and exit with the given code."""
     print(f"{name}: {' '.join(reason.split())}", file=sys.stderr)
     sys.exit(code)
