@@ -3,9 +3,9 @@
     python post/animate.py runs/gas.h5 -o gas.mp4              needs ffmpeg, see below
     python post/animate.py runs/crater.h5 --colour speed --count 500 --fps 30
 
-A name without an ending gets .mp4 if ffmpeg is installed, and .gif otherwise.  Without -o the film
-has the name of the run.  If the system has no ffmpeg, `.venv/bin/pip install imageio-ffmpeg`
-installs it.
+If the name of the film has no ending, the script appends .mp4 if ffmpeg is installed, and .gif
+otherwise.  Without -o the film has the name of the run.  The command `.venv/bin/pip install
+imageio-ffmpeg` installs ffmpeg if the system does not contain it.
 """
 
 from contextlib import suppress
@@ -39,7 +39,7 @@ from tqdm import tqdm
 
 
 def film_path(wish: Path | None, run: Run) -> Path:
-    """Return the path of the film: -o, or else the name of the run in the current folder."""
+    """Return the path of the film, which by default has the name of the run."""
     if not animation.FFMpegWriter.isAvailable():  # by the system
         with suppress(ImportError, RuntimeError):
             from imageio_ffmpeg import get_ffmpeg_exe
@@ -59,9 +59,9 @@ def film_path(wish: Path | None, run: Run) -> Path:
 def animate(
     run: Run, frames: list[int], colour: str | None = None, fps: float = 25
 ) -> animation.FuncAnimation:
-    """Write a film of these frames at `fps` frames per second.
+    """Write a film of the given frames that shows `fps` frames per second.
 
-    `colour` is "species" or a word of `COLOURINGS`.
+    `colour` is "species" or a key of `COLOURINGS`.
     """
     colour = chosen_colour(run, colour)
     aspect = aspect_of(run)

@@ -2,16 +2,17 @@
 
     python post/cooling.py runs/cooling/*.h5 -o cooling.png --csv cooling.csv
 
-Runs are combined by restitution xi; lines are means over the runs.  The first panels, one for each
-xi, show the mean kinetic energy per disk against time in the units of the input, with the band that
-contains 95 % of single runs.  The band is measured if there are at least four runs; otherwise it is
-estimated from the numbers of disks. The row below compares all xi on a logarithmic axis.  It shows
-the kinetic energy per disk of each species in units of the initial mean over all disks; bands are
-errors of the means.  The lowest row shows the ratio of the temperatures of the heaviest and the
-lightest species, which is 1 in equilibrium.  This row is omitted if all masses are equal.  With
-fewer than four runs the half-width of its band is twice the standard deviation over single runs.
-The table contains the energies against collisions per disk in these reduced units, and the energies
-against time in the units of the input.
+Runs with the same coefficient of restitution xi are combined, and lines show means over the runs.
+The panels of the first row, one for each xi, show the mean kinetic energy per disk against time in
+the units of the input.  The bands in these panels contain 95 % of single runs.  The width of the
+bands is measured if there are at least four runs; otherwise it is estimated from the numbers of
+disks.  The panels of the second row compare all values of xi on a logarithmic axis.  They show the
+kinetic energy per disk of each species, divided by the initial mean over all disks; bands show the
+errors of the means.  The third row shows the ratio of the temperatures of the heaviest and the
+lightest species, which is 1 in equilibrium.  The third row is omitted if all masses are equal. If
+there are fewer than four runs, the half-width of the band in the third row is twice the standard
+deviation over single runs.  The table contains the reduced energies against collisions per disk,
+and the energies in the units of the input against time.
 """
 
 from itertools import chain, cycle
@@ -33,13 +34,13 @@ DASHES = ("--", ":", "-.", (0, (5, 1)), (0, (1, 3)), (0, (8, 3)))  # line styles
 
 
 def in_time(found: Curves, name: str) -> Estimate:
-    """Draw the energy of a species, divided by the initial energy of all disks, against time."""
+    """Return the reduced energy of a species as a function of time."""
     first = found["energy_all"].mean[0]
     return Estimate(*(part / first for part in found[f"energy_{name}"]))
 
 
 def draw_ratio(axes: plt.Axes, groups: list, results: list[Curves]) -> None:
-    """Draw the temperature ratio against collisions, with the dilute limit."""
+    """Draw the temperature ratio against collisions per disk, with the theory for a dilute gas."""
     for (xi, own), found, colour in zip(groups, results, colours(len(groups), 2), strict=True):
         if "ratio" in found:
             tau, ratio = found["collisions_per_disk"], found["ratio"]
@@ -59,7 +60,7 @@ def draw_ratio(axes: plt.Axes, groups: list, results: list[Curves]) -> None:
 
 
 def draw_overview(figure: plt.Figure, places: tuple, runs: list[Run], found: list) -> None:
-    """Draw all energies on logarithmic axes; each restitution has a colour."""
+    """Draw all energies on logarithmic axes, with a colour for each coefficient of restitution."""
     left = figure.add_subplot(places[0])
     right = figure.add_subplot(places[1], sharey=left)
     styles = list(zip(("all", *runs[0].names), chain("-", cycle(DASHES)), strict=False))
@@ -85,9 +86,9 @@ def draw_overview(figure: plt.Figure, places: tuple, runs: list[Run], found: lis
 
 
 def randomised(run: Run, kind: Species, tau: np.ndarray) -> np.ndarray:
-    """Return the variance of the energies of one species, divided by the squared mean energy.
+    """Return the variance of the energies in a species, divided by the squared mean energy.
 
-    Collisions change this ratio from its initial value to 1, the value of an exponential
+    Collisions change this ratio from its initial value to 1, which is the ratio for an exponential
     distribution.
     """
     first = run.kinetic_energy(0)[kind.disks]
@@ -96,12 +97,13 @@ def randomised(run: Run, kind: Species, tau: np.ndarray) -> np.ndarray:
 
 
 def expected_scatter(run: Run, energies: dict[str, np.ndarray], tau: np.ndarray) -> dict:
-    """Return the expected scatter of the mean energies of each species and of "all" disks.
+    """Return the expected standard deviation of the mean energy in single runs.
 
-    The scatter is the standard deviation over single runs.
+    The keys are the names of the species, and "all" for all disks.
 
-    The energies of disks are assumed to be independent or, in an elastic gas, independent with a
-    fixed sum.  Inelastic collisions correlate the energies, which makes the true scatter smaller.
+    The energies of the disks are assumed to be independent or, in an elastic gas, independent
+    except for their fixed sum.  Inelastic collisions correlate the energies, and therefore the true
+    standard deviation is smaller.
     """
     counts = {kind.name: int(kind.disks.sum()) for kind in run.by_species}
     variances = {
@@ -117,10 +119,10 @@ def expected_scatter(run: Run, energies: dict[str, np.ndarray], tau: np.ndarray)
 
 
 def scatter(runs: list[Run], found: Curves) -> dict[str, np.ndarray]:
-    """Return the standard deviation of each energy over single runs, against time.
+    """Return the standard deviation of each energy over single runs as a function of time.
 
-    The standard deviation is measured if there are at least four runs; otherwise the expected
-    scatter is returned.
+    If there are at least four runs, the standard deviation is measured; otherwise the expected
+    standard deviation is returned.
     """
     names = ("all", *runs[0].names)
     if len(runs) >= FEWEST_RUNS:
@@ -132,7 +134,10 @@ def scatter(runs: list[Run], found: Curves) -> dict[str, np.ndarray]:
 
 
 def ratio_band(runs: list[Run], found: Curves) -> np.ndarray:
-    """Return the error of the temperature ratio or, for few runs, twice its scatter over runs."""
+    """Return the error of the temperature ratio.
+
+    If there are few runs, the function returns twice the standard deviation over single runs.
+    """
     if len(runs) >= FEWEST_RUNS:
         return found["ratio"].error
     both = [runs[0].by_species[k] for k in lightest_and_heaviest(runs[0])]
@@ -143,7 +148,7 @@ def ratio_band(runs: list[Run], found: Curves) -> np.ndarray:
 
 
 def draw_energies(axes: plt.Axes, runs: list[Run], found: Curves, xi: Restitution) -> None:
-    """Draw the mean energies at one restitution in units of the input, on linear axes."""
+    """Draw the mean energies for one coefficient of restitution on linear axes."""
     names = ("all", *runs[0].names) if len(runs[0].names) > 1 else ("all",)
     labels, deviations = (
         {kind.name: kind.label for kind in runs[0].by_species},
@@ -159,7 +164,7 @@ def draw_energies(axes: plt.Axes, runs: list[Run], found: Curves, xi: Restitutio
 
 
 def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
-    """Draw the energies for each restitution, all energies together, and the temperature ratio."""
+    """Draw the energies for each coefficient of restitution, and the temperature ratio."""
     ratio = any("ratio" in found for found in results)
     columns = min(len(groups), 3)
     above = -(-len(groups) // columns)
@@ -186,7 +191,7 @@ def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
 
 
 def table(groups: list, results: list[Curves]) -> list[dict]:
-    """Return a row for each restitution with the final energy and temperature ratio."""
+    """Return a table row with final energy and temperature ratio for each restitution."""
     return [
         {
             "restitution": xi.name,

@@ -2,37 +2,43 @@
 
     python post/correlations.py runs/state/memory_*.h5 -o correlations.png --csv correlations.csv
 
-The box must have no obstacles and no gravity.  Runs are combined by packing fraction; lines are
-means over the runs, bands are errors.  Frames may be spaced equally or logarithmically in time (use
---equilibration 0 if the run begins in equilibrium).  The units are the mean free time 1/w and the
-mean diameter.  Equilibrium begins after --equilibration or, without that option, when no observable
-drifts any longer.  Earlier frames are used for a2 only.  For gases that cool or flow, only a2 and
-the structure are computed.  The structure is an average over the frames after --equilibration;
-without that option it is an average over the frames without drift or, in a gas that cools, over the
-frames later than 15 collisions per disk.  Dashed lines show the species of a mixture.
+The script accepts runs without obstacles and without gravity.  Runs of equal packing fraction are
+combined; lines show means over the runs, and bands show errors.  The frames may be spaced equally
+or logarithmically in time (use --equilibration 0 if the run begins in equilibrium).  The unit of
+time is the mean free time 1/w, and the unit of length is the mean diameter.  Equilibrium begins
+after --equilibration or, without that option, when no observable drifts any longer.  Earlier frames
+are used only for a2. If the gas cools or flows, the script computes only a2 and the structure.  The
+structure is averaged over the frames after --equilibration.  Without that option, it is averaged
+over the frames in which no observable drifts or, if the gas cools, over the frames later than 15
+collisions per disk.  Dashed lines show the single species of a mixture.
 
-The time correlations are those of the package's `correlations`, whose docstring explains how pairs
-of frames are chosen: the velocity autocorrelation <v(0) v(t)>, in theory exp(-w t) at short times
-and 1/t at long times (mode coupling); the mean square displacement; F_s(k, t) = <exp(i k r)> at
---wavenumber; the non-Gaussian parameter alpha2 = <r^4> / (2 <r^2>^2) - 1.  The table also contains
-the overlap, which is the fraction of the disks within 0.3 diameters of their first position.
+The time correlations are calculated by the module `ricochet.correlations`, whose docstring explains
+how pairs of frames are chosen.  They are the velocity autocorrelation <v(0) v(t)>, the mean square
+displacement, the self-intermediate scattering function F_s(k, t) = <exp(i k r)> at --wavenumber,
+and the non-Gaussian parameter alpha2 = <r^4> / (2 <r^2>^2) - 1. In theory the velocity
+autocorrelation decays as exp(-w t) at short times, and as 1/t at long times (mode coupling).  The
+table also contains the overlap, which is the fraction of the disks within 0.3 diameters of their
+first position.
 
-D(t) is a quarter of the slope of the mean square displacement between neighbouring lags.  It is
-also half the integral of <v(0) v(s)> from 0 to t.  This integral is computed as half of <v(0) (x(t)
-- x(0))>, which is exact for any spacing of frames.  For driven disks, whose velocities change
-between collisions, only the first definition applies.  Enskog's D_E is shown for equal smooth disks
-of fixed energy.  In two dimensions the long-time tail makes D(t) grow as the logarithm of t without
-limit: a value of D applies to one time and one box, because the size of the box matters once sound
-has crossed it.  The table contains D from both definitions, averaged over the lags from `D_time` /
-2 to `D_time`; the two values must agree.  `D_time` is the time in which sound crosses the box, but
-at most an eighth of the run.  D requires a periodic box and equally spaced frames.
+The diffusion coefficient D(t) is defined in two ways: as a quarter of the slope of the mean square
+displacement between neighbouring lags, and as half the integral of <v(0) v(s)> from 0 to t.  The
+integral is computed as <v(0) (x(t) - x(0))>, which is exact for any spacing of frames.  For driven
+disks, whose velocities change between collisions, only the first definition applies.  Enskog's
+coefficient D_E is shown for equal smooth disks of fixed energy.  In two dimensions D(t) grows as
+the logarithm of t without limit, because of the long-time tail.  Therefore a value of D applies
+only to one time and to one size of the box: when sound has crossed the box, D depends on its size.
+The table contains D from both definitions, averaged over the lags from `D_time` / 2 to `D_time`;
+the two values must agree.  `D_time` is the time in which sound crosses the box, but at most an
+eighth of the duration of the run.  D is calculated only for a periodic box and equally spaced
+frames.
 
-a2 = <v^4> / (2 <v^2>^2) - 1, the second Sonine coefficient with each species at its own
-temperature, is 0 in equilibrium and -1/2 for equal speeds.  S(k) = <|sum of exp(i k x)|^2> / N.
-psi6 of a disk is the mean of exp(6 i theta) over its Delaunay neighbours; `local` is the mean of
-its modulus over the disks, `global` the modulus of its mean, which is 1 in a perfect triangular
-crystal. g6(r) = <psi6*(0) psi6(r)> decays exponentially in a fluid, as a power of r in a hexatic
-phase, and not at all in a crystal.
+The second Sonine coefficient is a2 = <v^4> / (2 <v^2>^2) - 1, where each species has its own
+temperature.  It is 0 in equilibrium, and -1/2 if all speeds are equal. The structure factor is S(k)
+= <|sum of exp(i k x)|^2> / N.  The bond-orientational order parameter psi6 of a disk is the mean of
+exp(6 i theta) over its Delaunay neighbours.  In the table, `local` is the mean modulus of psi6, and
+`global` is the modulus of the mean of psi6, which is 1 in a perfect triangular crystal. The
+correlation function g6(r) = <psi6*(0) psi6(r)> decays exponentially in a fluid and as a power of r
+in a hexatic phase, and does not decay in a crystal.
 """
 
 from itertools import combinations_with_replacement, cycle
@@ -72,7 +78,7 @@ from ricochet.script import by_packing, command_line, launch, measured, over_run
 import numpy as np
 
 PLAIN = {"walls"}  # the only special property allowed for Enskog's D
-#: Properties of runs that have no equilibrium but whose structure can be computed.
+#: Traits of runs that do not reach equilibrium, but for which the structure can be computed.
 RESTLESS = (
     "inelastic",
     "soft_contacts",
@@ -87,7 +93,7 @@ NUMBERS = ("D_displacement", "D_velocities", "psi6_local", "psi6_global")
 
 
 class Found(NamedTuple):
-    """Results of the runs at one packing fraction: scalars with errors, and curves by name."""
+    """Results of all runs at one packing fraction: numbers with errors, and named curves."""
 
     members: dict[str, list[SeriesMean]]
     curves: dict[str, Curve]
@@ -95,7 +101,7 @@ class Found(NamedTuple):
 
 
 def check(run: Run, first: Run) -> None:
-    """Raise an error for runs of systems that are not homogeneous."""
+    """Raise an error if the system of a run is not homogeneous."""
     allow(run, "correlations are those of disks without obstacles and gravity", *FLUID, *RESTLESS)
     if run.n_disks < 3:
         raise Refused(f"{run.path}: needs at least three disks")
@@ -106,7 +112,7 @@ def check(run: Run, first: Run) -> None:
 
 
 def bins(run: Run) -> dict[str, np.ndarray]:
-    """Return the bins of distances and of wavenumbers; the mean diameter is the unit of length."""
+    """Return the bins of distance and wavenumber; the unit of length is the mean diameter."""
     half = 0.5 * run.edges.min() / (2 * run.radius.mean())
     least = float(run.radius.min() / run.radius.mean())
     found = {
@@ -117,7 +123,7 @@ def bins(run: Run) -> dict[str, np.ndarray]:
 
 
 def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Curve]]:
-    """Return psi6 of each run, and the curves of all disks and of each pair of species."""
+    """Return psi6 of each run, and the structure of all disks and of each pair of species."""
     some = [evenly(run, own) for run, own in zip(runs, frames, strict=True)]
     psi = {(r.path, k): bond_order(r, k) for r, own in zip(runs, some, strict=True) for k in own}
     each = [[psi[run.path, k] for k in own] for run, own in zip(runs, some, strict=True)]
@@ -141,13 +147,13 @@ def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Cur
 
 
 def free_time(runs: list[Run], frames: list[slice]) -> float:
-    """Return the mean free time in these frames."""
+    """Return the mean free time, averaged over the given frames."""
     each = zip(runs, frames, strict=True)
     return float(np.mean([mean_free_time(run, run.time[own.start]) for run, own in each]))
 
 
 def motion(runs: list[Run], frames: list[slice], skip: float | None, wave: float) -> dict:
-    """Return the time correlations of all disks and of each species, against w t."""
+    """Return the time correlations of all disks and of each species as functions of w t."""
     first, diameter = runs[0], 2 * runs[0].radius.mean()
     members = correlators(runs, [wave / diameter], skip=skip)
     found, unit, curves = curves_of(members), free_time(runs, frames), {}
@@ -173,13 +179,13 @@ def motion(runs: list[Run], frames: list[slice], skip: float | None, wave: float
 
 
 def kurtosis(runs: list[Run], until: int) -> Curve:
-    """Return a2 against collisions per disk in the first frames."""
+    """Return a2 in the first frames as a function of the number of collisions per disk."""
     tau, a2 = zip(*(relaxation(run, frames=until) for run in runs), strict=True)
     return Curve(np.mean(tau, axis=0), *estimate(a2))
 
 
 def analysed(runs: list[Run], skip: float | None, wave: float = 2 * np.pi) -> Found:
-    """Return all results of the runs at one packing fraction."""
+    """Return all results for the runs at one packing fraction."""
     frames = [later(run, skip) for run in runs]
     pairs, settled = list(zip(runs, frames, strict=True)), all_settle(runs)
     try:
@@ -205,7 +211,7 @@ def analysed(runs: list[Run], skip: float | None, wave: float = 2 * np.pi) -> Fo
 
 
 def table(groups: list, results: list[Found]) -> tuple[list[dict], list[str]]:
-    """Return a row for each packing fraction, and the notes."""
+    """Return a table row for each packing fraction, and warnings about the numbers."""
     rows, notes = [], []
     for (eta, runs), found in zip(groups, results, strict=True):
         row = {"packing": eta, "runs": len(runs), "D_time": found.lag}
@@ -223,7 +229,7 @@ def table(groups: list, results: list[Found]) -> tuple[list[dict], list[str]]:
 
 
 def curves(groups: list, results: list[Found]) -> list[dict]:
-    """Return the scalars with errors, followed by all curves."""
+    """Return a table of the numbers with errors, followed by all curves."""
     names, rows = ("what", "packing", "x", "y", "error"), []
     for (eta, _), found in zip(groups, results, strict=True):
         for what, members in found.members.items():
@@ -252,7 +258,7 @@ LINES = ("-", "--", ":", "-.")  # line styles of all disks, and of species
 
 
 def parts(shown: dict[str, Curve], panel: str) -> dict[str, Curve]:
-    """Return the curves of a panel by species or pair of species; "" is the key of all disks."""
+    """Return the curves of a panel by species or pair of species; all disks have the key ""."""
     names = [one for one in shown if one == panel or one.startswith(f"{panel}_")]
     return {one[len(panel) + 1 :]: shown[one] for one in names if one != "vacf_tail"}
 
@@ -260,7 +266,7 @@ def parts(shown: dict[str, Curve], panel: str) -> dict[str, Curve]:
 def draw_group(
     panels: dict[str, plt.Axes], found: Found, row: dict, colour: str, count: int, keyed: bool
 ) -> None:
-    """Draw the curves of one packing fraction; `count` is the number of disks of its runs."""
+    """Draw the curves of one packing fraction; each run has `count` disks."""
     line, label, shown = {"color": colour, "lw": 1}, f"η = {row['packing']:.3g}", found.curves
 
     def positive(curve: Curve) -> Curve:
@@ -293,7 +299,7 @@ def draw_group(
 def draw(
     groups: list[tuple[float, list[Run]]], results: list[Found], rows: list[dict], wave: float
 ) -> plt.Figure:
-    """Draw the time correlations above and the structure below, as far as they were computed."""
+    """Draw all available time correlations, and below them the available structure functions."""
     there = set().union(*(one.curves for one in results))
     of = {"tail": "vacf", "D": "D_displacement(t)"}
     shown = {name: style for name, style in AXES.items() if of.get(name, name) in there}

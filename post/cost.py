@@ -2,10 +2,11 @@
 
     python post/cost.py runs/cost/*.h5 -o cost.png --csv cost.csv
 
-The script reads the collisions per second of processor time that each run records, and uses the
-fastest of several equal runs.  The lines are powers of N fitted to the points with N in --fit.
-Below that range the cost of the collision itself is not small compared with the cost of the search;
-above that range the data of the disks no longer fit into the caches.
+Each output file contains the number of collisions per second of processor time.  If several runs
+are equal, the script uses the fastest run.  The lines are power laws, fitted to the points whose
+number of disks N is in the range of --fit.  For smaller N, the cost of the collision itself is not
+small compared with the cost of the search.  For larger N, the data of the disks do not fit into the
+caches of the processor.
 """
 
 from ricochet import Run
@@ -24,7 +25,10 @@ LABELS = {
 
 
 def costs(runs: list[Run]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return N (ascending) and the shortest time per collision in microseconds for each search."""
+    """Return the numbers of disks and the shortest times per collision [microseconds].
+
+    There is a pair of arrays for each method of search.
+    """
     least: dict[str, dict[int, float]] = {}
     for run in runs:
         points = least.setdefault(str(run.parameter("run", "search", "cells")), {})
@@ -34,7 +38,7 @@ def costs(runs: list[Run]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 
 def fits(measured: dict, low: float, high: float) -> dict[str, PowerLaw]:
-    """Return a power law of N for each search, through the points from `low` to `high`."""
+    """Return for each method a power law fitted to the points with N from `low` to `high`."""
     laws = {}
     for search, (n, cost) in measured.items():
         inside = (n >= low) & (n <= high)
@@ -48,7 +52,7 @@ def fits(measured: dict, low: float, high: float) -> dict[str, PowerLaw]:
 def draw(
     runs: list[Run], measured: dict, laws: dict[str, PowerLaw], low: float, high: float
 ) -> plt.Figure:
-    """Draw times and fits on logarithmic axes; fits are dotted outside their range."""
+    """Draw times and fits on logarithmic axes; fitted lines are dotted outside the fit range."""
     figure, axes = plt.subplots(figsize=(7, 5.5))
     for search, colour, marker in zip(LABELS, COLOURS, "osD", strict=False):
         if search in measured:

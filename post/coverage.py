@@ -1,13 +1,13 @@
-"""Fraction of error bars that contain the true value (coverage).
+"""Fraction of error bars that contain the true value (coverage of the error bars).
 
     python post/coverage.py runs/coverage/*/*.h5 -o coverage.png --csv coverage.csv
 
-The input is a set of many runs that differ only by their seed, at one or more packing fractions.  Z
-is computed from the virial of each run, with an error that is half the width of the 68 % interval.
-The true value is taken as the mean over all runs of a packing fraction.  If the errors are correct,
-68 of 100 intervals contain the true value, and the errors equal the standard deviation of the means
-of single runs.  For comparison the script also computes the error that treats all samples of the
-observables as independent.
+The script requires many runs at one or more packing fractions, which differ only by their seed.
+For each run it calculates the compressibility factor Z from the virial, and an error, which is half
+the width of the 68 % confidence interval. The mean of Z over all runs at a packing fraction is
+taken as the true value.  If the errors are correct, 68 % of the intervals contain the true value,
+and the errors are equal to the standard deviation of Z over the runs.  For comparison, the script
+also calculates a naive error, which assumes that all samples of the observables are independent.
 """
 
 from ricochet import Run, RunError
@@ -23,7 +23,7 @@ SHOWN = 60  # runs in a panel
 
 
 def naive_error(run: Run, skip: float | None) -> float:
-    """Return the standard error of Z from the virial for samples treated as independent."""
+    """Return the standard error of Z if all samples of the virial are assumed to be independent."""
     amount, per = virial_over_kt(run, skip)
     return float(scipy.stats.sem(amount - per * np.sum(amount) / np.sum(per)) / np.mean(per))
 

@@ -1,18 +1,19 @@
-"""Crater of a projectile: the bed before and after, the energy against time, and the crater's size.
+"""Crater of a projectile: pictures before and after the impact, energy, and crater size.
 
     python post/crater.py runs/crater.h5 -o crater.png
     python post/crater.py runs/scan/*.h5 --csv craters.csv     sizes of many runs, no figure
 
-The projectile is the species 'projectile', or else the only disk that moves at the start.  All
-other disks form the bed.  The sizes are: `hit`, the number of bed disks that collided at least
-once; `displaced`, the number of bed disks that are further than one radius from their first
-position in the last frame; `width` and `depth`, the extent of the first positions of the displaced
-disks, where the depth is measured downwards from the surface of the bed; `hole_width` and
-`hole_depth`, the extent of the hole, in which the packing fraction, smoothed over a few disks, is
-below half of the packing fraction of the bed.  Runs in which the bed moves without a projectile,
-for example under gravity, are refused.  A crater is marked if the walls affect it (their collisions
-exceed 1 % of the number of disks), or if the run ended with more energy left than
-`stop.energy_fraction`.
+The projectile is the species 'projectile'.  Without a species of this name, the projectile is the
+only disk that moves at the start.  All other disks form the bed.  The script measures six sizes.
+`hit` is the number of bed disks that collided at least once.  `displaced` is the number of bed
+disks whose displacement in the last frame is larger than their radius.  `width` and `depth` are the
+extent of the region from which disks were displaced; the depth is measured downwards from the
+surface of the bed.  `hole_width` and `hole_depth` are the extent of the hole.  The hole is the
+region in which the packing fraction, averaged over a few disks, is smaller than half of the initial
+packing fraction of the bed.  The script rejects runs in which the bed moves without a projectile,
+for example under gravity.  The table marks a crater if the walls affect it, which is assumed if
+collisions with walls exceed 1 % of the number of disks.  It also marks a crater if the run ended
+with more energy left than `stop.energy_fraction`.
 """
 
 from ricochet import Run, crater, drawing
@@ -26,7 +27,7 @@ from matplotlib.ticker import LogLocator
 
 
 def draw_state(axes: plt.Axes, run: Run, frame: int, values: np.ndarray, limits: tuple):
-    """Draw the bed disks in the colours of the values, and the projectile in black."""
+    """Draw the bed disks with colours that show the given values, and the projectile in black."""
     draw_box(axes, run, run.time[frame])
     colours = plt.get_cmap("viridis")(plt.Normalize(*limits)(values))
     colours[projectile(run)] = (0, 0, 0, 1)
@@ -35,7 +36,7 @@ def draw_state(axes: plt.Axes, run: Run, frame: int, values: np.ndarray, limits:
 
 
 def hull(run: Run) -> np.ndarray:
-    """Return the convex hull (P, 2) of the first positions of displaced disks; it may be empty."""
+    """Return the convex hull (P, 2) of the initial positions of displaced disks, or no points."""
     points = run.position[0][displaced(run)]
     if len(points) < 4:
         return points[:0]
@@ -44,14 +45,14 @@ def hull(run: Run) -> np.ndarray:
 
 
 def draw_outline(axes: plt.Axes, ring: np.ndarray, label: str) -> None:
-    """Draw a line around the region that the label names, if there is one."""
+    """Draw the outline of a region, unless the outline is empty."""
     if len(ring):
         axes.plot(*ring.T, color=COLOURS[1], lw=1.4, zorder=4, label=label)
         axes.legend(loc="upper left")
 
 
 def draw_energy(axes: plt.Axes, run: Run) -> None:
-    """Draw the remaining energy and the collisions against time."""
+    """Draw the remaining energy and the number of collisions against time."""
     time, energy = run.observable("all/kinetic_energy")
     axes.semilogy(time, energy / energy[0], color=COLOURS[0], label="kinetic energy $E/E_0$")
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -71,7 +72,7 @@ def draw_energy(axes: plt.Axes, run: Run) -> None:
 
 
 def draw(run: Run, size: Crater) -> plt.Figure:
-    """Draw the state before and after, collisions per disk, and energy."""
+    """Draw the bed before and after the impact, collisions per disk, and the energy."""
     figure, ((before, after), (hits, energy)) = plt.subplots(2, 2, figsize=(9.4, 10.6))
     moved = run.displacement(-1)
     limits = (0, drawing.scale_top(run, [run.n_frames - 1], "displacement"))

@@ -1,18 +1,19 @@
-"""Crater size against the projectile's mass, speed and radius, and against restitution.
+"""Crater size against mass, speed and radius of the projectile, and against restitution.
 
     python post/crater_scan.py runs/crater_scan/*.h5 -o crater_scan.png --csv crater_scan.csv
 
-The four parameters are read from each run.  Runs that differ in only one of them form a curve
-against that parameter.  There is a curve for every combination of the other three parameters, and a
-panel for every parameter with at least one curve.  Runs that belong to no curve are listed in the
-printed notes and on the figure.  Points are means over the runs, with error bars.  Lines are
-weighted fits of size = A x^p.  For the restitution, x = 1 - xi^2 is the fraction of the normal
-energy lost in a collision.  The exponents are printed with chi^2 per degree of freedom, and a note
-marks each fit that does not describe its points.  If a point has fewer than four runs, all points
-have equal weights and the error follows from the deviations of the points from the fit.  Points
-with open symbols are not fitted: there the walls affect the crater (their collisions exceed 1 % of
-the number of disks), or some of the runs reached `stop.time` with more energy left than
-`stop.energy_fraction`.
+The script reads these four parameters from each run.  Runs that differ in only one parameter form a
+curve against that parameter.  There is one curve for every combination of the other three
+parameters, and one panel for every parameter with at least one curve.  Runs that belong to no curve
+are listed in the printed warnings and on the figure.  Points are means over the runs, with error
+bars.  Lines are weighted fits of size = A x^p.  For the restitution xi, the variable x = 1 - xi^2
+is the fraction of the normal energy that a collision dissipates.  The exponents are printed with
+chi^2 per degree of freedom.  If a fit does not describe its points, a warning is printed.  If a
+point of a curve is the mean of fewer than four runs, all points of the curve have equal weights.
+In this case, the error of the exponent is determined from the deviations of the points from the
+fit.  Points with open symbols are not used in fits, for one of two reasons.  Either the walls
+affect the crater, which is assumed if the number of collisions with walls exceeds 1 % of the number
+of disks, or some runs reached `stop.time` with more energy left than `stop.energy_fraction`.
 """
 
 from itertools import chain
@@ -43,7 +44,7 @@ from ricochet.script import command_line, grouped, launch, measured, report
 
 import numpy as np
 
-#: Text and dimension of the label of each parameter.
+#: Text and unit of the axis label of each parameter.
 AXES = {
     "mass": ("mass of the projectile / mass of a bed disk, $M$", "number"),
     "speed": ("speed of the projectile $v$", "speed"),
@@ -60,7 +61,7 @@ FEWEST_POINTS = 3  # smallest number of points that is fitted
 
 
 class Point(NamedTuple):
-    """The craters of runs that differ by their seed."""
+    """The craters of all runs that differ only by their seed."""
 
     values: dict[str, float]  # of AXES
     runs: int
@@ -75,7 +76,7 @@ Scans = dict[str, list[list[Point]]]  # the curves of each parameter; points in 
 
 
 def key_of(run: Run) -> tuple[float, ...]:
-    """Return mass ratio, speed, radius ratio and restitution."""
+    """Return the mass ratio, speed, radius ratio and restitution of a run."""
     if np.isnan(run.restitution):
         raise Refused(f"{run.path}: has no constant restitution, which a scan requires")
     tip, lying = projectile(run), np.flatnonzero(bed(run))[0]
@@ -85,7 +86,7 @@ def key_of(run: Run) -> tuple[float, ...]:
 
 
 def point(key: tuple[float, ...], runs: list[Run]) -> Point:
-    """Return the means over runs of equal parameters."""
+    """Return the mean crater sizes over runs with equal parameters."""
     craters = [crater(run) for run in runs]
     sizes = {name: estimate([getattr(c, name) for c in craters]) for name in ALL}
     left, hits = (
@@ -103,7 +104,7 @@ def others(axis: str, curve: list[Point]) -> dict[str, float]:
 
 
 def scanned(points: list[Point]) -> Scans:
-    """Return the curves with at least two points or, if there are none, the longest curve."""
+    """Return all curves with at least two points, or the longest curve if there are none."""
     scans = {}
     for axis in AXES:
         families = grouped(points, lambda p, axis=axis: tuple(others(axis, [p]).values()))
@@ -114,7 +115,7 @@ def scanned(points: list[Point]) -> Scans:
 
 
 def unused(points: list[Point], scans: Scans) -> list[str]:
-    """Return the points that belong to no curve."""
+    """Return the points that do not belong to any curve."""
     drawn = [p.values for scan in scans.values() for curve in scan for p in curve]
     return [
         f"not drawn: {listed(p.values)} (runs: {p.runs}), from which no other run differs in one "
@@ -125,12 +126,12 @@ def unused(points: list[Point], scans: Scans) -> list[str]:
 
 
 def fitted_values(curve: list[Point], axis: str) -> int:
-    """Return the number of different parameter values among the points that are fitted."""
+    """Return the number of different parameter values among the points used in the fit."""
     return len({p.values[axis] for p in curve if p.free})
 
 
 def unfitted(scans: Scans, runs: list[Run]) -> list[str]:
-    """Return the reason why curves have no fit, and the bed size that would allow a fit."""
+    """Return the reason why curves cannot be fitted, and a bed size that would allow a fit."""
     notes, fraction = [], energy_fraction(runs[0])
     for axis, curve in ((axis, curve) for axis, scan in scans.items() for curve in scan):
         cut = [p for p in curve if not p.free]
@@ -152,22 +153,25 @@ def unfitted(scans: Scans, runs: list[Run]) -> list[str]:
 
 
 def fewest(curve: list[Point]) -> int:
-    """Return the smallest number of runs per point among the fitted points."""
+    """Return the smallest number of runs per point, among the points used in the fit."""
     return min(p.runs for p in curve if p.free)
 
 
 def listed(values: dict[str, float]) -> str:
-    """Return parameters as text."""
+    """Return the values of the parameters as text."""
     return ",  ".join(f"{name} {value:g}" for name, value in values.items())
 
 
 def abscissa(axis: str, x: np.ndarray) -> np.ndarray:
-    """Return the independent variable against which the data are fitted."""
+    """Return the variable x of the fit, calculated from the values of a parameter."""
     return 1 - np.square(x) if axis == "restitution" else np.asarray(x, dtype=float)
 
 
 def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
-    """Fit a power law to a size; weights are equal if any point has fewer than four runs."""
+    """Fit a power law to a crater size.
+
+    All points have equal weights if any point is the mean of fewer than four runs.
+    """
     free = [p for p in curve if p.free]
     x = abscissa(axis, [p.values[axis] for p in free])
     y, error = np.array([p.sizes[name] for p in free]).reshape(-1, 2).T
@@ -176,7 +180,7 @@ def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
 
 
 def power(axis: str, curve: list[Point], fit: PowerLaw | None) -> str:
-    """Return the power law of a fit, for a legend."""
+    """Return the fitted power law as text for the legend of a figure."""
     if not fit:
         return ""
     exponent = "\\pm".join(rounded_to_error(fit.exponent, fit.exponent_error))
@@ -187,7 +191,7 @@ def power(axis: str, curve: list[Point], fit: PowerLaw | None) -> str:
 def draw_size(
     axes: plt.Axes, axis: str, curve: list[Point], name: str, fit: PowerLaw | None, **style
 ) -> None:
-    """Draw one size with its fit."""
+    """Draw one crater size against a parameter, with the fitted power law."""
     x, y, error = np.array([(p.values[axis], *p.sizes[name]) for p in curve]).T
     error, free = np.nan_to_num(error), np.array([p.free for p in curve])
     if fit:
@@ -204,9 +208,10 @@ def draw_size(
 
 
 def draw_sizes(axes: plt.Axes, axis: str, scan: list[list[Point]], names: dict, own: list) -> None:
-    """Draw several sizes.
+    """Draw several crater sizes against a parameter.
 
-    If there is one curve, colours distinguish sizes; otherwise they distinguish curves.
+    If there is only one curve, colours distinguish the sizes; otherwise colours distinguish the
+    curves.
     """
     shared = [others(axis, curve) for curve in scan]
     varying = [name for name in shared[0] if len({values[name] for values in shared}) > 1]
@@ -224,7 +229,7 @@ def draw_sizes(axes: plt.Axes, axis: str, scan: list[list[Point]], names: dict, 
 
 
 def draw(runs: list[Run], scans: Scans) -> plt.Figure:
-    """Draw panels for each parameter: numbers of disks above, width and depth below."""
+    """Draw two panels for each parameter: numbers of disks, and below them width and depth."""
     rows, columns = panel_grid(len(scans), 1)
     figure = plt.figure(figsize=(5.5 * max(columns, 1.3), 5.5 * rows))
     grid = figure.add_gridspec(2 * rows, columns, height_ratios=(1.3, 1) * rows)
@@ -260,7 +265,7 @@ def draw(runs: list[Run], scans: Scans) -> plt.Figure:
 
 
 def tables(scans: Scans) -> tuple[list[dict], list[dict], list[str]]:
-    """Return a row per point, a row per fit, and notes on fits that do not describe the points."""
+    """Return a table of points, a table of fits, and warnings about fits of poor quality."""
     rows, fits, missed = [], [], []
     for axis, curve in ((axis, curve) for axis, scan in scans.items() for curve in scan):
         for p in curve:

@@ -2,20 +2,22 @@
 
     python post/energy.py runs/gravity/events.h5 runs/gravity/steps_*.h5 -o energy.png
 
-The panels of the first row show the total energy and its parts against time on linear axes, side by
-side for the first run of each time step.  The middle row shows the mean kinetic and potential
-energy per disk of each species in the first run, against linear and logarithmic time.  The lowest
-panel shows, for each run, the largest relative change so far of the conserved quantity.  The
-conserved quantity is the total energy or, where energy is exchanged, total + dissipated - heat -
-work - drive.  The figure of driven disks has no logarithmic time axis.
+The panels of the first row show the total energy and its parts against time on linear axes.  There
+is one panel for the first run of each time step.  The second row shows the mean kinetic and
+potential energy per disk of each species in the first run, against linear and logarithmic time.
+For driven disks there is no panel with logarithmic time.  The lowest panel shows for each run the
+largest relative change of the conserved quantity between the start and each time.  The conserved
+quantity is the total energy or, if energy is exchanged, total + dissipated - heat - work - drive.
 
-Smaller time steps do not improve the conservation of energy: a step moves disks along their exact
-parabolas and every collision conserves energy, so that all changes are rounding errors.  Larger
-steps miss collisions instead; missed.py counts them.
+The conservation of energy does not depend on the time step: between collisions the disks follow
+exact parabolas, and every collision conserves energy, so all changes are rounding errors.  The
+error of large time steps is that collisions are missed; the script missed.py counts missed
+collisions.
 
-The table has three numbers for each run, relative to the total energy at the start or, if that
-energy is 0, to the largest total energy: the drift, which is the change over the whole run along a
-fitted line; the spread, which is the standard deviation from that line; and the largest change.
+The table contains three numbers for each run.  The drift is the change of a fitted straight line
+over the whole run.  The spread is the standard deviation of the conserved quantity from this line.
+The third number is the largest change of the conserved quantity.  All three numbers are divided by
+the total energy at the start or, if this energy is 0, by the largest total energy.
 """
 
 from collections.abc import Callable
@@ -35,12 +37,12 @@ WHY_EXACT = "flights and collisions are exact except for rounding; larger steps 
 
 
 def method(run: Run) -> str:
-    """Return the method of integration of the run, for the legend."""
+    """Return the name of the simulation method of a run, for the legend of a figure."""
     return f"time steps, Δt = {run.time_step:g}" if run.time_step else "event driven"
 
 
 def balance(run: Run) -> tuple[np.ndarray, str]:
-    """Return the conserved quantity at the times of observables, and the names of its terms."""
+    """Return the time series of the conserved quantity, and the names of its terms."""
     energy, words = run.observable("total_energy").value, "total"
     size = 1e-9 * np.abs(energy).max()
     for sign, term in ((1, "dissipated_energy"), (-1, "heat"), (-1, "work"), (-1, "drive_energy")):
@@ -52,7 +54,7 @@ def balance(run: Run) -> tuple[np.ndarray, str]:
 
 
 def change(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Return time and relative change of the conserved quantity."""
+    """Return the times and the relative changes of the conserved quantity."""
     time, total = run.observable("total_energy")
     if len(time) < 2:
         raise RunError(
@@ -67,7 +69,7 @@ def change(run: Run) -> tuple[np.ndarray, np.ndarray]:
 def means_of_windows(
     time: np.ndarray, value: np.ndarray, spaced: Callable = np.geomspace
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return means of a series over windows of growing length, at their mean times."""
+    """Return the mean times and mean values of a time series in consecutive windows."""
     cuts = spaced(time[0], time[-1], WINDOWS + 1)[1:-1]
     parts = np.searchsorted(cuts, time)
     number = np.bincount(parts)
@@ -77,9 +79,10 @@ def means_of_windows(
 
 
 def draw_species(axes: plt.Axes, run: Run, spaced: Callable) -> None:
-    """Draw kinetic energies solid and potential energies dotted, in a colour per species.
+    """Draw kinetic energies (solid lines) and potential energies (dotted lines) of all species.
 
-    `spaced` divides the time into windows: `np.linspace`, or `np.geomspace` for a logarithmic axis.
+    The function `spaced` divides the time into windows; it is `np.linspace`, or `np.geomspace` for
+    a logarithmic axis.
     """
     curves = [(name, "kinetic", "-") for name in run.names]
     if np.any(run.gravity):
@@ -99,7 +102,7 @@ def draw_species(axes: plt.Axes, run: Run, spaced: Callable) -> None:
 
 
 def of_each_method(runs: list[Run]) -> list[Run]:
-    """Return the first run of each method of integration and time step, at most `MOST_PANELS`."""
+    """Return the first run of each method and time step, but at most `MOST_PANELS` runs."""
     first: dict[float, Run] = {}
     for run in runs:
         first.setdefault(run.time_step, run)
@@ -107,7 +110,7 @@ def of_each_method(runs: list[Run]) -> list[Run]:
 
 
 def draw_total(axes: plt.Axes, run: Run) -> None:
-    """Draw the total energy and its parts on linear axes, in units of the input."""
+    """Draw the total energy of a run and its parts against time on linear axes."""
     time, total = run.observable("total_energy")
     axes.plot(time, total, color="black", lw=1.6, label="$E_{tot}$", zorder=3, **lone(time))
     for kind, colour in (("kinetic", COLOURS[2]), ("potential", COLOURS[3])):
@@ -123,7 +126,7 @@ def draw_total(axes: plt.Axes, run: Run) -> None:
 
 
 def draw(runs: list[Run]) -> plt.Figure:
-    """Draw the total for each method, the energies of species, and the changes of the total."""
+    """Draw total energies, energies of each species, and changes of the conserved quantity."""
     shown = of_each_method(runs)
     figure = plt.figure(figsize=(max(9, 3.2 * len(shown)), 10.5))
     grid = figure.add_gridspec(3, len(shown), height_ratios=(1, 1.3, 1.3))
@@ -147,7 +150,7 @@ def draw(runs: list[Run]) -> plt.Figure:
 
 
 def draw_changes(axes: plt.Axes, runs: list[Run]) -> None:
-    """Draw the largest change of the conserved quantity so far, for each run."""
+    """Draw for each run the largest change of the conserved quantity before each time."""
     worst = 0.0
     for run, colour in zip(runs, colours(len(runs), 2), strict=True):
         time, lost = change(run)

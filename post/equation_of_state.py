@@ -1,19 +1,20 @@
-"""Equation of state of hard disks: Z = P / (n kT) against packing fraction, by three methods.
+"""Equation of state of hard disks: Z = P / (n kT) against packing fraction, from three methods.
 
     python post/equation_of_state.py runs/state/eta_*.h5 -o state.png --csv state.csv
 
-The pressure P follows from the virial of the pair collisions, from the collision rate (equal disks)
-and from the force on the sides (walls).  Means are taken in equilibrium, which begins after
---equilibration or, without that option, when no observable drifts any longer. Errors include the
-autocorrelation of the pressure; `samples` is the effective number of independent samples of the
-virial. Runs at equal packing fraction are combined.  The gases must be elastic and without gravity.
-Thermal walls and driving are allowed if they all impose the same temperature; in this case kT is a
-measured mean whose error is included.  Walls exclude disks from a layer, so that the density in the
-interior is higher: the wall pressure therefore refers to the area accessible to the centres, and
-differs from the bulk pressure by a fraction of about 1/sqrt(N).  For disks of many radii r the
-curves show the equation of state that Santos, Yuste and Lopez de Haro (1999) derived for fluids.
-This equation depends on the radii only through <r>^2 / <r^2>, a ratio that must be the same for all
-runs.
+The pressure P is determined by three methods: from the virial of the pair collisions, from the
+collision rate (for equal disks), and from the force on the sides of the box (if they are walls).
+Means are taken in equilibrium, which begins after --equilibration or, without that option, when no
+observable drifts any longer.  Errors account for the autocorrelation of the pressure; in the table,
+`samples` is the effective number of independent samples of the virial. Runs with equal packing
+fraction are combined.  The disks must be elastic, and there must be no gravity.  Thermal walls and
+driving are allowed if all of them impose the same temperature; in this case kT is a measured mean,
+and its error is included.  Near walls there is a layer that the centres of disks cannot reach, and
+therefore the density in the interior is higher.  For this reason Z from the wall pressure refers to
+the area that centres can reach, and differs from Z of the bulk by a fraction of about 1/sqrt(N).
+For disks of many radii r, the curves show the equation of state of fluids derived by Santos, Yuste
+and Lopez de Haro (1999).  This equation depends on the radii only through the ratio <r>^2 / <r^2>,
+which must be the same for all runs.
 """
 
 from ricochet import Run, RunError, hard_disks
@@ -30,7 +31,7 @@ WAYS = {"virial": "virial", "rate": "collision rate", "walls": "force on the wal
 
 
 def likeness(runs: list[Run]) -> float:
-    """Return <r>^2 / <r^2>, on which the theoretical curves depend (1 for equal disks)."""
+    """Return the ratio <r>^2 / <r^2> of the radii, which determines the theoretical curves."""
     found = np.array([np.mean(run.radius) ** 2 / np.mean(run.radius**2) for run in runs])
     equal = np.array([np.ptp(run.radius) == 0 for run in runs])
     other = (np.abs(found - found[0]) > UNLIKE) | (equal != equal[0])
@@ -41,7 +42,10 @@ def likeness(runs: list[Run]) -> float:
 
 
 def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
-    """Return a row per packing fraction, empty where a method does not apply, and the notes."""
+    """Return a table row for each packing fraction, and warnings.
+
+    If a method does not apply to the runs, its cells are empty.
+    """
     rows, notes, alike = [], [], likeness(runs)
     for eta, same in by_packing(runs):
         row = {"packing": eta, "runs": len(same)}
@@ -59,7 +63,7 @@ def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
 
 
 def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
-    """Draw Z in the upper panel and its deviation from the reference in the lower panel."""
+    """Draw Z in the upper panel, and its deviation from a reference equation in the lower panel."""
     figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(8, 8), height_ratios=(2, 1))
     alike, fluid, solid = likeness(runs), np.linspace(0, 0.72, 200), np.linspace(0.715, 0.86, 100)
     laws = (hard_disks.henderson(fluid), hard_disks.simulated(fluid))

@@ -1,14 +1,15 @@
-"""Thermalisation time of two species under gravity, after which their kinetic energies agree.
+"""Time after which the kinetic energies of two species under gravity are equal.
 
     python post/equipartition.py runs/gravity_v0/*.h5 -o equipartition.png --csv times.csv
 
-Runs are combined by the width v0 of the start velocities; energies are means over the runs and over
-windows of --window.  T_therm is the time at which the relative difference of the energies falls
-below --within and stays there for three windows.  Its limits are the corresponding times for the
-difference minus its error and for the difference plus its error.  For a single run, the error is
-the fluctuation of the ratio of the energies in the second half of the time.  With 30 + 30 disks
-this error is 26 %, which is too large to determine T_therm: use many runs or many disks.  K_light
-and K_heavy in the table are means in equilibrium, which begins after --equilibration or, without
+Runs with the same width v0 of the initial velocity distribution are combined.  Energies are
+averaged over the runs, and over windows of time of the length --window.  The thermalisation time
+T_therm is the time at which the relative difference of the two energies falls below --within and
+stays below this value for three windows.  The error limits of T_therm are the times for the
+difference minus its error, and for the difference plus its error.  For a single run, the error is
+the fluctuation of the ratio of the energies in the second half of the run.  With 30 + 30 disks this
+error is 26 %, which is too large to determine T_therm: use many runs or many disks.  In the table,
+K_light and K_heavy are mean energies in equilibrium, which begins after --equilibration or, without
 that option, when no observable drifts any longer.
 """
 
@@ -32,7 +33,7 @@ import numpy as np
 
 
 class Approach(NamedTuple):
-    """Kinetic energies of the two species in time windows."""
+    """Kinetic energies of the two species in consecutive windows of time."""
 
     time: np.ndarray  # (W,) middles
     light: Estimate  # (W,)
@@ -42,7 +43,7 @@ class Approach(NamedTuple):
 
 
 def entry(time: np.ndarray, gap: np.ndarray, within: float = 0.1, lasting: int = 3) -> float:
-    """Return the time at which a difference (W,) falls below `within`, by interpolation.
+    """Return the interpolated time at which a difference (W,) falls below `within`.
 
     The difference must stay below `within` for at least `lasting` windows.
     """
@@ -55,7 +56,7 @@ def entry(time: np.ndarray, gap: np.ndarray, within: float = 0.1, lasting: int =
 
 
 def approach(runs: list[Run], width: float, within: float) -> Approach:
-    """Return the energies of the lightest and heaviest species per window, as means over runs."""
+    """Return the mean energies of the lightest and heaviest species in each window of time."""
     both = []
     for kind in lightest_and_heaviest(runs[0]):
         name = runs[0].names[kind]
@@ -74,7 +75,7 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
 
 
 def late(runs: list[Run], name: str, skip: float | None) -> Estimate:
-    """Return the mean over runs of an observable in equilibrium."""
+    """Return the mean of an observable in equilibrium over all runs."""
     means = []
     for run in runs:
         time, value = run.observable(name)
@@ -83,13 +84,13 @@ def late(runs: list[Run], name: str, skip: float | None) -> Estimate:
 
 
 def start_width(run: Run) -> float:
-    """Return v0, the largest `speed` in the input."""
+    """Return v0, which is the largest value of the input variable `speed`."""
     species = run.parameters.get("species", {})
     return max(float(species.get(name, {}).get("speed", 0.0)) for name in run.names)
 
 
 def draw(groups: list, results: list[Approach], until: float, within: float) -> plt.Figure:
-    """Draw a panel for each v0."""
+    """Draw the energies against time, in a separate panel for each v0."""
     figure, panels = plt.subplots(
         len(groups), 1, sharex=True, squeeze=False, figsize=(8, 1.2 + 2.1 * len(groups))
     )

@@ -1,11 +1,12 @@
-"""Export a run for other programs.
+"""Convert a run to a text file that other programs can read.
 
     python post/export.py runs/gas.h5 -o gas.xyz     extended XYZ, opens in OVITO as a 2D system
     python post/export.py runs/gas.h5 -o gas.csv     one line per disk and frame, for other programs
 
-Extended XYZ has two position columns, which makes OVITO treat the file as two-dimensional, and
-contains velocity, radius, mass, any further quantities of the disks (such as their orientation),
-the box and the time.  Numbers are written with all digits.
+The extended XYZ file contains two position coordinates of each disk; therefore OVITO treats the
+system as two-dimensional. The file also contains the velocity, radius, mass and any further
+quantities of each disk (such as the orientation), the box, and the time.  Numbers are written with
+full precision.
 """
 
 from pathlib import Path
@@ -21,7 +22,11 @@ PROPERTIES = "species:S:1:pos:R:2:velo:R:2:radius:R:1:mass:R:1"
 
 
 def rows(run: Run, frame: int) -> list[list[str]]:
-    """Return species, x, y, vx, vy, radius, mass and further quantities of each disk, as text."""
+    """Return the quantities of each disk in a frame as text.
+
+    The quantities are species, x, y, vx, vy, radius and mass, followed by any further quantities
+    that the run contains.
+    """
     species = [run.names[s - 1] for s in run.species]
     moving = [*run.position[frame].T, *run.velocity[frame].T, run.radius, run.mass]
     columns = [one.tolist() for one in (*moving, *(own[frame] for own in run.disk_data.values()))]
@@ -29,7 +34,10 @@ def rows(run: Run, frame: int) -> list[list[str]]:
 
 
 def xyz_frame(run: Run, frame: int) -> str:
-    """Return a frame as extended XYZ; the lower corner is the origin of positions."""
+    """Return a frame in extended XYZ format.
+
+    The origin of the positions is the lower left corner of the box.
+    """
     (width, height), (x0, y0) = run.edges, run.lower
     pbc = " ".join("T" if p else "F" for p in (*run.periodic, False))
     properties = ":".join([PROPERTIES, *(f"{name}:R:1" for name in run.disk_data), "id:I:1"])
@@ -45,7 +53,7 @@ def xyz_frame(run: Run, frame: int) -> str:
 
 
 def csv_frame(run: Run, frame: int) -> str:
-    """Return a frame as comma-separated lines."""
+    """Return the lines of a frame with comma-separated values."""
     time = str(run.time[frame])
     return "".join(
         ",".join((time, str(k), *disk)) + "\n" for k, disk in enumerate(rows(run, frame), start=1)

@@ -1,33 +1,36 @@
-"""Fields of a run in its steady state: density, flow, temperature, stress, heat flux.
+"""Density, flow, temperature, stress and heat flux as functions of position in a steady state.
 
     python post/fields.py runs/fourier/*.h5 --across x -o fourier.png --csv fourier.csv
     python post/fields.py runs/hopper.h5 --grid 16,24 -o hopper.png
 
-The fields of a cell are averages over the disks whose centres are in the cell: the number density n
-per accessible area (the area that centres can reach), the flow u (the mass-weighted mean of v), kT
-(the mean of m c^2 / 2, c = v - u), kT_x and kT_y (the means of m c_x^2 and m c_y^2), kT_rot (the
-mean of I omega^2, for disks that can rotate), the kinetic part of the stress (the sum of m c_a c_b
-per area) and the kinetic part of the heat flux (the sum of m c^2 c / 2 per area).  The collisional
-parts of stress and heat flux are not included.  Within a cell u is interpolated linearly from the
-neighbouring cells.  The frames after --equilibration are used; by default this is the second half
-of each run.  Errors follow from the differences between blocks of time, taken from all runs of one
-input (docs/theory.md).  A cell that contained disks in fewer than two blocks has a density only.
-The table contains kT, stress and heat flux of a cell only if at least three disks remain in the
-cell, whichever block of time is left out.  With --species the fields are those of one species,
-relative to the mean flow of that species.
+The box is divided into cells, and the fields in a cell are averages over the disks whose centres
+are in the cell.  The density n is the number of disks per accessible area (the area that centres
+can reach).  The flow velocity u is the mass-weighted mean of v.  With the relative velocity c = v -
+u, kT is the mean of m c^2 / 2, and kT_x and kT_y are the means of m c_x^2 and m c_y^2. If disks can
+rotate, kT_rot is the mean of I omega^2. The kinetic part of the stress is the sum of m c_a c_b per
+area, and the kinetic part of the heat flux is the sum of m c^2 c / 2 per area.  The collisional
+parts of stress and heat flux are not included.  Within a cell, u is interpolated linearly from the
+neighbouring cells.  The averages include the frames after --equilibration, by default the second
+half of each run.  Errors are determined from the differences between blocks of time, taken from all
+runs of one input (docs/theory.md).  If a cell contained disks in fewer than two blocks, only its
+density is calculated.  The table contains kT, stress and heat flux of a cell only if at least three
+disks remain in the cell when any one block of time is left out.  With --species, the fields of one
+species are calculated, relative to the mean flow of that species.
 
---grid also draws the stream function psi of the flux j = n u, where j_x = d psi / dy and j_y = -d
-psi / dx.  The contour lines of psi are the streamlines of the mean flow.  The longest arrow is the
-largest significant flow; arrows are pale where the flow is within its error (chi^2 of both
-components below 5.99, which noise exceeds in 5 % of the cells).
+With --grid, the script also draws the stream function psi of the particle flux j = n u, where j_x =
+d psi / dy and j_y = -d psi / dx.  The contour lines of psi are the streamlines of the mean flow.
+The longest arrow represents the largest significant flow.  Arrows are pale in cells without
+significant flow, where chi^2 of the two components is below 5.99. Noise alone exceeds this value in
+5 % of the cells.
 
-For equal disks between two walls, dashed lines show predicted profiles.  They start from
-temperature and flow in the middle and follow from the measured fluxes of momentum and energy at the
-walls, Enskog's viscosity and conductivity (Gass 1971) and the equation of state, without fitted
-parameters.  The band is the error that follows from the errors of the fluxes and of the values in
-the middle.  At a packing fraction of 0.2 the viscosity is 0.98 to 1.00 times Enskog's, the
-conductivity 1.03 to 1.05 times.  Squares are the temperatures and velocities of the walls; the
-table contains the predicted differences between wall and gas.
+For equal disks between two walls, dashed lines show predicted profiles without fitted parameters.
+A profile is calculated from the measured temperature and flow in the middle of the box, and from
+the measured fluxes of momentum and energy at the walls.  The calculation uses Enskog's viscosity
+and thermal conductivity (Gass 1971) and the equation of state.  The band shows the error of the
+predicted profile, which follows from the errors of the measured values.  At a packing fraction of
+0.2 the true viscosity is 0.98 to 1.00 times Enskog's viscosity, and the true thermal conductivity
+is 1.03 to 1.05 times Enskog's conductivity.  Squares show the temperatures and velocities of the
+walls.  The table contains the predicted differences between each wall and the gas next to it.
 """
 
 import argparse
@@ -49,7 +52,7 @@ from matplotlib.patches import Circle
 MOST_CELLS = 100_000
 LEAST_FLOW = 0.2  # smallest range of the axis of a flow velocity [thermal speeds]
 SIGNIFICANT = 5.99  # 95 % quantile of chi^2 with two degrees of freedom
-#: Text and dimension of the label of each field.
+#: Text and unit of the axis label of each field.
 LABELS = {
     "density": ("number density n", "number density"),
     "flow_x": ("flow $u_x$", "speed"),
@@ -66,7 +69,7 @@ PANELS = {"density": "A", "flow": "B", "temperature": "C"}  # panels with a pred
 
 
 def draw_profile(runs: list[Run], axis: int, x: np.ndarray, found: dict, law) -> plt.Figure:
-    """Draw density, flow along the walls, temperatures, stress and heat flux against an axis."""
+    """Draw density, flow, temperatures, stress and heat flux against the position along an axis."""
     run, flow = runs[0], f"flow_{'yx'[axis]}"
     figure, panels = plt.subplot_mosaic("AABBCC;DDDEEE", figsize=(12, 7))
     draw_fields(panels["A"], run.units, x, found, "density")
@@ -95,7 +98,7 @@ def draw_profile(runs: list[Run], axis: int, x: np.ndarray, found: dict, law) ->
 
 
 def draw_fields(axes: plt.Axes, units: Units, x: np.ndarray, found: dict, *names: str) -> None:
-    """Draw points with errors; cells without disks are gaps."""
+    """Draw points with error bars; there is a gap for each cell without disks."""
     there = [name for name in names if name in found]
     for name in there:
         label = LABELS[name][0] if len(there) > 1 else "measured"
@@ -105,13 +108,13 @@ def draw_fields(axes: plt.Axes, units: Units, x: np.ndarray, found: dict, *names
 
 
 def with_ends(run: Run, axis: int, x: np.ndarray) -> np.ndarray:
-    """Add to the positions x the smallest and the largest position that centres can reach."""
+    """Return the positions x together with the smallest and largest position of disk centres."""
     reach = run.radius[0]
     return np.concatenate([[run.lower[axis] + reach], x, [run.upper[axis] - reach]])
 
 
 def walls(run: Run, axis: int) -> list[dict]:
-    """Return position, kT and velocity of the two thermal sides across an axis."""
+    """Return position, kT and velocity of the two thermal sides at the ends of an axis."""
     each = zip(SIDES, run.sides, np.stack([run.lower, run.upper], axis=1).ravel(), strict=True)
     return [
         {
@@ -126,7 +129,7 @@ def walls(run: Run, axis: int) -> list[dict]:
 
 
 def at_walls(run: Run, axis: int, law: dict) -> list[dict]:
-    """Return kT and velocity of the walls, and of the gas next to them according to theory."""
+    """Return kT and velocity of each wall, and the predicted values of the gas next to the wall."""
     rows = []
     for wall in walls(run, axis):
         end = 0 if wall["wall"] == ACROSS[axis][0] else -1
@@ -138,7 +141,7 @@ def at_walls(run: Run, axis: int, law: dict) -> list[dict]:
 
 
 class Flow(NamedTuple):
-    """The mean flow on a grid of cells."""
+    """Mean flow in the cells of a grid."""
 
     u: np.ndarray  # (2, C) along x and y [speed]
     significant: np.ndarray  # (C,) whether the flow differs from 0 by more than its error explains
@@ -146,7 +149,7 @@ class Flow(NamedTuple):
 
 
 def flow_of(run: Run, cells: tuple[int, int], found: dict[str, Estimate]) -> Flow:
-    """Return the mean flow of measured fields and the stream function of the particle flux."""
+    """Return the measured mean flow, and the stream function of the particle flux."""
     parts = [found[name] for name in ("flow_x", "flow_y")]
     u, error = (np.array([part[k] for part in parts]) for k in (0, 1))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -156,10 +159,10 @@ def flow_of(run: Run, cells: tuple[int, int], found: dict[str, Estimate]) -> Flo
 
 
 def draw_arrows(axes: plt.Axes, run: Run, cells: tuple[int, int], flow: Flow, colour: str) -> None:
-    """Draw the flow as arrows; arrows of cells without significant flow are pale.
+    """Draw the flow as arrows, which are pale in cells without significant flow.
 
-    The arrow of the largest significant flow is as long as a cell.  If no flow is significant, the
-    largest flow sets the scale.
+    The arrow of the largest significant flow is as long as a cell.  If no cell has a significant
+    flow, the arrow of the largest flow is as long as a cell.
     """
     size = np.hypot(*flow.u)
     shown = size[flow.significant] if flow.significant.any() else size
@@ -178,7 +181,7 @@ def draw_arrows(axes: plt.Axes, run: Run, cells: tuple[int, int], flow: Flow, co
 def draw_grid(
     runs: list[Run], cells: tuple[int, int], found: dict[str, Estimate], flow: Flow
 ) -> plt.Figure:
-    """Draw maps of density and temperature, and the stream function with the flow as arrows."""
+    """Draw maps of density and temperature, and a map of the stream function with arrows."""
     run = runs[0]
     figure, panels = plt.subplots(1, 3, figsize=(16, 1 + 4.5 * run.edges[1] / run.edges[0]))
     sides = [np.linspace(run.lower[k], run.upper[k], cells[k] + 1) for k in (0, 1)]
@@ -202,7 +205,7 @@ def draw_grid(
 
 
 def cells_of(text: str) -> tuple[int, ...]:
-    """Parse N, the cells of a profile, or NX,NY, the cells of a map."""
+    """Convert a text to the number of cells of a profile (N), or to those of a map (NX,NY)."""
     cells = tuple(int(word) for word in text.split(","))
     if min(cells) < 1 or not 2 <= np.prod(cells) <= MOST_CELLS:
         raise argparse.ArgumentTypeError(f"the number of cells must be 2 to {MOST_CELLS}")

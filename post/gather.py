@@ -2,9 +2,9 @@
 
     python post/gather.py runs/scan --csv scan.csv
 
-The table has a row for each member run.  Its columns are the name; each changed variable by its
-full name; the seed; the state (finished, unfinished, failed) with the reason; the wall time in s;
-and the last value of each scalar observable.
+The table contains a row for each member run.  The columns are the name of the run, the values of
+all variables that the sweep changes, the seed, the state of the run (finished, unfinished or
+failed) with the reason, the wall time in seconds, and the last value of each scalar observable.
 """
 
 import argparse

@@ -1,22 +1,23 @@
-"""Distributions of squared speeds and heights of a gas under gravity, against exponential laws.
+"""Distributions of squared speeds and heights of a gas under gravity, with exponential laws.
 
     python post/gravity.py runs/gravity/long.h5 -o gravity.png --csv gravity.csv
 
-kT is the mean of the kinetic energy in equilibrium.  Equilibrium begins after --equilibration or,
-without that option, when no observable drifts any longer; the figure and the second table state why
-earlier frames are left out. The solid lines are P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~
-exp(-m g h / kT) for the height h of the centre above its lowest position.  These laws apply to a
-large number of point particles.  The dashed lines include two corrections.  If N disks share a
-fixed energy, (1 - e / (2 N kT))^(2 N - 2) replaces exp(-e / kT) for the energy e of a disk.  The
-centres of disks of species i are excluded from the area pi s_ij^2 around each disk of species j.
-To first order this multiplies the density of species i by exp(-sum_j pi s_ij^2 n_j(h)), a
-correction of a few per cent near the floor.  No line is drawn for the heights if this sum, computed
-for point particles, exceeds 0.5.
+The temperature kT is the mean kinetic energy of a disk in equilibrium.  Equilibrium begins after
+--equilibration or, without that option, when no observable drifts any longer.  The figure and the
+second table state why earlier frames are not used.  The solid lines show P(v^2) = m / (2 kT) exp(-m
+v^2 / 2 kT) and P(h) ~ exp(-m g h / kT), where h is the height of the centre of a disk above its
+lowest possible position.  These laws are exact for a large number of point particles.  The dashed
+lines include two corrections.  First, if the total energy of the N disks is fixed, the factor
+exp(-e / kT) for the energy e of a disk is replaced by (1 - e / (2 N kT))^(2 N - 2).  Second, the
+centres of disks of species i are excluded from the area pi s_ij^2 around each disk of species j,
+where s_ij is the sum of the two radii.  To first order, the excluded area multiplies the density of
+species i by exp(-sum_j pi s_ij^2 n_j(h)).  This correction is a few per cent near the floor.  If
+the sum, calculated for point particles, exceeds 0.5, no dashed line is drawn for the heights.
 
-Slopes are those of weighted lines fitted to the logarithm of the histograms, from 0 to 5 kT in the
-kinetic energy and from 1 to 5 kT in m g h.  The heights below 1 kT are left out, because the finite
-size of the disks flattens the distribution there.  The errors of the slopes follow from ten blocks
-of time.
+The slopes are determined by weighted linear fits to the logarithm of the histograms, for kinetic
+energies from 0 to 5 kT and potential energies m g h from 1 to 5 kT.  Smaller heights are not used
+in the fits, because the finite size of the disks flattens the distribution at these heights.  The
+errors of the slopes are determined from ten blocks of time.
 """
 
 from typing import NamedTuple
@@ -45,7 +46,7 @@ CROWDED = 0.5  # excluded fraction of the area at the floor up to which the firs
 
 
 class Samples(NamedTuple):
-    """Samples of one species in F frames, (F, n): squared speeds, their x parts, and heights."""
+    """Samples (F, n) of n disks of a species in F frames: v^2, v_x^2 and height."""
 
     mass: float
     radius: float
@@ -55,14 +56,14 @@ class Samples(NamedTuple):
 
 
 def samples(run: Run, kind: Species, frames: list[int]) -> Samples:
-    """Return squared speeds of a species and its heights above the lowest position of a centre."""
+    """Return the squared speeds and the heights of all disks of a species in the given frames."""
     squares = run.velocity[frames][:, kind.disks] ** 2
     height = run.position[frames][:, kind.disks, 1] - (run.lower[1] + kind.radius)
     return Samples(kind.mass, kind.radius, squares.sum(axis=2), squares[..., 0], height)
 
 
 def log_slope(values: np.ndarray, limits: tuple[float, float], bins: int = 30) -> float:
-    """Return the decay constant of a histogram from a weighted line fitted to its logarithm."""
+    """Return the decay constant of a histogram, from a weighted linear fit to its logarithm."""
     counts, edges = np.histogram(values, bins, limits)
     good = counts >= 5
     if good.sum() < 3:
@@ -72,12 +73,12 @@ def log_slope(values: np.ndarray, limits: tuple[float, float], bins: int = 30) -
 
 
 def sharers(run: Run) -> float:
-    """Return the number of disks that share a fixed total energy; infinity with a heat bath."""
+    """Return the number of disks that share a fixed total energy, or infinity with a heat bath."""
     return run.n_disks if run.nature.keeps_energy else np.inf
 
 
 def sharing(energy: np.ndarray, temperature: float, count: float) -> np.ndarray:
-    """Return the probability weight of an energy of one of `count` disks of fixed total energy."""
+    """Return the statistical weight of an energy of one disk, if the total energy is fixed."""
     if np.isinf(count):
         return np.exp(-energy / temperature)
     return np.maximum(1 - energy / (2 * count * temperature), 0) ** (2 * count - 2)
@@ -86,10 +87,10 @@ def sharing(energy: np.ndarray, temperature: float, count: float) -> np.ndarray:
 def crowded_heights(
     height: np.ndarray, species: list[Samples], pull: float, kt: float, width: float, share: float
 ) -> list[np.ndarray]:
-    """Return the densities at the heights (H,) with the excluded area to first order.
+    """Return the densities at the heights (H,), corrected to first order for the excluded area.
 
-    `width` is the width of the box that is accessible to centres, and `share` is the result of
-    `sharers`.  A disk excludes no area for its own centre.
+    `width` is the width of the area that the centres of disks can reach, and `share` is the result
+    of the function `sharers`.  The area that a disk excludes does not affect the disk itself.
     """
     numbers = [s.height.shape[1] for s in species]
     ideal = [sharing(s.mass * pull * height, kt, share) for s in species]
@@ -108,26 +109,26 @@ def crowded_heights(
 
 
 def normalised(x: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return a density that is normalised to the integral 1."""
+    """Return the values of a density after normalising its integral to 1."""
     return weight / np.trapezoid(weight, x)
 
 
 def law_slope(x: np.ndarray, density: np.ndarray, limits: tuple[float, float], count: int) -> float:
-    """Return the slope that `log_slope` finds for `count` values of an exact density."""
+    """Return the slope that `log_slope` would determine from `count` samples of a known density."""
     integral = scipy.integrate.cumulative_trapezoid(density, x, initial=0)
     ranks = (np.arange(count) + 0.5) / count
     return log_slope(np.interp(ranks, integral / integral[-1], x), limits)
 
 
 def crowding(run: Run, species: list[Samples], kt: float) -> float:
-    """Return the largest fraction of the area at the floor that is excluded for a species."""
+    """Return the largest fraction of the area near the floor that is excluded for a species."""
     radius, pull = np.array([(s.radius, s.height.shape[1] * s.mass) for s in species]).T
     taken = np.pi * np.add.outer(radius, radius) ** 2 @ pull * abs(run.gravity[1]) / kt
     return float(taken.max() / (run.edges[0] - 2 * radius[0]))
 
 
 def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Return the accessible heights, and `crowded_heights` (NaN if too much is excluded)."""
+    """Return the accessible heights and the corrected densities, or NaN at large excluded area."""
     free = run.edges - 2 * species[0].radius
     grid = np.linspace(0, free[1], 4001)
     if crowding(run, species, kt) > CROWDED:
@@ -136,7 +137,7 @@ def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, li
 
 
 def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[dict]:
-    """Return the fitted slopes divided by the slopes of the solid and of the dashed lines."""
+    """Return the ratios of the fitted slopes to the slopes of the solid and dashed lines."""
     temperature = kt[0]
     grid, crowded = heights(run, species, temperature)
     rows = []
@@ -161,7 +162,7 @@ def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[d
 
 
 def draw_histogram(panels, values: np.ndarray, top: float, colour: str, label: str) -> None:
-    """Draw a normalised histogram in a linear and a logarithmic panel, with errors from blocks."""
+    """Draw a normalised histogram with error bars in a linear and in a logarithmic panel."""
     bins = np.linspace(0, top, 51)
     blocks = np.array_split(values, min(BLOCKS, len(values)))
     parts = [binned(part.ravel(), bins).mean for part in blocks]
@@ -171,9 +172,12 @@ def draw_histogram(panels, values: np.ndarray, top: float, colour: str, label: s
 
 
 def draw(run: Run, species: list[Samples], result: list[dict], began: tuple) -> plt.Figure:
-    """Draw squared speeds above and heights below, linear on the left and logarithmic on the right.
+    """Draw the histograms of squared speeds (top row) and heights (bottom row).
 
-    `began` is the time of the first frame and the reason why earlier frames are left out.
+    The left panels have linear axes, and the right panels have logarithmic axes.
+
+    `began` contains the time of the first frame used, and the reason why earlier frames are not
+    used.
     """
     figure, panels = plt.subplots(2, 2, figsize=(11, 8), sharex="row")
     kt, g = result[0]["kT"], float(np.abs(run.gravity[1]))

@@ -1,28 +1,31 @@
-"""Cooling of a gas: Haff's law, and where the gas deviates from it.
+"""Cooling of a gas of inelastic disks, compared with Haff's law.
 
     python post/haff.py runs/haff/*.h5 -o haff.png --csv haff.csv
 
-Runs are combined by restitution xi.  The left panel shows the kinetic energy K against time in
-units of the initial mean free time 1/w0, and Haff's law K0 / (1 + (1 - xi^2) w0 t / 4)^2 (Haff
-1983).  The right panel shows K against collisions per disk, and an exponential law (van Noije and
-Ernst 1998).  The lower panels show the ratios of K to both laws.  Both laws apply while the gas is
-homogeneous.  At later times a part of K is the energy of flows, and K decreases more slowly. The
-boxes must be periodic with a total momentum of 0.  w0 follows from the equation of state; for
-unequal disks it is measured from the first collisions.  Both laws assume that all species have the
-same temperature, which is wrong for very different masses.
+Runs with the same coefficient of restitution xi are combined.  The left panel shows the kinetic
+energy K against time in units of the initial mean free time 1/w0, and Haff's law K0 / (1 + (1 -
+xi^2) w0 t / 4)^2 (Haff 1983).  The right panel shows K against collisions per disk, and an
+exponential law (van Noije and Ernst 1998).  The lower panels show the ratios of K to both laws.
+Both laws apply while the gas is homogeneous.  At later times a part of K is the energy of flows in
+the gas, and K decreases more slowly.  The boxes must be periodic, and the total momentum must be 0.
+For equal disks the initial collision rate w0 is calculated from the equation of state.  For unequal
+disks w0 is measured from the first collisions.  Both laws assume that all species have the same
+temperature; this assumption is wrong if the masses are very different.
 
-The cooling rate is -d ln K / d tau, where tau is the number of collisions per disk.  The
-homogeneous state ends at the tau beyond which the rate, averaged over two collisions per disk and
-over the runs, remains below 90 % of the predicted rate.  Beyond this tau the curves are pale; for
-several runs this tau is printed with an error. `rate` is the slope of a line fitted to ln K from
-tau = 2 to half of the tau at which the homogeneous state ends, or to the end of the run if it stays
-homogeneous.  The error of `rate` follows from the scatter of the runs.
+The cooling rate is -d ln K / d tau, where tau is the number of collisions per disk.  The rate is
+averaged over two collisions per disk and over the runs.  If this rate falls below 90 % of the
+predicted rate and stays below it, the homogeneous state is assumed to have ended at this tau.  At
+larger tau the curves are pale.  For several runs, the tau at the end of the homogeneous state is
+printed with an error.  The column `rate` is the rate determined by a linear fit to ln K.  The fit
+begins at tau = 2, and ends at half of the tau at which the homogeneous state ends.  If the gas
+stays homogeneous, the fit includes all later data.  The error of `rate` is determined from the
+scatter of the runs.
 
-Disks with velocity-dependent restitution (contact.restitution_law) follow another law, which
-assumes Maxwell's velocities (docs/theory.md).  For such disks the table contains, instead of the
-rate, the `exponent` p of K ~ t^-p in the last decade of time, which tends to 5/3.  If K differs
-from the law by more than 10 % at the end of a run that stays homogeneous, a note states by how much
-a slightly smaller cooling rate would change K.
+If the restitution depends on velocity (contact.restitution_law), K is compared with another law,
+which assumes a Maxwell distribution of velocities (docs/theory.md).  For such disks the table
+contains no rate.  It contains the `exponent` p of K ~ t^-p in the last decade of time, which
+approaches 5/3. If the gas stays homogeneous but K differs from the law by more than 10 % at the
+end, a warning states how much a slightly smaller cooling rate would change K.
 """
 
 from ricochet import Run
@@ -40,7 +43,7 @@ RATIO_TOP = 2.0  # largest upper limit of the axis of ratios
 
 
 def draw(runs: list[Run], groups: list, results: list) -> plt.Figure:
-    """Draw K against time and against collisions above, and the ratios of K to the laws below."""
+    """Draw K against time and collisions per disk, and below it the ratios of K to both laws."""
     figure, panels = plt.subplots(
         2, 2, sharex="col", sharey="row", figsize=(10, 7), height_ratios=(2, 1)
     )
@@ -81,7 +84,7 @@ def draw(runs: list[Run], groups: list, results: list) -> plt.Figure:
 
 
 def energies(groups: list, results: list) -> list[dict]:
-    """Return the energies after 5, 10 and 20 collisions per disk, as far as the runs reach."""
+    """Return the energies after 5, 10 and 20 collisions per disk, if the runs are long enough."""
     rows = []
     for (xi, members), (found, *_) in zip(groups, results, strict=True):
         reached = found["collisions_per_disk"]
@@ -96,14 +99,14 @@ def energies(groups: list, results: list) -> list[dict]:
 
 
 def expected(law: Restitution, found: dict) -> tuple[str, float]:
-    """Return the predicted cooling rate, or for viscoelastic disks the predicted exponent."""
+    """Return the predicted cooling rate, or the predicted exponent for viscoelastic disks."""
     if law.law == "constant":
         return "rate", haff_rate(law.xi)
     return "exponent", exponent(found["w0_t"], found["haff"])
 
 
 def rates(groups: list, results: list) -> list[dict]:
-    """Return the cooling rate, its prediction, and the end of the homogeneous state."""
+    """Return the measured and predicted cooling rate, and the end of the homogeneous state."""
     return [
         {
             "restitution": xi.name,
@@ -117,7 +120,7 @@ def rates(groups: list, results: list) -> list[dict]:
 
 
 def apart(xi: Restitution, found: dict, end: float) -> list[str]:
-    """Return the final K over its prediction if the cooling rate were slightly smaller."""
+    """Return the ratio of final K to the law for a slightly smaller cooling rate."""
     ratio, tau = found["K"].mean[-1] / found["law"][-1], found["collisions_per_disk"][-1]
     if not np.isnan(end) or abs(ratio - 1) < 1 - SLOW:
         return []

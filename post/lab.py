@@ -3,10 +3,11 @@
     python post/lab.py                 the inputs of the folder input/
     python post/lab.py my.nml          and your own input file
 
-Choose an input and move sliders: the simulation responds at once.  The page also plots speeds,
-energies and pressure.  Several runs can be shown side by side.  A run can be downloaded as an input
-file, as a script, and as an output file from which the program continues.  The script prints the
-address of the page and serves it until Ctrl-C, which also ends all simulations.
+On this page the user chooses an input file and moves sliders, and the simulation responds at once.
+The page also shows plots of speeds, energies and pressure.  Several runs can be shown side by side.
+The user can download a run as an input file, as a Python script that repeats it, or as an output
+file with which the simulation program can continue.  The script prints the address of the page.  It
+serves the page until the user presses Ctrl-C, which also ends all simulations.
 """
 
 import asyncio
@@ -24,7 +25,7 @@ from ricochet.script import Parser, launch
 
 from aiohttp import web
 
-#: Program of a worker process; the module `player` is in the folder of this file.
+#: Python code that a worker process executes.  The module `player` is in the folder of this file.
 WORKER = """import sys; sys.path[:0] = [{!r}]
 from player import scene
 from ricochet.pages.worker import work
@@ -32,7 +33,7 @@ work(scene)"""
 
 
 def routes(lab: Lab) -> dict:
-    """Return the function that answers the requests for each address."""
+    """Return for each address the function that answers its requests."""
     data = {"table": lab.table, "inputs": chooser([*lab.inputs.values()])}
 
     async def formed(request: web.Request) -> web.Response:
@@ -50,7 +51,7 @@ def routes(lab: Lab) -> dict:
 
 
 async def open_lab(lab: Lab, port: int, visit: bool) -> None:
-    """Serve the page until a signal arrives."""
+    """Serve the page of the laboratory until a signal arrives."""
     lab.prepare()
     try:
         async with serving(application(routes(lab), frames="'self'"), port) as (address, stop):
@@ -63,7 +64,7 @@ async def open_lab(lab: Lab, port: int, visit: bool) -> None:
 
 
 def port(text: str) -> int:
-    """Parse a port number."""
+    """Convert a text to a port number."""
     if not text.isdecimal() or int(text) > 65535:
         raise ArgumentTypeError(f"'{text}' is not a port: allowed are 0 (any free port) to 65535")
     return int(text)

@@ -1,24 +1,25 @@
-"""Diffusion of a tracer in the random Lorentz gas (random fixed circles) against density.
+"""Diffusion of a tracer among fixed, randomly placed circles (random Lorentz gas).
 
     python post/lorentz.py runs/lorentz/runs/*.h5 -o lorentz.png --csv lorentz.csv
 
-Each run holds one disk in a periodic box of equal circular obstacles, with frames at equal steps of
-time.  The density is n R^2, with n obstacles per area and R the sum of the two radii.  D is a
-quarter of the slope of the mean square displacement between the two lags --lags, in mean free
-times.  At these lags the slope is nearly constant: the velocity autocorrelation is negative and
-decays as 1/t^2.  Runs of the same density are combined; the error is the standard error of the mean
-over these runs.
+Each run contains one disk in a periodic box with equal circular obstacles, and has frames at equal
+intervals of time.  The reduced density is n R^2, where n is the number of obstacles per unit of
+area, and R the sum of the radii of disk and obstacle.  The diffusion coefficient D is a quarter of
+the slope of the mean square displacement between the two values of --lags, in units of the mean
+free time.  Between these lags the slope is nearly constant, because the velocity autocorrelation is
+small: it is negative and decays as 1/t^2. Runs with the same density are combined, and the error is
+the standard error of the mean.
 
-D is divided by D_0 = 3 v / (16 n R), the diffusion coefficient of the Boltzmann equation, which is
-exact in the limit of low density.  The curves are the density expansion for scatterers that may
-overlap,
+The figure shows D / D_0, where D_0 = 3 v / (16 n R) is the diffusion coefficient of the Boltzmann
+equation, which is exact in the limit of low density.  The curves show the density expansion for
+scatterers that may overlap,
 
     D_0/D = 1 - (4/3) nR^2 ln(nR^2) - 0.8775 nR^2 + 4.519 (nR^2 ln(nR^2))^2,
 
-of van Leeuwen and Weijland, Physica 36, 457 (1967) and 38, 35 (1968), with and without the last
-term.  (Its coefficients are quoted from memory: those papers could not be consulted.)  The mean
-free time is 1/(2 n R v) at every density, without corrections; the table contains the measured mean
-free time divided by this value.
+by van Leeuwen and Weijland, Physica 36, 457 (1967) and 38, 35 (1968), with and without the last
+term.  (The coefficients are quoted from memory, because these papers could not be consulted.) The
+mean free time is 1/(2 n R v) exactly, at every density.  The table contains the measured mean free
+time divided by this value.
 """
 
 from ricochet import Run, RunError
@@ -31,14 +32,14 @@ import numpy as np
 
 
 def expansion(density: np.ndarray | float, squared: bool = True) -> np.ndarray:
-    """Return D/D_0 from the expansion in the density n R^2, with or without the last term."""
+    """Return D / D_0 from the expansion in the density, with or without its last term."""
     n = np.asarray(density, dtype=float)
     logarithm = n * np.log(n)
     return 1 / (1 - 4 / 3 * logarithm - 0.8775 * n + squared * 4.519 * logarithm**2)
 
 
 def density_of(run: Run) -> float:
-    """Return n R^2 of a run of one disk among equal circular obstacles."""
+    """Return the reduced density n R^2 of a run of one disk among equal circular obstacles."""
     allow(run, "the Lorentz gas consists of one disk among fixed circles", "obstacles")
     radii = np.unique([obstacle.radius for obstacle in run.obstacles])
     inside = any(obstacle.inside for obstacle in run.obstacles)
@@ -49,7 +50,7 @@ def density_of(run: Run) -> float:
 
 
 def diffusion(run: Run, lags: tuple[float, float]) -> dict[str, float]:
-    """Return D/D_0 between two lags (in mean free times) and the reduced mean free time."""
+    """Return D / D_0 between two lags in mean free times, and the reduced mean free time."""
     speed = float(run.speed(0)[0])
     reach = float(run.radius[0] + run.obstacles[0].radius)
     free = reach / (2 * density_of(run) * speed)
@@ -68,7 +69,7 @@ def diffusion(run: Run, lags: tuple[float, float]) -> dict[str, float]:
 
 
 def draw(rows: list[dict]) -> plt.Figure:
-    """Draw D/D_0 against the density, with Boltzmann's limit and the expansion."""
+    """Draw D / D_0 against the density, with the Boltzmann limit and the density expansion."""
     figure, axes = plt.subplots(figsize=(6.5, 4.5))
     n, ratio, error = (
         np.array([row[name] for row in rows], dtype=float)

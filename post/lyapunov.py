@@ -1,16 +1,17 @@
-"""Divergence of neighbouring trajectories, and the Lyapunov exponent.
+"""Divergence of initially close trajectories, and the Lyapunov exponent.
 
     python post/lyapunov.py runs/pairs/*.h5 -o lyapunov.png --csv lyapunov.csv
 
-The runs are paired in the given order.  The two runs of a pair start from almost the same state and
-have frames at the same times.  Their distance is the Euclidean distance of the positions of all
-disks, with the nearest images at periodic sides.  This distance grows as exp(lambda t) until it
-reaches the size of the billiard.  A straight line is fitted to the logarithm of the distance of
-each pair, in the same interval of time for all pairs.  The interval ends when the first pair
-reaches the distance --largest, and begins at the fraction --fit-from of its end.  Before this
-interval the separation still turns into the direction of fastest growth.  lambda is the mean of the
-slopes, with its error. Gases that cool are refused, because they have no constant rate of
-divergence.
+The runs are combined to pairs in the given order.  The two runs of a pair start from almost the
+same state and have frames at the same times.  The distance between two runs is the Euclidean
+distance between the positions of all disks, calculated with the nearest periodic images.  This
+distance grows as exp(lambda t) until it reaches the size of the box.  A straight line is fitted to
+the logarithm of the distance of each pair, in the same interval of time for all pairs.  The
+interval ends when the first pair reaches the distance --largest, and begins at the fraction
+--fit-from of its end.  Earlier times are not used, because the separation has not yet turned into
+the direction of fastest growth.  The Lyapunov exponent lambda is the mean slope of the fitted
+lines, and its error is the standard error of the mean.  The script rejects gases that cool, because
+their rate of divergence is not constant.
 """
 
 from typing import NamedTuple
@@ -26,7 +27,7 @@ import numpy as np
 
 
 class Divergence(NamedTuple):
-    """Logarithms of the distances of pairs, and lines fitted to them from `begin` to `end`."""
+    """Logarithms of the distances of all pairs, and straight lines fitted between two times."""
 
     time: np.ndarray  # (T,)
     logarithm: np.ndarray  # (P, T)
@@ -37,7 +38,7 @@ class Divergence(NamedTuple):
 
 
 def distance(one: Run, other: Run) -> np.ndarray:
-    """Return the Euclidean distance (T,) of two runs in the space of all positions."""
+    """Return the Euclidean distance (T,) between the positions of all disks in two runs."""
     frames = min(one.n_frames, other.n_frames)
     if one.n_disks != other.n_disks or not np.array_equal(one.time[:frames], other.time[:frames]):
         raise RunError(f"{other.path}: not the same disks at the same times as in {one.path}")
@@ -46,9 +47,10 @@ def distance(one: Run, other: Run) -> np.ndarray:
 
 
 def divergence(time: np.ndarray, apart: np.ndarray, largest: float, begin: float) -> Divergence:
-    """Fit the distances (P, T) of P pairs.
+    """Fit straight lines to the logarithms of the distances (P, T) of P pairs.
 
-    `begin` is a fraction of the time at which a distance reaches `largest`.
+    The fits end when the first distance reaches `largest`.  `begin` is the start of the fits as a
+    fraction of this time.
     """
     with np.errstate(divide="ignore"):
         logarithm = np.log(apart)
@@ -66,7 +68,7 @@ def divergence(time: np.ndarray, apart: np.ndarray, largest: float, begin: float
 
 
 def draw(found: Divergence, units: Units) -> plt.Figure:
-    """Draw each pair as a thin line, and the geometric mean thick with the fitted line."""
+    """Draw the distance of each pair (thin lines), the geometric mean (thick line) and its fit."""
     figure, axes = plt.subplots(figsize=(7, 5))
     for track in found.logarithm:
         axes.semilogy(found.time, np.exp(track), color=COLOURS[0], lw=0.6, alpha=0.4)

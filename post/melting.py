@@ -1,14 +1,16 @@
-"""Melting of hard disks: pressure against packing fraction, a curve for each number of disks.
+"""Melting of hard disks: pressure against packing fraction for each number of disks.
 
     python post/melting.py runs/melting/*/*.h5 -o melting.png --csv melting.csv
 
-P* = P d^2 / kT follows from the virial, where d is the diameter.  P* is a mean in equilibrium,
-which begins after --equilibration or, without that option, when no observable drifts any longer.
-The disks must be equal and the box periodic.  Between the packing fractions 0.700 and 0.716 liquid
-and hexatic phase coexist at P* = 9.185.  In a finite box the pressure has a loop instead, which is
-caused by the interface between the phases and flattens as N grows.  For comparison: Engel et al.,
-Phys. Rev. E 87, 042134 (2013); N = 128^2: Li et al., J. Chem. Phys. 157, 234111 (2022). Correlation
-times are long near melting, so that the warnings about errors are important.
+The reduced pressure is P* = P d^2 / kT, where d is the diameter of the disks and P is calculated
+from the virial. P* is averaged in equilibrium, which begins after --equilibration or, without that
+option, when no observable drifts any longer.  The disks must be equal and the box must be periodic.
+In an infinite system, the liquid and the hexatic phase coexist at P* = 9.185 between the packing
+fractions 0.700 and 0.716. In a finite box the pressure is not constant in this range but forms a
+loop.  The loop is caused by the interface between the phases, and becomes flatter for larger N.
+Published values are from Engel et al., Phys. Rev. E 87, 042134 (2013), and for N = 128^2 from Li et
+al., J. Chem. Phys. 157, 234111 (2022).  The warnings about errors are important here, because
+correlation times are long near melting.
 """
 
 from ricochet import Run
@@ -23,7 +25,7 @@ import numpy as np
 
 
 def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
-    """Return a row for each number of disks and packing fraction, and the notes."""
+    """Return a table row for each number of disks and packing fraction, and warnings."""
     rows, notes = [], []
     for count, own in grouped(runs, lambda run: run.n_disks):
         for eta, same in by_packing(own):
@@ -35,7 +37,7 @@ def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
 
 
 def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
-    """Draw the measured points with error bars and the published values as lines."""
+    """Draw the measured values as points with error bars, and published values as lines."""
     figure, axes = plt.subplots(figsize=(8, 5.5))
     for (name, points), style in zip(MELTING.items(), (":", "--", "-"), strict=True):
         axes.plot(*np.transpose(points), ls=style, color="0.4", lw=1, label=name)

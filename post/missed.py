@@ -1,27 +1,30 @@
-"""Fraction of collisions that time-stepped runs miss.
+"""Fraction of collisions that time-stepped simulations fail to detect.
 
     python post/missed.py runs/gravity/rates/*.h5 -o missed.png --csv missed.csv
 
 The script requires event-driven runs and time-stepped runs with the same seeds.  For each time step
 dt it computes the fraction of pair collisions that are missing relative to the event-driven run of
-the same seed.  The first --equilibration collisions per disk are left out, and the fraction is
-averaged over the seeds.  The result is compared with the fraction P that is derived below. With a
-single pair of runs the error follows from the fluctuations of both collision rates in time.  For
-small time steps these fluctuations exceed the fraction of missed collisions, and several seeds are
-required.
+the same seed.  The first --equilibration collisions per disk are not counted, and the fraction is
+averaged over the seeds.  The result is compared with the predicted fraction P, which is derived
+below.  If there is only one pair of runs, the error is determined from the fluctuations of the two
+collision rates in time.  For small time steps these fluctuations are larger than the fraction of
+missed collisions; therefore runs with several seeds are required.
 
-Two disks with the relative speed g and the impact parameter b overlap on a chord of length 2 l,
-l = sqrt(s^2 - b^2), where s is their diameter.  They approach on the first half of the chord only,
-for the time l / g.  An overlap that is detected later is ignored, because the disks already
-separate.  The phase of the steps is random, so that a collision is missed with the probability 1 -
-l / (g dt) if that is positive.  With b uniform in -s..s and q = g dt / s the mean is
+Two disks of diameter s with the relative speed g and the impact parameter b would overlap along a
+chord of length 2 l, where l = sqrt(s^2 - b^2).  They approach each other only along the first half
+of the chord, for the time l / g.  If an overlap is detected later, it is ignored, because the disks
+already separate.  The time between the first contact and the next time step is random.  Therefore
+the probability that a collision is missed is 1 - l / (g dt), or 0 if this expression is negative.
+The impact parameter b is distributed uniformly between -s and s.  With q = g dt / s the mean
+probability is
 
     P(q) = 1 - sqrt(1 - q^2) - (asin q - q sqrt(1 - q^2)) / (2 q)    for q < 1,
     P(q) = 1 - pi / (4 q)                                            beyond; q^2 / 6 for small q.
 
-The relative speeds of colliding pairs have a density ~ g^2 exp(-mu g^2 / 2 kT) with the reduced
-mass mu; pairs of species i and j collide at a rate ~ N_i N_j / (h_i + h_j) / sqrt(mu), where h = kT
-/ (m g) are their scale heights.
+The probability density of the relative speeds of colliding pairs is proportional to g^2 exp(-mu g^2
+/ 2 kT), where mu is the reduced mass.  The collision rate of disks of species i with disks of
+species j is proportional to N_i N_j / (h_i + h_j) / sqrt(mu).  Here h_i = kT / (m_i a) is the scale
+height of species i in a gravitational field of acceleration a.
 """
 
 from itertools import combinations_with_replacement
@@ -39,7 +42,7 @@ SPEEDS = np.linspace(0, 12, 2001)  # in units of sqrt(kT / mu)
 
 
 def missed_share(q: np.ndarray) -> np.ndarray:
-    """Return P(q), the fraction of collisions missed at the relative speed g, with q = g dt / s."""
+    """Return P(q), the mean probability that a collision at q = g dt / s is missed."""
     q = np.asarray(q, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         short = np.minimum(q, 1)
@@ -50,7 +53,7 @@ def missed_share(q: np.ndarray) -> np.ndarray:
 
 
 def expected_share(run: Run, step: float, temperature: float) -> float:
-    """Return the mean of P over all pairs of species of a dilute gas in equilibrium."""
+    """Return the mean of P over all collisions of a dilute gas in equilibrium."""
     shares, rates = [], []
     pull = float(np.linalg.norm(run.gravity))
     for a, b in combinations_with_replacement(kinds_of_disks(run), 2):
@@ -64,7 +67,7 @@ def expected_share(run: Run, step: float, temperature: float) -> float:
 
 
 def rate_and_temperature(run: Run, skip: float | None) -> tuple[SeriesMean, float]:
-    """Return the pair collisions per disk and time and the temperature kT in equilibrium."""
+    """Return the number of pair collisions per disk and unit of time, and kT, in equilibrium."""
     time, tau = run.collisions_per_disk
     first = int(np.searchsorted(time, start_of_equilibrium(run, skip)))
     if first >= len(time) - 1:
@@ -74,10 +77,10 @@ def rate_and_temperature(run: Run, skip: float | None) -> tuple[SeriesMean, floa
 
 
 def missed_of_pairs(rates: list[SeriesMean], exact: list[SeriesMean]) -> Estimate:
-    """Return the fraction of collisions that time steps miss, from runs with equal seeds.
+    """Return the fraction of missed collisions, determined from pairs of runs with equal seeds.
 
-    The error follows from the scatter of the pairs or, for a single pair, from the fluctuations of
-    both rates.
+    The error is determined from the scatter of the pairs.  For a single pair it is determined from
+    the fluctuations of the two collision rates.
     """
     shares = [1 - one.mean / other.mean for one, other in zip(rates, exact, strict=True)]
     if rates == exact:
@@ -89,7 +92,7 @@ def missed_of_pairs(rates: list[SeriesMean], exact: list[SeriesMean]) -> Estimat
 
 
 def compare(runs: list[Run], skip: float | None) -> list[dict]:
-    """Return a row in percent for the event-driven runs (dt = 0) and for each time step."""
+    """Return a table row for the event-driven runs (dt = 0) and for each time step, in percent."""
     groups = grouped(runs, lambda run: run.time_step)
     if groups[0][0] != 0 or len(groups) < 2:
         raise RunError("event-driven and time-stepped runs are required")
@@ -111,7 +114,7 @@ def compare(runs: list[Run], skip: float | None) -> list[dict]:
 
 
 def draw(runs: list[Run], rows: list[dict]) -> plt.Figure:
-    """Draw the measured and the expected fraction of missed collisions against dt."""
+    """Draw the measured and the predicted fraction of missed collisions against dt."""
     figure, axes = plt.subplots(figsize=(6.5, 4.5))
     names = ("dt", "missed_percent", "missed_percent_error")
     dt, share, error = (np.array([row[name] for row in rows[1:]]) for name in names)

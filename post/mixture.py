@@ -3,12 +3,13 @@
     python post/mixture.py runs/mixture/*.h5 -o mixture.png --csv mixture.csv
 
 Equilibrium begins after --equilibration or, without that option, when no observable drifts any
-longer.  The frames selected by --frames are thinned out until they are at least --min-separation
-collisions per disk apart.  Errors follow from the scatter of the runs or, for a single run, from
-the autocorrelation over its frames.  In theory each species has <K> = kT and <v> = sqrt(pi kT / 2
-m).  In a periodic box <K> is smaller by the ratio of the disk's mass to the total mass.  kT is
-exact if the kinetic energy is conserved.  With thermal walls, driving or rotation kT is the
-measured mean over all disks in equilibrium, with an error.
+longer.  Frames selected by --frames are used only if they are at least --min-separation collisions
+per disk apart.  Errors are determined from the scatter of the runs.  For a single run they are
+determined from the fluctuations between its frames, including the autocorrelation.  The theoretical
+values for each species are <K> = kT and <v> = sqrt(pi kT / 2 m).  In a periodic box <K> is smaller
+than kT by the fraction m / M, where M is the total mass of all disks.  If the kinetic energy is
+conserved, kT is known exactly.  With thermal walls, driving or rotation, kT is the measured mean
+over all disks in equilibrium, and has an error.
 """
 
 from ricochet import Run
@@ -32,13 +33,13 @@ BINS = 60  # bins of a histogram
 
 
 def pooled(runs: list[Run], frames: list[list[int]], name: str) -> np.ndarray:
-    """Return the speeds of all disks of a species in these frames."""
+    """Return the speeds of all disks of a species in the given frames of all runs."""
     each = zip(runs, frames, strict=True)
     return np.concatenate([run.speed(k)[run.of_species(name)] for run, own in each for k in own])
 
 
 def table(runs: list[Run], frames: list[list[int]], skip: float | None = None) -> list[dict]:
-    """Return mean speed and energy of each species, initially and in equilibrium, with theory."""
+    """Return mean speed and energy of each species, at the start and in equilibrium."""
     rows = []
     for kind in kinds_of_disks(runs[0]):
         name, mass = kind.name, kind.mass
@@ -66,7 +67,10 @@ def table(runs: list[Run], frames: list[list[int]], skip: float | None = None) -
 
 
 def speed_bins(start: np.ndarray, top: float) -> np.ndarray:
-    """Return about 60 bins up to `top`; a common initial speed is the centre of a bin."""
+    """Return about 60 bins of speed up to `top`.
+
+    If all initial speeds are equal, this speed is the centre of a bin.
+    """
     speed, width = float(np.mean(start)), top / BINS
     if 0 < speed < top and np.ptp(start) < 1e-9 * speed:
         width = speed / max(1, round(speed / width))
@@ -74,7 +78,7 @@ def speed_bins(start: np.ndarray, top: float) -> np.ndarray:
 
 
 def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Figure:
-    """Draw a row of two panels for each species: the start and equilibrium."""
+    """Draw two panels for each species: the speeds at the start and in equilibrium."""
     names = runs[0].names
     figure, panels = plt.subplots(
         len(names), 2, sharex=True, squeeze=False, figsize=(10, 3.2 * len(names))

@@ -2,27 +2,28 @@
 
     python post/rates.py runs/bulk.h5 -o rates.png --csv rates.csv
 
-All runs must be of the same system, without gravity, and are combined.  Means are taken in
-equilibrium, which begins after --equilibration or, without that option, when no observable drifts
-any longer.  Errors include the autocorrelation of each quantity, and `samples` is its effective
-number of independent samples.  Warnings explain why an error may be unreliable.  If the kinetic
-energy is conserved, kT of each run is exact, and the results of all runs are scaled to the mean kT.
-With thermal walls, a thermostat of one temperature or rotating disks, kT is a measured mean with an
-error.
+The script combines runs of one system without gravity.  Means are taken in equilibrium, which
+begins after --equilibration or, without that option, when no observable drifts any longer.  Errors
+account for the autocorrelation of each quantity; in the table, `samples` is the effective number of
+independent samples.  Warnings explain why an error may be unreliable.  If the kinetic energy is
+conserved, kT of each run is exact, and the results of all runs are scaled to the mean kT.  With
+thermal walls, with a thermostat of one temperature, or for rotating disks, kT is a measured mean
+with an error.
 
 The pressure is measured from the virial of the pair collisions and from the momentum transfer to
-each side.  The pressure on the sides is slightly larger, because centres stay at least a radius
-away from sides.  With an event log the table also contains w_ij, the rate at which a disk of
-species i collides with disks of species j, and the free paths are analysed.  The free path of a
-disk in a frame is the product of its speed and the time from its last collision before the frame to
-its first collision after the frame.  Long paths occur in more frames; therefore each path is
-weighted with 1 over its duration.  The errors follow from the scatter of runs or, for a single run,
-of blocks of frames.  The line is the prediction for equal disks and molecular chaos (Boltzmann,
-Enskog).  Free paths are not defined for driven disks, whose velocities change between collisions.
+each side.  The pressure on the sides is slightly larger, because the centre of a disk cannot be
+closer to a side than the radius.  If the run has an event log, the table also contains w_ij, the
+rate at which a disk of species i collides with disks of species j, and the script analyses the free
+paths.  The free path of a disk in a frame is the distance that it travels between its last
+collision before the frame and its first collision after the frame.  Because long paths occur in
+more frames than short paths, the weight of each path is the inverse of its duration.  The errors
+are determined from the scatter of the runs or, for a single run, from the scatter of blocks of
+frames.  The line shows the prediction for equal disks and molecular chaos (Boltzmann, Enskog).
+Free paths are not defined for driven disks, whose velocities change between collisions.
 
-For runs that lose energy, or whose walls differ in temperature, only the free paths are analysed.
-The frames used are those after --equilibration; without that option they are the frames without
-drift or, in a gas that cools, the frames later than 15 collisions per disk.
+If the disks lose energy, or if the walls have different temperatures, the script analyses only the
+free paths.  It uses the frames after --equilibration.  Without that option, it uses the frames in
+which no observable drifts or, if the gas cools, the frames later than 15 collisions per disk.
 """
 
 from ricochet import Run, RunError, statistics, thermodynamics as td
@@ -36,8 +37,8 @@ import numpy as np
 
 BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
 BLOCKS = 8  # number of blocks of frames of a single run
-#: Traits with which free flights are straight, have a constant speed, and have the same
-#: distribution of lengths everywhere in the box.
+#: Traits of runs whose free flights can be analysed: the flights are straight, the speed is
+#: constant, and the distribution of free paths is the same everywhere in the box.
 STRAIGHT = {
     "walls",
     "mixture",
@@ -51,7 +52,7 @@ STRAIGHT |= {"thermal_walls", "unequal_temperatures", "sliding_surfaces"}
 
 
 def check(runs: list[Run]) -> None:
-    """Raise an error for runs with obstacles or gravity, and for runs of different systems."""
+    """Raise an error if the systems differ, or if they contain obstacles or gravity."""
     first = runs[0]
     for run in runs:
         allow(run, "rates are those of a gas without obstacles and gravity", *td.FLUID, *STRAIGHT)
@@ -63,14 +64,14 @@ def check(runs: list[Run]) -> None:
 
 
 def scales(runs: list[Run]) -> np.ndarray:
-    """Return the factors that scale kT of runs with conserved energy to the mean kT."""
+    """Return the factors by which kT of each run is scaled to the mean kT."""
     kept = all(run.nature.keeps_kinetic_energy for run in runs)
     kts = np.array([td.kt_at_start(run) if kept else 1.0 for run in runs])
     return kts.mean() / kts
 
 
 def over_all(runs: list[Run], skip: float | None, notes: list[str]) -> dict[str, SeriesMean]:
-    """Return the results with errors, all scaled to one temperature."""
+    """Return all results with errors, scaled to one temperature."""
     kts = scales(runs)
     found = [td.rates(run, skip) for run in runs]
     means = {}
@@ -83,7 +84,7 @@ def over_all(runs: list[Run], skip: float | None, notes: list[str]) -> dict[str,
 
 
 def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
-    """Return the mean pressure of the runs against time: from the virial, and on the sides."""
+    """Return the mean pressure of the runs against time, from the virial and from the sides."""
     cuts = np.linspace(0, min(run.collisions_per_disk.time[-1] for run in runs), FINE + 1)
 
     def growth(*parts: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -109,7 +110,7 @@ def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
 
 
 def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lengths and weights of the free paths in all frames."""
+    """Return the lengths and the statistical weights of the free paths in all frames."""
     allow(run, "free paths require disks whose velocities change in collisions only", *STRAIGHT)
     log = run.event_log()
     disk = np.concatenate([log.i, log.j[log.j > 0]])
@@ -130,10 +131,12 @@ def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndar
 def mean_and_density(
     runs: list[Run], skip: float | None = None
 ) -> tuple[Estimate, Estimate] | None:
-    """Return the mean free path and the density of reduced free paths, or None without a log.
+    """Return the mean free path and the probability density of reduced free paths.
 
-    The unit of a reduced path is the mean free path.  Errors follow from the scatter of the runs
-    or, for a single run, of blocks of frames.
+    The result is None if the run has no event log.
+
+    A reduced path is the length of a path divided by the mean free path.  Errors are determined
+    from the scatter of the runs or, for a single run, from the scatter of blocks of frames.
     """
     parts = [free_paths(run, skip) for run in runs if td.has_log(run)]
     if not parts or sum(len(path) for path, _ in parts) == 0:
@@ -154,7 +157,7 @@ def mean_and_density(
 
 
 def draw_pressure(axes: plt.Axes, curves: dict[str, Curve], mean: SeriesMean, start: float) -> None:
-    """Draw the pressure against time with its error, and its mean in equilibrium."""
+    """Draw the pressure against time with its error, and the mean pressure in equilibrium."""
     x = curves["virial"].x
     end = x[-1] + x[0]
     for (way, curve), colour in zip(curves.items(), COLOURS, strict=False):
@@ -170,7 +173,7 @@ def draw_pressure(axes: plt.Axes, curves: dict[str, Curve], mean: SeriesMean, st
 
 
 def draw_paths(axes: plt.Axes, paths: tuple[Estimate, Estimate], equal: bool) -> None:
-    """Draw the measured distribution of free paths and that expected for molecular chaos."""
+    """Draw the measured distribution of free paths and the prediction for molecular chaos."""
     mean, height = paths
     label = f"measured, $\\ell$ = {' ± '.join(statistics.rounded_to_error(*mean))}"
     bars(axes, height, BINS, color=COLOURS[0], label=label)
@@ -183,7 +186,7 @@ def draw_paths(axes: plt.Axes, paths: tuple[Estimate, Estimate], equal: bool) ->
 
 
 def table(runs: list[Run], start: float, means: dict, path: Estimate | None) -> list[dict]:
-    """Return a row for each quantity: first exact quantities, then those with an error."""
+    """Return a table row for each quantity; quantities with an error are at the end."""
     begin = "equilibrium_from" if means else "from_time"
     exact = {"packing": td.packing(runs[0]), begin: start}
     momentum = np.mean([td.drift(run) * run.mass.sum() for run in runs], axis=0)

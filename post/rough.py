@@ -5,11 +5,11 @@
 The left panel shows T = m <v^2> / 2 and T_rot = I <omega^2> against collisions per disk; the dashed
 curves are the theory for Maxwell's velocities (Luding et al. 1998).  The right panel shows T_rot /
 T and two values of its steady state: the prediction of that theory and, where available, the result
-of direct simulations of the Boltzmann equation, which is up to 6 % lower.  Both apply to a
-homogeneous dilute gas of equal disks without Coulomb friction.  The flow that develops in a cooling
-gas contributes to T and lowers the ratio: by 3.8 to 4.6 % at a packing fraction of 0.02 and by 0.3
-to 0.5 % at 0.0025, and by more if the gas cools faster.  All runs must be of the same input, in a
-periodic box.
+of direct simulations of the Boltzmann equation, which is up to 6 % lower.  Both values apply to a
+homogeneous dilute gas of equal disks without Coulomb friction.  In a cooling gas a flow develops,
+which contributes to T and therefore decreases the ratio.  The decrease is 3.8 to 4.6 % at a packing
+fraction of 0.02 and 0.3 to 0.5 % at a packing fraction of 0.0025; it is larger if the gas cools
+faster.  All runs must have the same input, and the box must be periodic.
 """
 
 from ricochet import Run, RunError, theory
@@ -19,7 +19,7 @@ from ricochet.script import command_line, launch, measured, report, spread
 
 
 def draw(runs: list[Run], law: tuple, exact: float | None, found: Curves) -> plt.Figure:
-    """Draw both temperatures on logarithmic axes, and their ratio."""
+    """Draw both temperatures on logarithmic axes, and the ratio of the temperatures."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 5))
     tau, start = found["collisions_per_disk"], (found["T"].mean[0], found["T_rot"].mean[0])
     expected = theory.rough_temperatures(tau, start, *law)

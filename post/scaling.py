@@ -1,11 +1,11 @@
-"""Speedup of a run on several cores.
+"""Speedup of a run that uses several processor cores.
 
     build/ricochet gas.nml -o runs/t2_1.h5 --set run.threads=2
     python post/scaling.py runs/t*.h5 -o scaling.png --csv scaling.csv
 
-The script compares wall times of complete runs that differ in `run.threads` only.  For repeated
-runs it shows the median, the smallest and the largest time.  runs/scaling.sh performs the runs and
-calls this script.
+The script compares the wall times of complete runs that differ only in `run.threads`.  If runs were
+repeated, it shows the median, the smallest and the largest time.  The shell script runs/scaling.sh
+performs the runs and calls this script.
 """
 
 from ricochet import Run, RunError
@@ -16,7 +16,7 @@ import numpy as np
 
 
 def table(runs: list[Run]) -> list[dict]:
-    """Return a row for each number of disks and threads, in ascending order."""
+    """Return a table row for each number of disks and number of threads, in ascending order."""
     groups = grouped(runs, lambda run: (run.n_disks, int(run.provenance.get("threads", 1))))
     walls = {key: [recorded(run, "wall_time") for run in same] for key, same in groups}
     rows = []
@@ -31,7 +31,7 @@ def table(runs: list[Run]) -> list[dict]:
 
 
 def draw(rows: list[dict]) -> plt.Figure:
-    """Draw the speedup against the number of threads; ideal speedup is dotted."""
+    """Draw the speedup against the number of threads, with the ideal speedup as a dotted line."""
     figure, axes = plt.subplots(figsize=(7, 5.5))
     for (disks, own), colour in zip(grouped(rows, lambda row: row["disks"]), COLOURS, strict=False):
         threads, y, low, high = (

@@ -1,11 +1,12 @@
-"""Write a file of randomly placed circles for obstacle.file: a random Lorentz gas.
+"""Write a file with randomly placed circles, the obstacles of a random Lorentz gas.
 
     python post/scatterers.py 100000 0.01 --radius 0.9 --seed 1 -o scatterers.txt
 
-The centres are independent and uniformly distributed in a square from (0, 0) to (L, L), so that
-circles may overlap.  The density is the number of circles per unit of area.  The script prints L =
-sqrt(number / density), which is the value for both components of `box.upper`; the sides must be
-periodic.  For a tracer of radius r the reduced density n R^2 of the theory has R = r + radius.
+The file can be used as `obstacle.file` of an input.  The centres are independent and uniformly
+distributed in a square from (0, 0) to (L, L); therefore circles can overlap.  The density n is the
+number of circles per unit of area.  The script prints L = sqrt(number / density), which must be
+used for both components of `box.upper`; all sides of the box must be periodic.  The theory of the
+Lorentz gas uses the reduced density n R^2, where R is the sum of the radii of tracer and circle.
 """
 
 import argparse
@@ -15,7 +16,7 @@ import numpy as np
 
 
 def scatterers(number: int, density: float, radius: float, seed: int) -> np.ndarray:
-    """Return the circles (number, 3): x, y and radius."""
+    """Return x, y and radius (number, 3) of each circle."""
     side = np.sqrt(number / density)
     centres = np.random.default_rng(seed).uniform(0, side, (number, 2))
     return np.column_stack([centres, np.full(number, radius)])

@@ -2,11 +2,12 @@
 
     python post/scattering.py runs/scattering/*.h5 -o scattering.png --csv scattering.csv
 
-Each run contains two disks, one of them at rest.  The impact parameter b is the distance of the
-line of flight from the centre of the disk at rest, positive on the left of that disk, and R12 = r1
-+ r2.  The scattering angle is the angle between the first and the last velocity of the moving disk.
-The exact result for a finite mass ratio M = m1 / m2 and restitution xi, with kappa = (1 + xi) / 2 *
-M / (1 + M), s = b / R12 and c^2 = 1 - s^2, is
+Each run contains two disks, one of which is at rest at the start.  The impact parameter b is the
+distance between the path of the moving disk and the centre of the disk at rest; it is positive if
+the moving disk passes on the left.  R12 = r1 + r2 is the sum of the radii.  The scattering angle is
+the angle between the initial and the final velocity of the moving disk.  The exact result for a
+finite mass ratio M = m1 / m2 and restitution xi, with kappa = (1 + xi) / 2 * M / (1 + M), s = b /
+R12 and c^2 = 1 - s^2, is
     tan theta = 2 kappa s c / (1 - 2 kappa c^2);   M infinite and xi = 1:  theta = 2 acos(s).
 """
 
@@ -20,7 +21,7 @@ import numpy as np
 
 
 def moving_and_resting(run: Run) -> tuple[int, int]:
-    """Return the indices of the disk that moves at the start and of the disk at rest."""
+    """Return the indices of the disk that moves at the start and of the disk that is at rest."""
     moving = np.flatnonzero(run.speed(0))
     if run.n_disks != 2 or len(moving) != 1:
         raise Refused(f"{run.path}: needs two disks, one of them at rest")
@@ -47,7 +48,7 @@ def scattering(run: Run) -> dict[str, float]:
 
 
 def draw(rows: list[dict], ratio: float, restitution: float) -> plt.Figure:
-    """Draw the angle and its deviation from the exact one for this mass ratio."""
+    """Draw the scattering angle, and its deviation from the exact angle for this mass ratio."""
     names = ("b_over_R12", "angle_degrees", "error_degrees")
     s, angle, error = (np.array([row[name] for row in rows]) for name in names)
     figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(6, 6), height_ratios=(3, 1))

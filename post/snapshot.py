@@ -4,13 +4,15 @@
     python post/snapshot.py runs/gas.h5 --frames 0,10,-1 -o gas.png    chosen frames side by side
     python post/snapshot.py runs/gravity.h5 --count 12 --quiver        twelve frames, evenly spread
 
---colour is species, speed, displacement from the first frame, number of collisions so far, spin
-(the angular velocity of disks that can rotate), or psi6 (the phase of the bond-orientational order
-parameter relative to that of the mean over all disks).  All frames share one colour scale that
-starts at 0, unless --per-frame is given; with --log the scale is logarithmic.  If colours show a
-quantity, all species except the first are outlined.  A disk that overlaps a periodic side is drawn
-on both sides of the box.  A line from the centre shows the orientation of disks that can rotate.
-Small disks far apart are drawn enlarged, and the title states the factor.
+The option --colour selects what the colours show: species, speed, displacement (from the first
+frame), collisions (number of collisions since the start), spin (the angular velocity of disks that
+can rotate), or psi6. For psi6, colours show the phase of the bond-orientational order parameter of
+each disk relative to the phase of its mean over all disks.  All frames have the same colour scale,
+which begins at 0, unless --per-frame is given.  With --log the colour scale is logarithmic.  If
+colours show a quantity other than the species, all disks except those of the first species have an
+outline.  A disk that overlaps a periodic side is drawn on both sides of the box.  If disks can
+rotate, a line from the centre of each disk shows its orientation.  Disks that would be too small to
+be visible are drawn enlarged, and the title states the factor.
 """
 
 import argparse
@@ -27,7 +29,7 @@ from matplotlib.colors import LogNorm, Normalize, to_rgba_array
 
 
 def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
-    """Return a colour scale that clips the few largest values; a logarithmic one starts above 0."""
+    """Return a colour scale for the given values; the few largest values exceed the scale."""
     if colour in ("psi6", "spin"):
         top = np.quantile(np.abs(values), 0.995) or 1.0
         return Normalize(*drawing.limits_of(colour, top))
@@ -39,7 +41,7 @@ def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
 
 
 def draw_key(axes: plt.Axes, run: Run, arrows: Quiver, longest: float) -> None:
-    """Draw the scale of the arrows above a panel: an arrow of a round speed."""
+    """Draw a reference arrow above a panel, with the speed that corresponds to its length."""
     power = 10.0 ** np.floor(np.log10(longest))
     speed = max(step * power for step in (1, 2, 5) if step * power <= longest)
     unit = run.units.name("speed")
@@ -49,7 +51,7 @@ def draw_key(axes: plt.Axes, run: Run, arrows: Quiver, longest: float) -> None:
 
 
 def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> plt.Figure:
-    """Draw a panel for each frame."""
+    """Draw a picture of the disks for each frame."""
     aspect = drawing.aspect_of(run)
     rows, columns = drawing.panel_grid(len(frames), aspect)
     width = min(10.5, (6.0 if len(frames) == 1 else 3.4) * columns) / columns

@@ -1,26 +1,29 @@
-"""Speed distributions in the first frame, the last frame and equilibrium, and the relaxation.
+"""Speed distributions in the first frame, in the last frame and in equilibrium.
 
     python post/speeds.py runs/gas/*.h5 -o speeds.png --csv speeds.csv
 
-The reduced speed is u = v / sqrt(2 kT / m), where kT is the mean kinetic energy of the species, so
-that the equilibrium distribution is P(u) = 2 u exp(-u^2) for any mass.  If m = 1 and all initial
-speeds are 1, u equals v.  --unscaled draws v in units of the input.  Runs of the same N are
-combined.  Equilibrium, or the steady state of a driven gas, begins after --equilibration or,
-without that option, when no observable drifts any longer.  The frames selected by --frames are
-thinned out until they are at least --min-separation collisions per disk apart; kT is the mean over
-the remaining frames. In a sheared box speeds are relative to the flow.  A gas that only loses
-energy has no steady state. Its histogram contains the frames after --equilibration (by default
-after 15 collisions per disk), and the speeds of each frame are scaled with kT of that frame. The
-same scaling is used for a gas whose sides move or whose kT drifts; `kT_first` and `kT_last` show
-the change. Each species of a mixture has its own row and curve, with its kT and the temperatures
-kT_x and kT_y of both velocity components.  Kolmogorov-Smirnov (KS) and chi-square tests compare the
-speeds with the expected distribution after the speeds of each frame are divided by the thermal
-speed in that frame.  If the kinetic energy is conserved, the expected distribution is that of N
-disks that share a fixed kinetic energy; otherwise it is Maxwell's distribution.  The p-values
-follow from random samples that are scaled in the same way (docs/theory.md).  Frames that are close
-in time have a smaller weight: the number of `independent` speeds follows from the statistical
-inefficiency.  The tests do not apply if disks conserve their angular momentum in a round container.
-a2 = <v^4> / (2 <v^2>^2) - 1.
+The figure shows histograms of the reduced speed u = v / sqrt(2 kT / m), where kT is the mean
+kinetic energy of the species.  The equilibrium distribution of u is P(u) = 2 u exp(-u^2) for any
+mass.  If m = 1 and all initial speeds are 1, u equals v.  With --unscaled the histograms show v in
+units of the input.  Runs with the same number of disks N are combined.  Equilibrium, or the steady
+state of a driven gas, begins after --equilibration or, without that option, when no observable
+drifts any longer.  The frames selected by --frames are thinned out until they are at least
+--min-separation collisions per disk apart; kT is the mean over the remaining frames.  In a sheared
+box, speeds are measured relative to the mean flow.  A gas that only loses energy does not reach a
+steady state.  The histogram of such a gas contains the frames after --equilibration (by default
+after 15 collisions per disk), and the speeds in each frame are scaled with kT of that frame.
+Speeds are also scaled frame by frame if sides of the box move or if kT drifts; then `kT_first` and
+`kT_last` show the change of kT.  For each species of a mixture there are a separate row of the
+table and a separate curve, with the temperature kT and the temperatures kT_x and kT_y of both
+velocity components.  Kolmogorov-Smirnov (KS) and chi-square tests compare the speeds with the
+expected distribution after the speeds of each frame are divided by the thermal speed in that frame.
+If the kinetic energy is conserved, the expected distribution is that of N disks with a fixed total
+kinetic energy; otherwise the Maxwell distribution is expected.  The p-values are determined from
+random samples that are scaled in the same way (docs/theory.md).  Frames that are close in time
+contain correlated speeds; therefore the number of `independent` speeds is reduced by the
+statistical inefficiency.  The tests do not apply if disks conserve their angular momentum in a
+round container.  The last panel shows the second Sonine coefficient a2 = <v^4> / (2 <v^2>^2) - 1
+against the number of collisions per disk.
 """
 
 from typing import NamedTuple
@@ -54,8 +57,8 @@ from ricochet.script import command_line, grouped, late_frames, launch, measured
 import numpy as np
 
 BINS = np.linspace(0, 3, 51)  # u = 1 is the centre of a bin
-#: Titles for the possible states of the late frames of all runs.  In the first two states all late
-#: frames have the same mean kT.
+#: Panel titles for the possible states of the late frames.  In the first two states, kT is the same
+#: in all late frames on average.
 EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
 COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each frame at its own kT"
 UNSTEADY = "No steady kT yet: each frame at its own"
@@ -69,7 +72,7 @@ ABOUT_A2 = (
 
 
 def state_of(run: Run) -> str:
-    """Return the state of the late frames: equilibrium, a steady state, or a changing state."""
+    """Return the state in the late frames: equilibrium, a steady state, or a changing state."""
     if run.n_disks < 3:
         raise Refused(
             f"{run.path}: needs at least three disks, whose collisions establish a "
@@ -85,7 +88,7 @@ def state_of(run: Run) -> str:
 def temperature(
     runs: list[Run], picked: list[list[int]], species: str | None = None
 ) -> tuple[SeriesMean, list[float], bool]:
-    """Return the mean kT of these frames, kT in the first and the last, and whether kT drifts."""
+    """Return the mean kT of the frames, kT of the first and last frame, and whether kT drifts."""
     tracks = tracks_of(runs, picked, species)
     kt = combine_runs([correlated_mean(track) for track in tracks])
     alone = species is None or len(runs[0].names) == 1
@@ -98,7 +101,7 @@ def temperature(
 def tracks_of(
     runs: list[Run], picked: list[list[int]], species: str | None, component: int | None = None
 ) -> list[np.ndarray]:
-    """Return kT of all frames between the first and the last selected one, for each run."""
+    """Return for each run kT of all frames between the first and last selected frame."""
     spans = [slice(frames[0], frames[-1] + 1) for frames in picked]
     return [
         kt_of_frames(run, own, species, component) for run, own in zip(runs, spans, strict=True)
@@ -108,7 +111,7 @@ def tracks_of(
 def pooled(
     runs: list[Run], picked: list[list[int]], state: str, name: str
 ) -> tuple[Estimate, dict]:
-    """Return the density (B,) and tests of a species' speeds in late frames of runs of equal N."""
+    """Return the speed density (B,) of a species in late frames, and results of the tests."""
     own, each = zip(runs, picked, strict=True), state not in (EQUILIBRIUM, STEADY)
     u = np.concatenate([reduced_speeds(*one, each=each, species=name) for one in own])
     test, several = speed_test(runs, picked, name), len(runs[0].names) > 1
@@ -139,21 +142,21 @@ def pooled(
 
 
 class Scale(NamedTuple):
-    """Axis of speeds: the thermal speed in the units of the axis, and the label."""
+    """Axis of speeds: the thermal speed in the units of the axis, and the label of the axis."""
 
     thermal: float = 1.0  # sqrt(2 kT / m), or 1
     label: str = "speed $u = v\\,/\\,\\sqrt{2kT/m}$"
 
     @property
     def law(self) -> str:
-        """Return Maxwell's density as text for a legend."""
+        """Return the Maxwell distribution as text for the legend of a figure."""
         if self.thermal == 1.0 and "u" in self.label:
             return "Maxwell, $P(u)=2u\\,e^{-u^2}$"
         return "Maxwell, $P(v)=(mv/kT)\\,e^{-mv^2/2kT}$"
 
 
 def scale_of(run: Run, kt: float, unscaled: bool) -> Scale:
-    """Return the scale of speeds at a temperature: units of the input if `unscaled`, else u."""
+    """Return the axis of speeds at a temperature: v if `unscaled` is true, and u otherwise."""
     if not unscaled:
         return Scale()
     return Scale(float(np.sqrt(2 * kt / run.mass[0])), run.units.label("speed v", "speed"))
@@ -162,7 +165,7 @@ def scale_of(run: Run, kt: float, unscaled: bool) -> Scale:
 def draw_histogram(
     axes: plt.Axes, heights: list[Estimate], labels: list[str], scales: list[Scale]
 ) -> None:
-    """Draw histograms as steps, and the Maxwell curve of each scale."""
+    """Draw histograms as steps, and the Maxwell distribution for each scale."""
     style = {"fill": True, "alpha": 0.45} if len(heights) == 1 else {"fill": False}
     each = zip(heights, labels, scales, colours(len(labels)), strict=True)
     for height, label, scale, colour in each:
@@ -178,7 +181,7 @@ def draw_histogram(
 
 
 def draw_relaxation(axes: plt.Axes, groups: list) -> None:
-    """Draw the mean and the error of a2 over the runs against collisions per disk."""
+    """Draw the mean of a2 over the runs, and its error, against collisions per disk."""
     equal = True
     for (count, runs), colour in zip(groups, colours(len(groups)), strict=True):
         tracks = [relaxation(run) for run in runs]
@@ -204,7 +207,7 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
 
 
 def cooling(row: dict) -> str:
-    """Return the change of the temperature of a gas as text; under gravity kT may increase."""
+    """Return the change of the temperature of a gas as text; kT can increase under gravity."""
     goes = "falls" if row["kT_last"] < row["kT_first"] else "goes"
     if row["frames"] == row["runs"]:
         return f"kT is {row['kT_last']:.4g}"
@@ -212,7 +215,7 @@ def cooling(row: dict) -> str:
 
 
 def label_of(row: dict, state: str) -> str:
-    """Return the temperature and the results of the tests as text."""
+    """Return the temperature and the results of the statistical tests as text."""
     size, free = row["speeds"], row["independent"]
     words = ", ".join(filter(None, (f"N = {row['N']}", row.get("species")))) + f": {size} speeds"
     words += f", {free} independent" if free < size else ""
@@ -226,14 +229,14 @@ def label_of(row: dict, state: str) -> str:
 
 
 def chance(p: float) -> str:
-    """Return a probability as text that is never 0 or 1."""
+    """Return a probability as text; the text is never 0 or 1."""
     return "p < 0.0001" if p < 1e-4 else f"p = {min(p, 0.9999):.4f}"
 
 
 def draw(
     runs: list[Run], groups: list, pools: list, state: str, unscaled: bool = False
 ) -> plt.Figure:
-    """Draw four panels: first frame, last frame, late frames, relaxation."""
+    """Draw four panels: speeds in the first, last and late frames, and the relaxation of a2."""
     figure, ((first, last), (late, way)) = plt.subplots(2, 2, figsize=(10, 7))
     largest = groups[-1][1][0]
     for axes, frame, when in ((first, 0, "first frame"), (last, -1, f"t = {largest.time[-1]:.4g}")):
@@ -264,7 +267,7 @@ def draw(
 
 
 def check_unscaled(runs: list[Run], state: str) -> None:
-    """Raise an error for --unscaled if the late frames have several masses or temperatures."""
+    """Raise an error if --unscaled is used but masses or temperatures in late frames differ."""
     for run in runs:
         if np.ptp(run.mass) > 0:
             raise RunError(

@@ -3,8 +3,9 @@
     python post/trajectory.py runs/sinai.h5 -o sinai.png               all disks (at most 12)
     python post/trajectory.py runs/sinai.h5 --disks 1,5 --frames :200  two of them, 200 frames
 
-Without gravity, and with a frame at every event (output.frames_every_events = 1), the straight
-lines between frames are the exact trajectories.  Several runs are drawn side by side.
+Positions in successive frames are connected by straight lines.  These lines are the exact
+trajectories if there is no gravity and the run has a frame at every event
+(output.frames_every_events = 1).  Several runs are drawn side by side.
 """
 
 from ricochet import Run
@@ -24,10 +25,10 @@ from matplotlib.patches import Circle
 
 
 def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
-    """Return the positions (T', 2) of each disk in these frames.
+    """Return the path (T', 2) of each disk through the given frames.
 
-    A path that crosses a periodic side is extended beyond that side and enters again at the
-    opposite side.  A row of NaN separates the two pieces.
+    If a path crosses a periodic side, it is extended beyond this side, and continues from the
+    opposite side of the box.  A row of NaN separates the two pieces of the path.
     """
     paths = list(np.moveaxis(run.position[frames][:, disks], 1, 0))
     if run.image is None:
@@ -37,7 +38,7 @@ def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
 
 
 def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return the path (T, 2); steps across a side are repeated in all images that they touch."""
+    """Return a path (T, 2) in the box, with each step across a side repeated on the other side."""
     rows = [path[:1]]
     gap = np.full((1, 2), np.nan)
     for start, end, jump in zip(path[:-1], path[1:], np.diff(image, axis=0), strict=True):
@@ -50,7 +51,7 @@ def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarra
 
 
 def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) -> None:
-    """Draw trajectories, with each disk at its last position; the other disks are grey."""
+    """Draw the paths of the chosen disks, and all disks at their last positions."""
     draw_box(axes, run, run.time[frames[-1]])
     others = np.full(run.n_disks, "0.85")
     others[disks] = "none"

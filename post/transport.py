@@ -5,24 +5,27 @@
 The disks must be elastic and the box periodic.  Runs are combined by packing fraction.  The files
 must contain the Helfand moments of momentum and energy (output.helfand), about four samples of the
 observables per mean free time (output.observables_every_time) and, for D, equally spaced frames.
-For mixtures only the viscosities are computed: the diffusion of the species also transports energy,
-and D differs between species (see correlations.py).
+For mixtures the script computes only the viscosities, for two reasons.  The diffusion of the
+species also transports energy, and D differs between species (see correlations.py).
 
-The small panels show half the slope of the mean square of a moment between neighbouring lags,
-divided by Enskog's coefficient; for D they show half the integral of <v(0) v(s)> from 0 to t. Bands
-are errors over the runs.  The right panel and the table contain means over the lags from t/2 to t,
-with errors that include the autocorrelation.  For viscosities and conductivity t is 20 mean free
-times, or longer if heavy disks decorrelate slowly, but at most an eighth of the run.  For D, t is
-the time in which sound crosses the box, as in correlations.py.
+The small panels show the coefficients as functions of the lag, divided by Enskog's coefficients.  A
+viscosity or the conductivity is half the slope of the mean square change of a Helfand moment
+between neighbouring lags.  D is half the integral of <v(0) v(s)> from 0 to the lag.  Bands show the
+errors, determined from the scatter of the runs.  The right panel and the table contain means over
+the lags from t/2 to t; their errors account for the autocorrelation.  For viscosities and
+conductivity, t is 20 mean free times, or longer if heavy disks decorrelate slowly, but at most an
+eighth of the duration of the run.  For D, t is the time in which sound crosses the box, as in
+correlations.py.
 
-Enskog's coefficients (Gass 1971; for mixtures after Lopez de Haro, Cohen and Kincaid 1983) use the
-pair correlation at contact of Henderson or, for mixtures, of Jenkins and Mancini 1987.  In the
-table the units of all coefficients are the mean mass, the mean diameter and kT.  The theory assumes
-that the velocities of colliding disks are independent.  Unless the gas is dense, viscosities and
-conductivity are accurate to a few per cent, whereas D is less accurate.  In two dimensions no
-coefficient converges for long times in large boxes.  If N disks share a fixed energy, the relative
-decrease of the conductivity is about 6 / N, that of the bulk viscosity 5 / N and that of the
-viscosity 2 / N (docs/theory.md).
+Enskog's coefficients are calculated after Gass (1971), and for mixtures after Lopez de Haro, Cohen
+and Kincaid (1983).  The value of the pair correlation function at contact is taken from Henderson
+or, for mixtures, from Jenkins and Mancini (1987).  In the table, the units of all coefficients are
+formed from the mean mass, the mean diameter and kT.  The theory assumes that the velocities of
+colliding disks are independent.  Unless the gas is dense, the predicted viscosities and
+conductivity are accurate to a few per cent, whereas the predicted D is less accurate.  In two
+dimensions no coefficient converges for long times in large boxes.  If the total energy of N disks
+is fixed, the conductivity is smaller by a fraction of about 6 / N, the bulk viscosity by 5 / N, and
+the shear viscosity by 2 / N (docs/theory.md).
 """
 
 from ricochet.analysis.statistics import combine_runs
@@ -44,7 +47,7 @@ Results = list[tuple[float, dict[str, Found]]]
 
 
 def table(results: Results) -> tuple[list[dict], list[str]]:
-    """Return a row for each packing fraction and coefficient, and the warnings."""
+    """Return a table row for each packing fraction and coefficient, and warnings."""
     rows, unsettled, notes = [], [], []
     for eta, found in results:
         for name in filter(found.get, LABELS):
@@ -62,7 +65,7 @@ def table(results: Results) -> tuple[list[dict], list[str]]:
 
 
 def draw(results: Results, rows: list[dict]) -> plt.Figure:
-    """Draw the ratios of all coefficients to Enskog's, against lag and packing fraction."""
+    """Draw all coefficients, divided by Enskog's coefficients, against lag and packing fraction."""
     there = set().union(*(found for _, found in results))
     layout, height = [[*filter(there.__contains__, LABELS), "all"]], 4.5
     if "D" in there:
