@@ -1,10 +1,10 @@
-"""Draw the pictures of the inputs that the laboratory offers: input/pictures/NAME.png.
+"""Draw the pictures input/pictures/NAME.png of all input files that the laboratory offers.
 
     python docs/chooser_pictures.py [NAME...]
 
-Each picture shows its input at the time given in input/chooser.json, with the paths of the disks if
-there are few disks.  A picture contains a digest of its input, so that a test can detect that the
-input has changed.
+Each picture shows the simulation of an input file at the time that input/chooser.json specifies.
+If there are few disks, the picture also shows their paths.  Each picture contains a checksum of the
+input file, with which a test can detect that the input file has changed.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ from PIL import Image, PngImagePlugin
 INPUTS = Path(__file__).resolve().parents[1] / "input"
 PIXELS, FEW = 144, 20
 SPECIES = ("#0072b2", "#d55e00", "#009e73")
-#: The palette of a picture: greys, and mixtures of the colours of disks with white.
+#: Colour palette of a picture: shades of grey, and mixtures of the disk colours with white.
 PALETTE = [g for grey in (77, 130, 204, 255) for g in (grey,) * 3] + [
     round(255 + share * (int(colour[k : k + 2], 16) - 255))
     for colour in SPECIES
@@ -32,13 +32,13 @@ PALETTE = [g for grey in (77, 130, 204, 255) for g in (grey,) * 3] + [
 
 
 def digest(path: Path, at: float) -> str:
-    """Return a digest of the time and of the input as the program reads it, without comments."""
+    """Return a checksum of the time and of the input without its comments."""
     lines = [line.split("!")[0].strip() for line in path.read_text(encoding="utf-8").splitlines()]
     return hashlib.sha256("\n".join([*filter(None, lines), repr(float(at))]).encode()).hexdigest()
 
 
 def picture(path: Path, at: float) -> bytes:
-    """Return a picture of the disks at a given time, as PNG."""
+    """Return a PNG picture of the disks at the given time."""
     from ricochet import Simulation
     from ricochet.reading.reader import SIDES, obstacles_of, walls_of
 

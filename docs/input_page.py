@@ -1,4 +1,4 @@
-"""Write docs/input.md from the program's table of variables.
+"""Write the page docs/input.md from the table of input variables that the program prints.
 
 python docs/input_page.py build/ricochet > docs/input.md
 """
@@ -57,14 +57,15 @@ on the laboratory page). All other variables are fixed during a run.
 
 
 def said(program: Path, *words: str) -> str:
-    """Return the output of the program for an option."""
+    """Return the output of the program when it is called with an option."""
     return subprocess.run([program, *words], check=True, capture_output=True, text=True).stdout
 
 
 def variables(program: Path) -> dict[str, dict[str, dict]]:
-    """Return the variables of each group of `GROUPS`, with numbers as the program writes them.
+    """Return the input variables of each group of `GROUPS`.
 
-    The variables that all kinds of boundaries share form a separate group.
+    Variables that are common to all kinds of boundaries form a separate group.  Numbers are texts
+    in the format of the program.
     """
     table = json.loads(said(program, "--print-variables"), parse_float=str, parse_int=str)
     walls = [table[group] for group in ("side", "obstacle", "wall")]
@@ -76,7 +77,7 @@ def variables(program: Path) -> dict[str, dict[str, dict]]:
 
 
 def written(entry: dict) -> str:
-    """Return the default of a variable, or its example, in the format of an input file."""
+    """Return the default value of a variable, or an example, in the format of an input file."""
     value = entry["example"] if entry["default"] is None else entry["default"]
     words = value if isinstance(value, list) else [value]
     words = [str(word).lower() if isinstance(word, bool) else word for word in words]
@@ -85,14 +86,14 @@ def written(entry: dict) -> str:
 
 
 def shared(walls: list[dict[str, dict]], name: str) -> bool:
-    """Return whether all kinds of boundaries have the variable with the same meaning."""
+    """Return whether the variable exists, with the same meaning, for all kinds of boundaries."""
     return len({wall[name]["help"] for wall in walls if name in wall}) == 1 and all(
         name in wall for wall in walls
     )
 
 
 def condition(group: str, entry: dict) -> str:
-    """Return the choice with which a variable applies; empty if the variable always applies."""
+    """Return the choice that makes a variable apply, or an empty text if it always applies."""
     if not entry["goes_with"]:
         return ""
     [(choice, words)] = entry["goes_with"].items()
@@ -103,7 +104,7 @@ def condition(group: str, entry: dict) -> str:
 
 
 def facts(group: str, entry: dict) -> list[str]:
-    """Return facts about a variable: allowed values, default, condition, exclusions, changes."""
+    """Return the facts about a variable that its section lists, such as its allowed values."""
     allowed = [f"Allowed: {entry['allowed']}" + f" [{entry['unit']}]" * bool(entry["unit"])]
     if entry["default"] is not None:
         default = f"Default: `{written(entry)}`"
@@ -123,7 +124,7 @@ def facts(group: str, entry: dict) -> list[str]:
 
 
 def section(group: str, name: str, entry: dict) -> str:
-    """Return the section of the page about one variable."""
+    """Return the section of the page that describes one variable."""
     title = name if group == LAW else f"{group}.{name}"
     meanings = (entry["meanings"] or {}).items()
     lines = [f"### `{title}`", "", plain(entry["help"]), ""]
@@ -133,12 +134,12 @@ def section(group: str, name: str, entry: dict) -> str:
 
 
 def plain(text: str) -> str:
-    """Return the text with the marks of emphasis of Markdown escaped."""
+    """Return the text after escaping the characters that Markdown uses for emphasis."""
     return text.replace("**", "^")
 
 
 def page(program: Path) -> str:
-    """Return the whole page."""
+    """Return the text of the page docs/input.md."""
     lines = [HEAD]
     for group, entries in variables(program).items():
         lines += [f"## {group}" if group == LAW else f"## &{group}", "", GROUPS[group], ""]

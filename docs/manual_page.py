@@ -1,8 +1,8 @@
-"""Write the manual page of a command (ricochet, ricochet-ensemble) from the output of --help.
+"""Write the Unix manual page of a command (ricochet, ricochet-ensemble) from its --help text.
 
 python docs/manual_page.py build/ricochet PREFIX > ricochet.1
 
-The version is that of the program `ricochet` in the same folder.
+The version number is taken from the program `ricochet` in the folder of the command.
 """
 
 import re
@@ -12,8 +12,8 @@ from textwrap import dedent
 
 from input_page import GROUPS, LAW, said, variables, written
 
-#: Section of the manual page for each paragraph of --help.  The key is the word with which the
-#: paragraph begins, if a colon follows this word.
+#: Section of the manual page for each paragraph of the --help text.  A paragraph is identified by
+#: its first word, if a colon follows this word.
 SECTIONS = {
     "usage": "SYNOPSIS",
     "members": "OPTIONS",
@@ -50,13 +50,13 @@ Results, in the format H5MD. Until the run has finished: OUT.h5.part.
 
 
 def roff(text: str) -> str:
-    """Return the text with the special characters of roff escaped."""
+    """Return the text after escaping the special characters of roff."""
     text = text.replace("\\", "\\e").replace("-", "\\-")
     return "\n".join("\\&" + line if line[:1] in {".", "'"} else line for line in text.split("\n"))
 
 
 def section(paragraph: str) -> list[str]:
-    """Return a paragraph of --help as a section in roff."""
+    """Convert a paragraph of the --help text to a section in roff format."""
     found = re.match(r"(\w+):( *)", paragraph)
     word = found[1] if found else "" if paragraph.startswith(" ") else None
     heading = SECTIONS.get(word, "DESCRIPTION")
@@ -66,7 +66,7 @@ def section(paragraph: str) -> list[str]:
 
 
 def inputs(program: Path) -> list[str]:
-    """Return the groups of the input and their variables in roff."""
+    """Return a list of all input groups and their variables in roff format."""
     lines = [
         ".SH INPUT",
         "A file consists of groups",
@@ -87,7 +87,7 @@ def inputs(program: Path) -> list[str]:
 
 
 def page(command: Path, prefix: str) -> str:
-    """Return the whole page."""
+    """Return the text of the manual page in roff format."""
     program = command.with_name("ricochet")
     version = said(program, "--version").split()[1]
     headline, *paragraphs = said(command, "--help").rstrip().split("\n\n")

@@ -1,9 +1,10 @@
-"""Print the event queues that docs/how-it-works.md shows, and draw them with the disks.
+"""Print the event queues shown in docs/how-it-works.md, and draw them with the disks.
 
     python docs/queue_page.py build/tests/four_disks                   the queues
     python docs/queue_page.py build/tests/four_disks docs/queue.png    and the figure
 
-The program (docs/four_disks.f90, built by `make test`) steps the real engine event by event.
+The event queues come from the program docs/four_disks.f90, which `make test` builds.  This program
+performs a real simulation of four disks, one event at a time.
 """
 
 import json
@@ -23,7 +24,7 @@ BOX, RADIUS = 4.0, 0.3
 
 @dataclass(frozen=True)
 class Expected:
-    """The state of a disk at its own time, and its predicted event."""
+    """The state of a disk at the time of its last event, and its predicted next event."""
 
     disk: int
     place: np.ndarray
@@ -39,7 +40,7 @@ class Expected:
 
     @property
     def what(self) -> str:
-        """Return the event in words."""
+        """Return a description of the predicted event."""
         if self.kind == "side":
             return f"hits the {SIDES[-self.partner]}"
         return "leaves its cell" if self.kind == "crossing" else f"hits disk {self.partner}"
@@ -59,7 +60,7 @@ def expected(record: dict) -> Expected:
 
 
 def states(program: Path) -> list[tuple[float, list[Expected]]]:
-    """Return time and queue, in order of time, at the start and after each event."""
+    """Return the time and the sorted event queue at the start and after each event."""
     text = subprocess.run([program], check=True, capture_output=True, text=True).stdout
     found, decoder = [], json.JSONDecoder()
     while text := text.lstrip():
@@ -71,7 +72,7 @@ def states(program: Path) -> list[tuple[float, list[Expected]]]:
 
 
 def table(now: float, queue: list[Expected]) -> str:
-    """Return the queue in the format of the page."""
+    """Return the event queue as a table in the format of the page."""
     lines = [f"t = {now:.4f}", "   due   disk"]
     for event in queue:
         stale = f"   stale: disk {event.partner} has collided since" if event.stale else ""
@@ -80,7 +81,10 @@ def table(now: float, queue: list[Expected]) -> str:
 
 
 def draw(axes: plt.Axes, now: float, queue: list[Expected]) -> None:
-    """Draw disks with velocities, the next event as a line, and its positions as outlines."""
+    """Draw the disks, their velocities, and the next event.
+
+    A line shows the motion to the next event, and outlines show the positions at the event.
+    """
     first, disks = queue[0], {event.disk: event for event in queue}
     axes.add_patch(Rectangle((0, 0), BOX, BOX, fill=False, clip_on=False, **WALL))
     for line in axes.axvline, axes.axhline:

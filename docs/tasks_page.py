@@ -1,10 +1,10 @@
-"""Write the results of the textbook tasks into docs/getting-started.md, from the tables of runs/.
+"""Write the results of the textbook exercises into the page docs/getting-started.md.
 
     make figures                     or runs/mixture.sh, cooling.sh, crater.sh, gravity.sh alone
     python docs/tasks_page.py        reads runs/figures into docs/tasks.json, and writes the page
 
-docs/tasks.json stores each number of the page with its error.  In the page, each text is enclosed
-by comments that contain the name of the text.
+The file docs/tasks.json stores each number of the page with its error.  In the page, HTML comments
+enclose each text that this script replaces, and contain the name of the text.
 """
 
 import csv
@@ -56,19 +56,19 @@ TEXTS = {
 
 
 def table(name: str) -> list[dict[str, str]]:
-    """Return the rows of a table."""
+    """Return the rows of a table with measured results."""
     with (TABLES / f"{name}.csv").open(newline="") as file:
         return list(csv.DictReader(file))
 
 
 def value(row: dict[str, str], name: str, error: str = "") -> tuple[float, float | None]:
-    """Return a number of a row, with its error if the table has a column for the error."""
+    """Return a number from a table row, with its error if the table contains the error."""
     error = error or f"{name}_error"
     return float(row[name]), float(row[error]) if error in row else None
 
 
 def mixture() -> Numbers:
-    """Return the energies and speeds of the mixture in equilibrium."""
+    """Return the energies and speeds of both species of the mixture in equilibrium."""
     return {
         f"{name}_{row['species']}{end}": value(row, name + end)
         for row in table("mixture")
@@ -78,7 +78,7 @@ def mixture() -> Numbers:
 
 
 def cooling() -> Numbers:
-    """Return the temperature ratios at the end of cooling."""
+    """Return the ratios of the temperatures of both species at the end of cooling."""
     end = table("cooling_velocity")[-1]
     return {
         f"ratio_{xi}": value(end, f"ratio_xi{xi}", f"ratio_error_xi{xi}")
@@ -87,7 +87,7 @@ def cooling() -> Numbers:
 
 
 def crater() -> Numbers:
-    """Return the crater of the task, and the exponents of its growth."""
+    """Return the size of the crater, and the exponents of its dependence on the parameters."""
     rows = [row for row in table("crater_scan") if row["in_fit"] == "1"]
     (base,) = (row for row in rows if row["scan"] == "mass" and float(row["mass"]) == 25)
     found = {name: value(base, name) for name in ("hit", "displaced", "width", "depth")}
@@ -100,7 +100,7 @@ def crater() -> Numbers:
 
 
 def gravity() -> Numbers:
-    """Return the results under gravity: energy, missed collisions, equipartition, distributions."""
+    """Return the results of the exercises about a gas under gravity."""
     changes = [float(row["largest_change"]) for row in table("gravity_energy")]
     times = [value(row, "T_therm") for row in table("gravity_equipartition")]
     found = {"energy_change": (max(changes), None), "T_first": min(times), "T_last": max(times)}
@@ -116,7 +116,7 @@ def gravity() -> Numbers:
 
 
 def words(number: tuple[float, float | None]) -> str:
-    """Return a number in the format of the page."""
+    """Return a number as text in the format of the page."""
     mean, error = number
     if error is None:
         return f"{mean:.1g}" if mean < 1e-6 else f"{mean:.4g}"
@@ -124,7 +124,7 @@ def words(number: tuple[float, float | None]) -> str:
 
 
 def filled(page: str, numbers: Numbers) -> str:
-    """Return the page with all texts replaced."""
+    """Return the page after replacing all texts that contain results."""
     for name, template in TEXTS.items():
         text = BLANK.sub(lambda blank: words(numbers[blank[1]]), template)
         items = [" ".join(item.split()) for item in re.split(r"\n(?=- )", text)]

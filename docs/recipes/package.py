@@ -1,5 +1,5 @@
-# Recipe for Spack: copy this file into packages/ricochet/ of your repository, with the address of
-# this project as `git`. Not tried here.
+# Package recipe for Spack.  To use it, copy this file into the folder packages/ricochet/ of your
+# Spack repository, and set `git` to the address of this project.  This recipe has not been tested.
 from spack.package import *
 from spack_repo.builtin.build_systems.makefile import MakefilePackage
 
@@ -24,7 +24,8 @@ class Ricochet(MakefilePackage):
     requires("%fortran=gcc@12:", msg="built and tested with gfortran")
 
     def build(self, spec, prefix):
-        # Spack's compiler wrapper adds the flags of the target; our own are for this processor.
+        # The compiler wrapper of Spack adds optimisation flags for the target processor.  The flags
+        # of the Makefile would be for the processor of the computer that compiles.
         make("ARCH=x86-64", "all", "library")
 
     def install(self, spec, prefix):
