@@ -1,4 +1,5 @@
-!> Prints the state and the predicted event of each of four disks, event by event, as lines of JSON for docs/queue_page.py.
+!> Simulates four disks, and prints their states and predicted events after each event. The output consists of JSON lines for
+!> docs/queue_page.py.
 program four_disks
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: int32, int64, real64
@@ -36,7 +37,7 @@ program four_disks
 
 contains
 
-  !> The system: elastic walls, 4 by 4.
+  !> Defines the system: four disks in a box of 4 by 4 with elastic walls.
   function four() result(sim)
     type(simulation_t) :: sim
     integer(int32) :: i
@@ -55,7 +56,7 @@ contains
     end do
   end function four
 
-  !> Writes the time, and the motion and the predicted event of each disk.
+  !> Writes the time, and for each disk its motion and its predicted event.
   subroutine show(sim)
     type(simulation_t), intent(in) :: sim
     integer(int32) :: i, code

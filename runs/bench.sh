@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
-# Benchmarks: cost of a collision, of the start and of the output. docs/performance.md explains the results.
+# Benchmarks: cost of collisions, of the start of a run and of the output. docs/performance.md explains the results.
 #
 #   runs/bench.sh            1e3 to 1e5 disks at four packings; gravity, restitution, sizes, samples
 #   runs/bench.sh --full     1e6 disks as well: rates, random start, memory; runs and threads on two cores
 #   runs/bench.sh --check    instructions per collision against what is promised (needs valgrind)
 #
-# A rate is the number of collisions, in millions, per second of processor time of one run that samples observables. Each rate is
-# the median of RUNS=5 runs on one core. All runs start from a state without correlations to its initial state. No other program
-# should run at the same time. The measured program is RICOCHET=build/ricochet; for --check it must not contain AVX-512 code.
+# A rate is the number of collisions, in millions, per second of processor time. It is measured in runs on one core that also sample
+# observables, and is the median of RUNS=5 runs. Before the measurement, the system is simulated until it has lost all correlations
+# to its initial state. No other program should run at the same time. The environment variable RICOCHET names the measured program
+# (default build/ricochet). For --check the program must not contain AVX-512 code.
 set -euo pipefail
 export LC_ALL=C # awk then reads and writes 0.5 with a point in every language
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
@@ -20,18 +21,18 @@ trap 'rm -rf "$work"' EXIT
 one_core=()
 if command -v taskset >/dev/null; then one_core=(taskset -c $(($(nproc) - 1))); fi
 
-# --- One state, one run ---------------------------------------------------------------------------
+# --- Preparation of starting states, and single runs -----------------------------------------------
 
-# input FILE START SPECIES...: writes an input file; START contains the variables of the start of every species.
+# input FILE START SPECIES...: writes an input file. START contains the variables that define the initial state of each species.
 input() {
   local file=$1 start=$2 species
   shift 2
   for species; do echo "&species $species, $start /"; done >"$file"
 }
 
-# state NAME SPECIES...: simulates these species for 20 collisions per disk and writes $work/NAME.nml, an input that starts from the
-# result. The initial positions are random or, at packing fractions too high for random insertion, a lattice. A lattice of 1e5 disks
-# or more has not melted after this time.
+# state NAME SPECIES...: simulates these species for 20 collisions per disk, and writes the input file $work/NAME.nml, which starts
+# from the last frame of this simulation. The initial positions are random or, if the packing fraction is too high for random
+# insertion, on a lattice. A lattice of 1e5 disks or more does not melt during the 20 collisions per disk.
 state() {
   local name=$1 placement=random
   shift
@@ -43,24 +44,25 @@ state() {
   input "$work/$name.nml" "placement = 'file', file = '$work/$name.h5', velocities = 'file'" "$@"
 }
 
-# gas DISKS PACKING: makes a state of equal disks at this packing fraction.
+# gas DISKS PACKING: prepares a starting state of equal disks at this packing fraction.
 gas() { state "gas_$1_$2" "name = 'gas', count = $1, packing_fraction = $2"; }
 
-# polydisperse DISTRIBUTION DISKS PACKING: makes a state of disks whose radii differ by up to a factor of 9.9.
+# polydisperse DISTRIBUTION DISKS PACKING: prepares a starting state of disks with different radii; the largest radius is up to 9.9
+# times the smallest radius.
 polydisperse() {
   local spread=0.472
   [ "$1" = lognormal ] && spread=0.398
   state "$1_$2_$3" "name = 'gas', count = $2, packing_fraction = $3, polydispersity = $spread, radius_distribution = '$1', mass_scaling = 'area'"
 }
 
-# run NAME COLLISIONS [OPTION...]: performs one run from a state.
+# run NAME COLLISIONS [OPTION...]: performs one run that begins from the starting state NAME.
 run() {
   local name=$1 collisions=$2
   shift 2
   "${run_by[@]}" "$program" "$work/$name.nml" -o "$work/bench.h5" --force --quiet --set "stop.collisions=$collisions" "$@"
 }
 
-# rate NAME COLLISIONS [OPTION...]: prints the number of collisions per second of one run, in millions.
+# rate NAME COLLISIONS [OPTION...]: prints the rate of a run, in millions of collisions per second.
 rate() {
   run_by=("${one_core[@]}")
   run "$@" | awk '$1 == "collisions_per_second" { print $3/1e6 }'
@@ -90,10 +92,11 @@ table() {
     "$(repeated rate gas_1000_0.5 20000 --set run.search=pairs | median)"
 }
 
-# --- Rates with one more option, interleaved with rates without it -----------------------------------------
+# --- Rates with an additional option, measured alternately with and without the option ----------------------
 
-# beside WHAT LEAST NAME OTHER COLLISIONS [OPTION...]: prints the rate from state OTHER with the options, and its ratio to the rate
-# from state NAME without options.
+# beside WHAT LEAST NAME OTHER COLLISIONS [OPTION...]: measures the rate of a run with the options from the starting state OTHER,
+# and the rate of a run without options from the starting state NAME. The function prints the first rate, and the ratio of the first
+# to the second rate.
 beside() {
   local what=$1 least=$2 name=$3 other=$4 collisions=$5 k
   shift 5
@@ -131,15 +134,15 @@ costs() {
   beside '1e5 disks, packing 0.45: a disk of 100 radii' 0.90 gas_100000_0.45 brownian 6000000
 }
 
-# Five species with radii 1, 1.1, ... 1.4 and a total packing fraction of 0.5.
+# The mixture has five species with the radii 1, 1.1, ... 1.4 and a total packing fraction of 0.5.
 sizes=()
 for tenths in 10 11 12 13 14; do
   sizes+=("name = 'r$tenths', count = 2000, packing_fraction = $(awk -v r=$tenths 'BEGIN { print r*r/1460 }')")
 done
 
-# --- Whole processes ---------------------------------------------------------------------------------
+# --- Time and memory of complete processes -----------------------------------------------------------
 
-# process COMMAND...: prints the processor time in seconds and the memory in bytes of a complete process.
+# process COMMAND...: prints the processor time in seconds, and the memory in bytes, that the command uses.
 process() {
   python3 -c 'import os, sys
 child = os.spawnvp(os.P_NOWAIT, sys.argv[1], sys.argv[1:])
@@ -173,7 +176,7 @@ processes() {
   printf '%-52s%8.2f times as fast, at least 1.9\n' 'four runs on two cores' "$(awk -v one="$one" -v two="$two" 'BEGIN { print one/two }')"
 }
 
-# faster WHAT LEAST NAME COLLISIONS [OPTION...]: prints the speedup of two threads in wall time, including the start.
+# faster WHAT LEAST NAME COLLISIONS [OPTION...]: prints the ratio of the wall times of complete runs with one and with two threads.
 faster() {
   local what=$1 least=$2 k threads
   shift 2
@@ -202,17 +205,17 @@ threads() {
   faster 'gravity, 100000 disks, packing 0.5' 1.6 gas_100000_0.5 6000000 --set box.gravity=0,-1
 }
 
-# ensemble JOBS: performs four runs of several seconds each, JOBS at a time.
+# ensemble JOBS: performs four runs that take several seconds each; JOBS runs are performed at the same time.
 ensemble() {
   RICOCHET=$program runs/ensemble.sh "$work/gas_10000_0.5.nml" -d "$work/ensemble$1" --seeds 1-4 -j "$1" \
     --set stop.collisions=20000000
 }
 
-# --- The gate ------------------------------------------------------------------------------------------
+# --- Numbers of instructions, compared with their limits ----------------------------------------------
 
-# instructions RADII PACKING COLLISIONS [OPTION...]: counts the instructions of the event loop and of the start of epochs. The rest
-# of a run (start, output) is left out, because its instructions depend on the clock. The runs have 1000 equal disks, or 4000 disks
-# of many sizes.
+# instructions RADII PACKING COLLISIONS [OPTION...]: counts the instructions in the event loop and at the start of epochs.
+# Instructions in other parts of a run (start, output) are not counted, because their number depends on the time of day. The runs
+# have 1000 equal disks, or 4000 disks of many sizes.
 instructions() {
   local radii=$1 packing=$2 collisions=$3 name
   shift 3
@@ -226,7 +229,7 @@ instructions() {
   counted run "$name" "$collisions" "$@"
 }
 
-# counted COMMAND...: prints the number of instructions of the program that COMMAND runs through `run_by`.
+# counted COMMAND...: prints the number of instructions that the simulation program executes when COMMAND runs it through `run_by`.
 counted() {
   run_by=(valgrind --tool=callgrind --callgrind-out-file=/dev/null)
   run_by+=(--toggle-collect=__{event_driven_MOD_{advance,start,renew},epochs_MOD_move_epoch,kicks_MOD_kick}'*')
@@ -234,8 +237,8 @@ counted() {
   awk '/Collected/ { print $4 }' "$work/count"
 }
 
-# obstacles NAME: writes $work/NAME.nml, an input with one disk among 1225 obstacles: random scatterers with a density of one per
-# unit of area, the pegs of a board, or the scatterers of a Lorentz gas.
+# obstacles NAME: writes the input file $work/NAME.nml with one disk among 1225 circular obstacles. The obstacles are randomly
+# placed with a density of one per unit of area, form the regular pattern of a pegboard, or form a Lorentz gas.
 obstacles() {
   local file=$work/$1.nml kind=${1%_*} number=${1#*_}
   case $kind in
@@ -255,21 +258,21 @@ obstacles() {
   echo '&stop events = 1 /' >>"$file"
 }
 
-# events NAME NUMBER: runs one disk among obstacles for NUMBER events.
+# events NAME NUMBER: simulates one disk among obstacles for NUMBER events.
 events() {
   "${run_by[@]}" "$program" "$work/$1.nml" -o "$work/bench.h5" --force --quiet --set "stop.events=$2"
 }
 
-# piston DISKS: writes $work/piston_DISKS.nml, a gas at a packing fraction of 0.2 in mechanical equilibrium with a piston, whose
-# mass is a tenth of the mass of the gas.
+# piston DISKS: writes the input file $work/piston_DISKS.nml of a gas at a packing fraction of 0.2. The gas is in mechanical
+# equilibrium with a piston, whose mass is a tenth of the mass of the gas.
 piston() {
   gas "$1" 0.2
   { echo "&side name = 'right' motion = 'piston' mass = $(($1/10)) force = $((3*$1/2)) /" && cat "$work/gas_$1_0.2.nml"; } \
     >"$work/piston_$1.nml"
 }
 
-# kicked NUMBER: runs a periodic gas of 1000 disks with NUMBER thermostat kicks, each of which changes all velocities, ten times per
-# collision time.
+# kicked NUMBER: simulates a gas of 1000 disks in a periodic box with a thermostat. The thermostat changes all velocities at NUMBER
+# times, ten times per mean collision time.
 kicked() {
   local interval=8.5e-4
   "${run_by[@]}" "$program" "$work/gas_1000_0.3.nml" -o "$work/bench.h5" --force --quiet --set box.boundary=periodic,periodic \
@@ -280,7 +283,7 @@ kicked() {
 check() {
   local radii packing name disks limit options count driving=1494 verdict=0
   while read -r radii packing limit options; do
-    # shellcheck disable=SC2086 # several options, or none
+    # shellcheck disable=SC2086 # the variable contains any number of options
     count=$((($(instructions "$radii" "$packing" 100000 $options) - $(instructions "$radii" "$packing" 1 $options))/100000))
     printf '%s radii, packing %s%s: %s instructions per collision, at most %s\n' "$radii" "$packing" "${options:+, ${options#--set }}" "$count" "$limit"
     [ "$count" -gt 0 ] && [ "$count" -le "$limit" ] || verdict=1

@@ -1,7 +1,6 @@
-# shellcheck shell=bash
-# Common part of the scripts that simulate the systems of this folder: each of these scripts sources this file in its first line.
-# This file defines the variables python, data (folder of the runs) and figures (folder of the figures), and the function `replace`.
-# Options of ensemble.sh, such as -j 4, are passed on.
+# shellcheck shell=bash Definitions that are common to the scripts in this folder which simulate a system; these scripts source this
+# file. The file defines the variables `python` (the Python interpreter), `data` (folder of the output files) and `figures` (folder
+# of the figures), and the function `replace`. Options such as -j 4 are passed to ensemble.sh.
 set -euo pipefail
 if [[ " $* " == *' -h '* || " $* " == *' --help '* ]]; then
   sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"
@@ -17,7 +16,8 @@ command -v "$python" >/dev/null || {
 }
 mkdir -p -- "$data" "$figures"
 
-# replace FILE: writes standard input to FILE. If FILE is a link, the link is replaced and its target is not changed.
+# replace FILE: writes standard input to FILE. If FILE is a symbolic link, the link is replaced, and the file to which it refers is
+# not changed.
 replace() {
   rm -f -- "$1" && (set -C && cat >"$1")
 }

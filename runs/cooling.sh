@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# S4: kinetic energies of the mixture for restitution 1, 0.9, 0.8; eight seeds, both wall rules.
+# Exercise S4: kinetic energies of a mixture with the coefficients of restitution 1, 0.9 and 0.8, with eight seeds and with elastic
+# or inelastic walls.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 runs/ensemble.sh input/cooling.nml -d "$data" --scan contact.wall_rule=velocity,normal \

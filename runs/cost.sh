@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
-# L2: time per collision against the number of disks for the three methods of finding the next event. The runs are performed one at
-# a time, so that they do not disturb each other's timing; remove runs/cost to repeat the measurement.
+# Exercise L2: time per collision against the number of disks, for the three methods of finding the next event. Only one run is
+# performed at a time, because simultaneous runs would affect the measured times. To repeat the measurement, remove the folder
+# runs/cost.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# The packing fraction is 0.3 for every number of disks, and no output is written during a run. The number of collisions is large
-# enough to make the cost of the first predictions (one per disk) negligible: 10 per disk, or 5 per disk for a million disks. A few
-# hundred collisions in total suffice for `rescan`, which predicts the events of all disks at each collision.
+# The packing fraction is always 0.3, and no output is written during a run. The runs have 10 collisions per disk, or 5 collisions
+# per disk for a million disks. With so many collisions the cost of the initial prediction of one event per disk is negligible. The
+# method `rescan` predicts the events of all disks after each collision; therefore a few hundred collisions in total are sufficient
+# for it.
 measure() { # columns: collisions, collisions per disk, power of N by which the collisions are divided, search, numbers of disks
   local collisions=$1 per_disk=$2 power=$3 search=$4 count number radius
   shift 4

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# S5: pictures of one crater, and the crater size against mass, speed, radius and restitution.
+# Exercise S5: pictures of one crater, and crater size against mass, speed and radius of the projectile and against restitution.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# Each parameter has ten values, with eight beds (seeds) for each value. The other three parameters have their base values: mass 25,
-# speed 5, radius 5, restitution 0.5. Because hard disks have no energy scale, the crater does not depend on the speed. The contact
-# time of the TC model is proportional to 1/speed, because a constant contact time would introduce such a scale.
+# Each parameter is varied over ten values, with eight beds (seeds) for each value. The other three parameters keep the values mass
+# 25, speed 5, radius 5 and restitution 0.5. The crater does not depend on the speed, because hard disks define no energy scale. A
+# constant contact time in the TC model would define an energy scale; therefore the contact time is proportional to 1/speed.
 member() { # mass speed radius restitution seed
   local contact_time
   contact_time=$(awk -v v="$2" 'BEGIN { printf "%.17g", 5e-5 / v }')

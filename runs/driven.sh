@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Gases that are heated or sheared by walls, rough disks, transport coefficients in equilibrium, and driven disks: the Leidenfrost
-# effect, Maxwell's demon, the Brazil nut effect, compression by a piston, white-noise driving and active disks; four seeds each.
+# Simulations of gases that walls heat or shear, of rough disks, of transport coefficients in equilibrium, and of driven disks. The
+# driven systems are the Leidenfrost effect, Maxwell's demon, the Brazil nut effect, compression by a piston, white-noise driving
+# and active disks. Each system is simulated with four seeds.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 for system in fourier couette rough; do
@@ -12,7 +13,7 @@ done
   -o "$figures/couette.png" --csv "$figures/couette.csv"
 "$python" post/rough.py "$data"/rough/*.h5 -o "$figures/rough.png" --csv "$figures/rough.csv"
 
-# Viscosity, conductivity and diffusion: the interval between frames is several mean free times at each packing fraction.
+# Runs for viscosity, conductivity and diffusion: at each packing fraction, the interval between frames is several mean free times.
 transport=()
 while read -r packing interval samples placement; do
   runs/ensemble.sh input/bulk.nml -d "$data/transport_$packing" --seeds 1-4 \
@@ -31,7 +32,8 @@ TABLE
 "$python" post/transport.py "${transport[@]}" -o "$figures/transport.png" \
   --csv "$figures/transport.csv"
 
-# Arguments: the system, the quantity to show, the member run for the film, and the options that define the member runs.
+# The arguments are the system, the quantity to show, the member run from which the film is made, and the options that define the
+# member runs.
 while read -r system show film scan; do
   runs/ensemble.sh "input/$system.nml" -d "$data/$system" --seeds 1-4 ${scan:+--scan "$scan"} "$@"
   "$python" post/driven.py "$data/$system"/*.h5 --show "$show" -o "$figures/$system.png" \

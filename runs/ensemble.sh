@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Performs the member runs of a sweep (seeds x values) on all cores. The same command continues after an interruption.
+# Performs the runs of a sweep, one run for each combination of seeds and values of variables, on all cores. After an interruption,
+# the same command continues the sweep.
 set -euo pipefail
 me=${0##*/}
 ((BASH_VERSINFO[0]*100 + BASH_VERSINFO[1] >= 404)) || { echo "bash 4.4 or newer is needed, this is $BASH_VERSION" >&2; exit 2; }
@@ -48,7 +49,7 @@ exit:   0 all members finished; 1 some members failed; 2 wrong usage; 3 the fold
 TEXT
 }
 
-# fail CODE TEXT...: prints one line and exits with CODE.
+# fail CODE TEXT...: prints an error message in one line, and exits with the exit status CODE.
 fail() {
   local code=$1
   shift
@@ -65,13 +66,13 @@ for near in difflib.get_close_matches(sys.argv[1], sys.argv[2:], 1): print(f"; d
     "$@" 2>/dev/null || true
 }
 
-# --- members: two parallel arrays, the name and the overrides ("--set A=B --set C=D") ---
+# --- member runs: two arrays contain their names and their overrides ("--set A=B --set C=D") ---
 
 most=100000
 names=()
 overrides=()
 
-# Adds run.seed=1,2,3,4,11 to the scans if the argument is 1-4,11.
+# Adds the seeds to the scanned variables; for example, the argument 1-4,11 adds run.seed=1,2,3,4,11.
 scan_seeds() {
   local part first last parts list=()
   mapfile -t -d , parts < <(printf '%s,' "$1")
@@ -89,8 +90,9 @@ scan_seeds() {
   scans+=("run.seed=${list%,}")
 }
 
-# Adds a member for every combination of the scans (the first one varies slowest) and the seeds. The name of a member is built from
-# its values, without blanks and slashes: ball.mass_5 for species.ball.mass=5, gravity_2_-5 for box.gravity(2)=-5.
+# Adds a member run for every combination of the values of the scanned variables and the seeds. The first scanned variable varies
+# slowest. The name of a member run contains its values, without blanks and slashes. For example, the name is ball.mass_5 for
+# species.ball.mass=5, and gravity_2_-5 for box.gravity(2)=-5.
 generate_members() {
   local scan variable list values separator value k short old_names old_overrides known=' '
   names=("") overrides=("")
@@ -116,7 +118,7 @@ generate_members() {
   done
 }
 
-# Reads the members of the manifest from standard input.
+# Reads the names and overrides of the member runs from standard input, in the format of the manifest.
 read_manifest() {
   local line rest
   while IFS= read -r line || [[ -n $line ]]; do
@@ -153,9 +155,9 @@ check_names() {
   done
 }
 
-# --- the folder: the script never writes through a link, into a FIFO, or into a file that it did not create ---
+# --- files in the folder: the script does not write through links, into FIFOs, or into files that it did not create ---
 
-# ordinary FILE: succeeds if FILE does not exist or is an ordinary file.
+# ordinary FILE: returns success if FILE does not exist or is an ordinary file.
 may_be_ours() { [[ ! -L $1 && (! -e $1 || -f $1) ]]; }
 
 check_ordinary() {
@@ -163,8 +165,8 @@ check_ordinary() {
     fail 3 "$1 is not an ordinary file: remove it, or choose another folder"
 }
 
-# replace FILE: writes standard input to FILE, completely or not at all. An existing file is replaced by a new one, so that its
-# links keep the old content.
+# replace FILE: writes standard input to FILE. The file is either written completely or not changed. An existing file is replaced by
+# a new file; therefore other hard links of the existing file keep its old contents.
 put() {
   local new=$folder/.new.$$.${HOSTNAME:-} reason
   check_ordinary "$1"
@@ -174,20 +176,21 @@ put() {
   fi
 }
 
-# Prints the last line of the log of member NAME.
+# Prints the last line of the log file of the member run NAME.
 last_words() { ! may_be_ours "$folder/$1.log" || tail -n 1 -- "$folder/$1.log" 2>/dev/null || true; }
 
 is_finished=': is a finished run, ' # the answer to --resume if a stop rule is met already
 goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line in the log of a member that has not failed
 
-# Succeeds if member NAME has data: a finished output or one from which it can continue. The log of a member that failed states the
-# reason.
+# Returns success if the member run NAME has a finished output file, or an output file from which it can continue. If a member run
+# has failed, its log file states the reason.
 has_data() { [[ -e $folder/$1.h5 || -e $folder/$1.h5.part && $(last_words "$1") =~ $goes_on ]]; }
 
-# A finished file that is older than the input, or that is being extended, is not the result of the present settings.
+# If a finished output file is older than the input file, or if a run is extending it, the file is not the result of the present
+# settings.
 is_done() { [[ -e $folder/$1.h5 && ! -e $folder/$1.h5.part && ! $folder/input.nml -nt $folder/$1.h5 ]]; }
 
-# NAME OVERRIDES: succeeds if the program can continue the data of a member with these settings.
+# may_continue NAME OVERRIDES: returns success if the program can continue the member run NAME with these settings.
 may_continue() {
   local arguments=("$input" -o "$folder/$1.h5" --resume --check --quiet) said
   add_overrides "$2"
@@ -196,7 +199,8 @@ may_continue() {
 
 has_failed() { [[ ! -e $folder/$1.h5 && ! $(last_words "$1") =~ $goes_on ]]; }
 
-# Appends an empty line to the log of member NAME, so that its last line is not attributed to the next attempt.
+# Appends an empty line to the log file of the member run NAME. Otherwise the last line of the log file could be attributed to the
+# next attempt.
 forget_failure() {
   local lock
   has_failed "$1" && open_log "$folder/$1.log" || return 0
@@ -204,8 +208,8 @@ forget_failure() {
   exec {lock}>&-
 }
 
-# Checks that the members of an earlier command in this folder have the same settings, because results are identified by their
-# names.
+# Checks that the member runs of earlier commands in this folder have the same settings. The check is necessary because results are
+# identified only by the names of the member runs.
 remember() {
   local line name k door='' changed='' mended='' extended=() found=()
   local -A before=() linked=()
@@ -257,9 +261,9 @@ remember() {
   [[ -z $door ]] || exec {door}<&-
 }
 
-# --- workers ---
+# --- worker processes, which perform the member runs ---
 
-# Appends the overrides of a member to `arguments`. A value in quotes may contain ' --set '.
+# Appends the overrides of a member run to the array `arguments`. A value in quotes may contain the text ' --set '.
 add_overrides() {
   local rest=$1 pair quotes more
   while [[ $rest == '--set '* ]]; do
@@ -277,7 +281,7 @@ add_overrides() {
   done
 }
 
-# Runs member k and reports the result to the parent through the pipe.
+# Performs the member run k, and reports the result to the parent process through the pipe.
 run_member() {
   local base=$folder/${names[$1]} status resume='' said
   said=$(last_words "${names[$1]}")
@@ -298,7 +302,8 @@ run_member() {
     [[ -n $resume && $(last_words "${names[$1]}") == *": its run broke off "* ]] || break
     resume= # the member starts from the beginning
   done
-  # The member was stopped while it started, or while bash waited for it a second time (-1: bash has lost the exit status).
+  # If the script is being stopped, these values of the exit status mean that the member run was stopped while it started, or while
+  # bash waited for it a second time. The value -1 means that bash has lost the exit status.
   if [[ -n $stopping ]] && ((status >= 127 || status < 0)); then status=75; fi
   if ((status == 3)) && [[ -e $base.h5 && $(last_words "${names[$1]}") == *"$is_finished"* ]]; then
     touch -- "$base.h5" && status=0
@@ -307,8 +312,8 @@ run_member() {
   printf '%s %s\n' "$1" "$status" >&"$events"
 }
 
-# Arguments: the exit status and the earlier messages. After a member has been killed three times, no further attempt is made,
-# because the member probably needs more memory or time.
+# Reports that a member run was killed. The arguments are the exit status and the message about earlier attempts. If a member run
+# has been killed three times, it is not started again, because it probably needs more memory or time.
 tell_kill() {
   local how='' given_up=''
   [[ $1 != 137 ]] || how=' (out of memory?)'
@@ -317,8 +322,8 @@ tell_kill() {
   printf '%skilled by signal %d%s, %(%FT%T%z)T on %s\n' "$given_up" "$(($1 - 128))" "$how" -1 "$host"
 }
 
-# Opens a member's log with the file descriptor `lock`. The log must be an ordinary file with a single name, and its path must still
-# refer to the opened file.
+# Opens the log file of a member run with the file descriptor `lock`. The log file must be an ordinary file with a single hard link,
+# and its path must still refer to the opened file.
 open_log() {
   may_be_ours "$1" && { exec {lock}>>"$1"; } 2>/dev/null || return
   [[ ! -L $1 && $1 -ef /dev/fd/$lock && $(stat -L -c %h "/dev/fd/$lock") == 1 ]] && return
@@ -326,8 +331,8 @@ open_log() {
   return 1
 }
 
-# Runs all members that no other worker and no other copy of the script has taken. A member is taken by a lock on its log; the
-# program inherits the lock, which therefore exists as long as the program runs.
+# Performs all member runs that no other worker process and no other copy of this script performs. Each member run is reserved by a
+# lock on its log file. The simulation program inherits the lock; therefore the lock exists as long as the program runs.
 work() {
   local k base lock child='' stopping='' interrupted=''
   trap 'stopping=1 interrupted=1; [[ -z $child ]] || kill -TERM "$child" 2>/dev/null || true' TERM INT
@@ -353,7 +358,7 @@ work() {
   printf 'worker ends\n' >&"$events"
 }
 
-# --- the parent: starts workers, forwards signals, shows progress ---
+# --- parent process: starts worker processes, forwards signals, and shows the progress ---
 
 clock() {
   local s=$1
@@ -364,7 +369,8 @@ clock() {
   fi
 }
 
-# tell MEMBER TEXT: prints a line of a share. Because shares run elsewhere, the line contains the member, the time and the host.
+# tell MEMBER TEXT: prints a line about a member run of a share. Because shares are processed on other computers or at other times,
+# the line contains the name of the member run, the time and the host.
 tell() {
   [[ -z $task ]] || printf '%(%FT%T%z)T %s %s %s: %s\n' -1 "$task" "$host" "$1" "$2" >&2
 }
@@ -430,15 +436,15 @@ count_reply() {
   esac
 }
 
-# failure MEMBER HOW REASON: counts a failed member and reports the failure.
+# failure MEMBER HOW REASON: counts a failed member run, and prints the reason of the failure.
 failure() {
   failed=$((failed + 1))
   failures+=("$1$2: ${3:-no message in its log}")
   tell "$1" "failed$2: ${3:-no message in its log}"
 }
 
-# announce TEXT: prints a summary of the members, which begins with TEXT. A share prints no summary, because it has printed a line
-# for each member.
+# announce TEXT: prints a summary of all member runs that begins with TEXT. A share prints no summary, because it has already
+# printed a line for each member run.
 announce() {
   [[ -z $share ]] || return 0
   printf '%s: %s%d of %d members finished' "$folder" "$1" "$finished" "$total" >&2
@@ -458,10 +464,10 @@ summarise() {
   exit 75
 }
 
-# --- engines: they start this script elsewhere, each time with one share of the members ---
+# --- engines (GNU parallel, Slurm): they start this script several times, each time for a share of the member runs ---
 
-# Sets `share_command`, to which K/M must be appended, and `shares`, the number M of shares, which is at most the argument. Failed
-# members belong to no share.
+# Sets two variables: `shares` is the number M of shares, which is at most the argument, and `share_command` is the command for a
+# share, to which the text K/M must be appended. Failed member runs do not belong to any share.
 prepare_shares() {
   local most=$1 k here left=0
   here=$(cd -- "$folder" && pwd)
@@ -474,7 +480,7 @@ prepare_shares() {
     --manifest "$here/left.txt" -j 1 --share)
 }
 
-# The states of the members are determined from their files.
+# Determines which member runs have failed from their output and log files.
 judge_by_files() {
   local name said=''
   for name in "${names[@]}"; do
@@ -483,8 +489,8 @@ judge_by_files() {
   done
 }
 
-# TERM must be delivered to the script itself: a shell that runs the script would terminate at once, and GNU parallel would regard
-# the share as finished and continue with its sequence.
+# The signal TERM must be delivered to the script itself, and not to a shell that runs the script. Such a shell would terminate at
+# once, and GNU parallel would treat the share as finished although the script continues.
 run_parallel() {
   local options=(--will-cite -j "$jobs" --termseq 'TERM,600000') child=''
   command -v parallel >/dev/null || die "--engine parallel needs GNU parallel (package parallel)"
@@ -502,8 +508,8 @@ run_parallel() {
   judge_by_files
 }
 
-# Checks the input before jobs are submitted, so that an invalid input fails at once and not in the queue. Of members that differ
-# only in their seed, one is checked.
+# Checks the input before jobs are submitted, because an invalid input should not wait in the queue before it is reported. If
+# several member runs differ only in their seed, only the first of them is checked.
 check_inputs() {
   local k kind reason arguments
   local -A seen=()
@@ -518,7 +524,7 @@ check_inputs() {
   ((failed == 0)) || summarise 'nothing is submitted: correct the members that failed, or leave them out: '
 }
 
-# Members on other machines end shortly after the connection to them has ended.
+# Waits until the member runs on other computers have ended. They end shortly after the connection to these computers has ended.
 wait_for_locks() {
   local name
   for name in "${names[@]}"; do
@@ -527,7 +533,8 @@ wait_for_locks() {
   done
 }
 
-# The tasks of the array pass TERM on to the members. A task that reaches its time limit and was not cancelled is requeued.
+# Submits a job array to Slurm. Each task of the array forwards the signal TERM to its member runs. If a task reaches its time limit
+# and was not cancelled, it is added to the queue again.
 submit_to_slurm() {
   local id='' here text site
   command -v sbatch >/dev/null || die "--engine slurm needs Slurm (no sbatch here)"
@@ -567,7 +574,7 @@ exit \$status"
   exit 75
 }
 
-# --- command line ---
+# --- options of the command line ---
 
 trap 'fail 75 "stopped before any member ran"' TERM INT
 unset CDPATH
@@ -636,7 +643,8 @@ for k in "${!overrides[@]}"; do
   overrides[k]=${common:+$common${overrides[k]:+ }}${overrides[k]}
 done
 
-# The K-th of M shares consists of the members K, K + M, K + 2M, ..., or of the lines with these numbers in a manifest.
+# Share K of M consists of the member runs with the numbers K, K + M, K + 2M, and so on. With a manifest, the numbers are those of
+# its lines.
 if [[ -n $share ]]; then
   task=${SLURM_ARRAY_JOB_ID:+${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID:-}}
   task=${task:-share $share}

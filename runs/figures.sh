@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Reproduce the figures of every system and show them side by side in runs/figures/index.html.
+# Produces the figures of all systems, and a page runs/figures/index.html that shows all figures.
 #
 #   runs/figures.sh                 all
 #   runs/figures.sh gas crater      some
@@ -30,7 +30,7 @@ for system; do
   esac
 done
 
-# Writes a section for each existing figure: name, title, and the script that produces it.
+# Writes a section of the page for each existing figure, with its name, its title, and the script that produces it.
 section() {
   local name=$1 title=$2 script=$3 file
   for file in "$name".{png,mp4,gif}; do

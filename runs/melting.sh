@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
-# Melting: pressure against packing fraction, and pictures of the bond-orientational order.
+# Melting of hard disks: pressure against packing fraction, and pictures of the bond-orientational order.
 #
-# A crystal takes very long to melt between 0.70 and 0.72, and a liquid to freeze. Therefore 64^2 disks start from a crystal that is
-# about half melted at 0.66. There are two such starts, one slightly less and one slightly more melted, so that an influence of the
-# start shows as a difference between the runs. 128^2 disks start from four copies of the result, with new velocities. The script
-# takes several minutes; P* is then correct to 0.1 near melting, and warnings state at which packing fractions the two starts still
-# differ. FULL=1 performs longer runs, and runs of 256^2 disks, in about eight hours of processor time.
+# Between the packing fractions 0.70 and 0.72, crystals melt and liquids freeze very slowly. Therefore the runs of 64^2 disks start
+# from a crystal that has been melted by about half at a packing fraction of 0.66. Two starting states are used, one slightly less
+# and one slightly more melted. If the starting state affects the results, the two runs yield different results. The runs of 128^2
+# disks start from four copies of the final state of 64^2 disks, with new velocities. The script takes several minutes. The pressure
+# P* near melting is then correct to 0.1, and warnings name the packing fractions at which the two starting states yield different
+# results. With FULL=1 the script performs longer runs, and also runs of 256^2 disks, which takes about eight hours of processor
+# time.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 if [[ -n ${FULL:-} ]]; then
@@ -22,7 +24,7 @@ disks() { # arguments: number of disks along a side of the square, folder, furth
     --set "box.upper=$upper" --set "output.observables_every_collisions=$((5 * $1 ** 2))" "${@:3}"
 }
 
-# copy_four_times FOLDER NAME...: writes, for each run, a starting file with four copies of its last frame in a square.
+# copy_four_times FOLDER NAME...: writes for each run a starting file that contains four copies of its last frame, two by two.
 copy_four_times() {
   "$python" - "$@" <<'PYTHON'
 import sys

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Memory per disk of each kind of run, compared with the estimate of the program (src/start/memory.f90).
+# Memory per disk in different kinds of runs, compared with the estimate of the program (src/start/memory.f90).
 #
 #   runs/memory.sh             490 000 disks, on one core without domains, and 10^6 with domains
 #   runs/memory.sh 10000000    this number of disks, only the kinds of run with domains
 #   runs/memory.sh 490000 file only the kinds whose name contains a word
 #
-# The measured number is the largest resident memory of the process, and the estimate is that printed by --check. The script needs
-# about 250 bytes of memory per disk (700 with neighbour lists). Other programs may run at the same time. The measured program is
-# RICOCHET=build/ricochet.
+# The script measures the largest resident memory of the process, and compares it with the estimate that the option --check prints.
+# The runs need about 250 bytes of memory per disk, or 700 bytes with neighbour lists. Other programs may run at the same time. The
+# environment variable RICOCHET names the measured program (default build/ricochet).
 set -euo pipefail
 export LC_ALL=C # awk then reads and writes 0.5 with a point in every language
 case ${1:-} in -h | --help) sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
@@ -17,8 +17,8 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 verdict=0
 
-# kind DISKS NAME TEXT...: runs an input that consists of the lines TEXT, in which %N stands for the number of disks, and prints a
-# row. If NAME begins with `keep`, the output is kept as the starting file of other kinds.
+# kind DISKS NAME TEXT...: performs a run and prints a row of the table. The input file consists of the lines TEXT, in which %N is
+# replaced by the number of disks. If NAME begins with `keep`, the output file is kept, and other kinds of runs can start from it.
 kind() {
   local disks=$1 name=$2 out=$work/run.h5 assumed used
   shift 2

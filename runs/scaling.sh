@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
-# Speedup of a run on several cores of this machine. The script takes about five minutes, during which no other program should run.
-# The script is not part of `make figures`. The runs are gases at a packing fraction of 0.5 in a box with walls, for 6 million collisions
-# (15 million for a million disks). Each is run three times, alternately with 1, 2, 4, ... threads up to the number of cores.
+# Speedup of a simulation that uses several cores of this computer. The script takes about five minutes, and no other program should
+# run during this time. `make figures` does not call this script. The simulated systems are gases in a box with walls at a packing
+# fraction of 0.5. Each run has 6 million collisions, or 15 million collisions for a million disks. Each system is simulated three
+# times, alternately with 1, 2, 4, ... threads up to the number of cores.
 #
 #   runs/scaling.sh
 #   SIZES="10000 100000" THREADS="1 2 3" RUNS=5 runs/scaling.sh
 #
-# post/scaling.py draws the figure; remove runs/scaling to repeat the measurement.
+# The script post/scaling.py draws the figure. To repeat the measurement, remove the folder runs/scaling.
 set -euo pipefail
 if (($# > 0)); then
   sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"

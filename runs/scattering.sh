@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# S1: scattering angle of a light disk that collides with a heavy disk, for 81 impact parameters b/R12 in -1.2..1.2.
+# Exercise S1: scattering angle of a light disk that collides with a heavy disk, for 81 impact parameters b/R12 between -1.2 and
+# 1.2.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# Height of the light disk: 0.5 + b, R12 = 0.1 + 0.001.
+# The light disk starts at the height 0.5 + b; the sum of the radii is R12 = 0.1 + 0.001.
 for k in {-40..40}; do
   awk -v k="$k" 'BEGIN {
     s = 1.2 * k / 40

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# A sequence of runs of one system, each of which starts from the last frame of the previous run: compressed in two steps, relaxed,
-# cooled, heated, expanded.
+# A sequence of runs of one system. Each run starts from the last frame of the previous run. The system is compressed in two steps,
+# relaxed, cooled, heated and expanded.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 stage() { # arguments: name, name of the previous run, further options of ensemble.sh

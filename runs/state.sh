@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Bulk hard disks: equation of state, time correlations and order, Haff's law; four seeds each.
+# Properties of hard disks in a periodic box: equation of state, time correlations, order, and Haff's law; four seeds each.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# Pressure: initial positions are random up to a packing fraction of 0.5 and made by Lubachevsky-Stillinger compression up to 0.7;
-# from 0.72 on they form a crystal in a commensurate box.
+# Runs for the pressure: the initial positions depend on the packing fraction. Up to 0.5 they are random, up to 0.7 they result from
+# Lubachevsky-Stillinger compression, and for 0.72 and above they form a crystal in a commensurate box.
 runs/ensemble.sh input/bulk.nml -d "$data/fluid" --seeds 1-4 \
   --scan species.disks.packing_fraction=0.05,0.1,0.15,0.2,0.25,0.3,0.35,0.4,0.45,0.5 "$@"
 runs/ensemble.sh input/bulk.nml -d "$data/dense" --seeds 1-4 --set species.disks.placement=dense \
@@ -15,8 +15,8 @@ runs/ensemble.sh input/bulk.nml -d "$data/crystal" --seeds 1-4 \
 "$python" post/equation_of_state.py "$data"/{fluid,dense,crystal}/*.h5 \
   -o "$figures/equation_of_state.png" --csv "$figures/equation_of_state.csv"
 
-# Time correlations: the interval between frames is about a tenth of the mean free time at each packing fraction; the runs start
-# from equal speeds.
+# Runs for time correlations: at each packing fraction, the interval between frames is about a tenth of the mean free time. All
+# disks start with the same speed.
 memory=()
 while read -r packing interval placement; do
   runs/ensemble.sh input/bulk.nml -d "$data/memory_$packing" --seeds 1-4 \
@@ -35,7 +35,7 @@ TABLE
   --csv "$figures/correlations.csv"
 "$python" post/rates.py "$data"/memory_0.3/*.h5 -o "$figures/rates.png" --csv "$figures/rates.csv"
 
-# Cooling of a dilute gas: the theory is valid until the shear (clustering) instability sets in.
+# Runs for the cooling of a dilute gas: the theory is valid until flows and clusters develop (shear and clustering instability).
 runs/ensemble.sh input/bulk.nml -d "$data/cooling" --seeds 1-8 \
   --set species.disks.packing_fraction=0.02 --set stop.collisions_per_disk=60 \
   --set output.observables_every_collisions=100 --scan contact.restitution=0.95,0.9,0.8 "$@"
