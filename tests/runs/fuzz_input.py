@@ -1,8 +1,8 @@
 """Run the program with thousands of damaged input files and check its reactions.
 
-Whatever the file, --check must end within seconds with status 0 or 2, without a backtrace. Refused,
-the lines name the file; accepted, what --print-input says of it is the same when it is written anew
-and read again.
+For every input file, --check must end within seconds with the exit status 0 or 2 and without a
+backtrace.  If the file is refused, all messages must name the file.  If the file is accepted, the
+output of --print-input must not change when it is written to a new input file and read again.
 
     python tests/runs/fuzz_input.py --count 10000 --program build/ricochet
 """
@@ -64,7 +64,7 @@ TOKENS += ["(\n", "\n", "\r\n", "\r", "\t", "\x00", "\x1b", "\xa0", "\u2212", "\
 
 
 def mutate(rng: random.Random, text: str) -> bytes:
-    """Return a copy of the text with one to four damages."""
+    """Return a copy of the text with one to four random changes."""
     data = text.encode()
     for _ in range(rng.choice([1, 1, 1, 2, 4])):
         data = rng.choice(INJURIES)(rng, data)
@@ -141,7 +141,7 @@ INJURIES += [shuffle_lines, truncate, change_layout, insert_space, insert_space,
 
 
 def judge(program: str, data: bytes, path: Path) -> tuple[str, str]:
-    """Return 'accepted', 'refused' or the fault, with details."""
+    """Return 'accepted', 'refused' or the kind of fault, with details."""
     path.write_bytes(data)
     run = asked(program, path, "--check")
     errors = run.stderr.decode("utf-8", "replace").rstrip("\n")
@@ -167,13 +167,13 @@ def asked(program: str, path: Path, option: str) -> subprocess.CompletedProcess:
 
 
 def printed(program: str, path: Path) -> list[tuple[str, dict]]:
-    """Return the groups of an input file and their values."""
+    """Return the groups of an input file and their values, as the program prints them."""
     told = asked(program, path, "--print-input").stdout.decode("utf-8", "surrogateescape")
     return [(group["group"], group["values"]) for group in json.loads(told or "[]")]
 
 
 def cases(count: int, seed: int):
-    """Yield mutated files; every tenth file consists of random bytes."""
+    """Yield damaged input files; every tenth file consists of random bytes."""
     for number in range(count):
         rng = random.Random(f"{seed} {number}")
         if number % 10 == 9:
@@ -183,7 +183,7 @@ def cases(count: int, seed: int):
 
 
 def fuzz(program: str, count: int, seed: int) -> Counter:
-    """Return the numbers of verdicts by kind; files with faults are printed to stderr."""
+    """Return how often each verdict occurred, and print files with faults to stderr."""
     verdicts: Counter = Counter()
     files = list(cases(count, seed))
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count() or 1) as pool:

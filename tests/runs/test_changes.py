@@ -1,12 +1,14 @@
-"""Changes of a running simulation, which continues like one that is loaded from a file.
+"""Changes of a running simulation: it continues exactly like a simulation loaded from a file.
 
-Each random system is advanced, and changed at random moments: gravity, the laws and motions of all
-boundaries, the driving, the contacts and the velocities.  The first course also tries changes that
-are refused and changes in which no value differs, which do nothing.  Two others advance to the same
-moments in other slices, on several threads, with another search and queue, and are saved and loaded
-on the way.  The program continues the last file.  All end with the same bits.
+Each test advances a random system and changes it at random times.  The changes concern gravity, the
+collision rules and motions of all boundaries, the driving, the contact law and the velocities.  The
+first simulation of a system also attempts invalid changes, and changes to equal values, which must
+have no effect.  Two further simulations advance to the same times in other steps, on several
+threads, with another search and event queue, and are saved and loaded between changes.  The program
+continues the last saved file.  All final states must be bit-identical.
 
-`SYSTEMS=300 SEED=20270131` takes other systems and more of them, as `make check` does each day.
+The environment variables SYSTEMS and SEED set the number of systems and the seed, for example
+`SYSTEMS=300 SEED=20270131`.  `make check` uses another seed every day.
 """
 
 import os
@@ -47,18 +49,18 @@ CONTACT += ("reference_speed", "wall_rule", "tangential_restitution", "friction"
 CONTACT += ("wall_tangential_restitution", "wall_friction")
 SAMPLED = ("total_energy", "dissipated_energy", "heat", "work", "drive_energy")
 SAMPLED += ("all/kinetic_energy",)
-#: Features for which the trajectory depends on more than the present state of the disks.
+#: Features with which the trajectory depends on more than the present state of the disks.
 MEMORY = r"&drive|contact_time|temperature =|motion =|shear_rate|'steps'|pair_restitution"
 
 
 class Change(NamedTuple):
-    """Settings GROUP.VARIABLE=VALUE, or the velocities of all disks."""
+    """A change of a simulation: settings GROUP.VARIABLE=VALUE, or velocities of all disks."""
 
     settings: list[str]
     velocity: np.ndarray | None = None
 
     def apply(self, simulation: Simulation) -> None:
-        """Apply the change to a simulation at its present time."""
+        """Apply this change to a simulation at its present time."""
         if self.velocity is None:
             simulation._change(self.settings)
         else:
@@ -66,13 +68,13 @@ class Change(NamedTuple):
 
 
 def settings(group: str, words: str, reset: tuple[str, ...] = ()) -> list[str]:
-    """GROUP.VARIABLE=VALUE of the words of a group; variables to reset get their defaults."""
+    """Return settings GROUP.VARIABLE=VALUE, where the variables in `reset` have default values."""
     values = dict(re.findall(r"(\w+) = ('\w+'|[^ ,]+(?:, [^ ,]+)*)", words))
     return [f"{group}.{name}={values.get(name, '')}" for name in {**dict.fromkeys(reset), **values}]
 
 
 def drawn_change(simulation: Simulation, draw: Draw) -> Change:
-    """Return a random change that is valid for the initial system; the program may refuse it."""
+    """Return a random change that is valid for the initial system but may be refused later."""
     rng = draw.rng
     walls = {name.rpartition(".")[0] for name in simulation._values()}
     walls = sorted(wall for wall in walls if wall.startswith(("obstacle.", "wall.")))
@@ -104,7 +106,7 @@ def drawn_change(simulation: Simulation, draw: Draw) -> Change:
 
 
 def drawn_velocity(simulation: Simulation, draw: Draw) -> np.ndarray:
-    """Return velocities that are related to the present ones, or independent of them."""
+    """Return new random velocities, which may depend on the present velocities."""
     rng, velocity = draw.rng, simulation.velocity
     if draw.chance(0.25):
         return velocity[::-1].copy()
@@ -116,10 +118,10 @@ def drawn_velocity(simulation: Simulation, draw: Draw) -> np.ndarray:
 
 
 class Course:
-    """A random system in memory with a record of its changes, by which it can be repeated."""
+    """A simulation of a random system, with a record of its changes for repetitions."""
 
     def __init__(self, program: Path, seed: str):
-        """Write the input of the system into a folder."""
+        """Draw a random system, and write its input file into a folder."""
         self.program, self.rng = program, random.Random(seed)
         system = accepted(program, Path(), self.rng, most=MOST_DISKS)
         self.draw, self.steps = system.draw, "'steps'" in system.text
@@ -134,7 +136,7 @@ class Course:
         self.found: dict = {}  #: all that files of it have said
 
     def next_moment(self, simulation: Simulation) -> dict:
-        """Return the next moment: a number of events, or a time suited to the present speeds."""
+        """Return when the next change occurs: after a number of events, or at a time."""
         rng, draw = self.rng, self.draw
         speed = simulation.observable("all/mean_speed") or draw.speed
         if draw.sheared:
@@ -148,14 +150,14 @@ class Course:
         return {"time": simulation.time + time, "events": events}
 
     def advance(self, simulation: Simulation) -> None:
-        """Advance the simulation to the next moment."""
+        """Advance the simulation to the next change."""
         moment = self.next_moment(simulation)
         self.moments.append((moment, simulation.time))
         simulation.advance(**moment)
         self.moments[-1] = moment, simulation.time
 
     def run(self) -> Simulation:
-        """Perform the first run, which the other runs repeat."""
+        """Perform the first simulation, which all further simulations repeat."""
         simulation = Simulation("case.nml")
         self.look(simulation)
         try:
@@ -176,7 +178,7 @@ class Course:
         return simulation
 
     def attempt(self, simulation: Simulation, change: Change) -> None:
-        """Attempt a change that may be refused, beside a change to equal values."""
+        """Attempt a change that may be refused, together with a change to equal values."""
         if self.rng.random() < 0.3:
             self.change_nothing(simulation)
         before = facts(simulation)
@@ -205,7 +207,7 @@ class Course:
             self.faults.append(f"a change of nothing: {unlike(before, facts(simulation))}")
 
     def look(self, simulation: Simulation) -> None:
-        """Sample the energies, and determine the largest overlap."""
+        """Record the energies, and determine the largest overlap of disks."""
         observed = simulation._observed()
         for name, values in self.samples.items():
             values.append(float(observed[name][0]) if name in observed else 0.0)
@@ -225,7 +227,7 @@ class Course:
                 self.faults.append(f"overlap {deepest:g} times what is allowed at {time}")
 
     def judge_energy(self) -> None:
-        """Check the energy balance of the whole run."""
+        """Check the energy balance of the whole simulation."""
         found = {name: value for name, value in self.found.items() if "/observables" not in name}
         for name, values in self.samples.items():
             found[f"/observables/{name}/value"] = np.array(values)
@@ -233,7 +235,7 @@ class Course:
             self.faults.append(f"energy: {part:g} times what is allowed")
 
     def repeat(self, name: str) -> Simulation:
-        """Repeat the run with other steps and another method, saved and loaded."""
+        """Repeat the simulation with other steps and methods, and with saving and loading."""
         rng, simulation = self.rng, Simulation("case.nml", *self.way())
         for k in range(len(self.moments) + 1):
             if k > 0:
@@ -251,7 +253,7 @@ class Course:
         return simulation
 
     def way(self) -> tuple[dict[str, str], int]:
-        """Return variables and a number of threads that do not change the results."""
+        """Return random variables, and a number of threads, that must not change the results."""
         searches = ["cells", "pairs", *["rescan"] * (self.draw.disks <= 60)]
         ways = {"run.search": self.rng.choice(searches)}
         if not self.steps:
@@ -259,7 +261,7 @@ class Course:
         return ways, self.rng.choice([1, 1, 2, 3])
 
     def continue_by_program(self, simulation: Simulation) -> None:
-        """Check that the program continues a file as the simulation does, to the same end."""
+        """Check that the program continues a saved file to the final state of the simulation."""
         simulation.save("last.h5", force=True, input="last.nml")
         moment = self.next_moment(simulation)
         stop = [f"--set=stop.{name}={value!r}" for name, value in moment.items()]
@@ -283,7 +285,7 @@ class Course:
             self.faults.append(f"the program differs: {different}, times {where}")
 
     def start_from_last_frame(self, simulation: Simulation) -> None:
-        """Check that a run from the last frame has the same first collisions."""
+        """Check that a run which starts from the last frame has the same first collisions."""
         text, slowest = simulation.input, np.abs(simulation.velocity)
         if re.search(MEMORY, text) or np.any((slowest > 0) & (slowest < 1e-100)):
             return
@@ -311,7 +313,7 @@ class Course:
 
 
 def kept(simulation: Simulation, name: str) -> Simulation:
-    """Return the simulation after saving and loading."""
+    """Save and load a simulation, and return the loaded simulation."""
     simulation.save(f"{name}.h5", force=True)
     simulation.close()
     return Simulation.load(f"{name}.h5")
@@ -325,18 +327,18 @@ def facts(simulation: Simulation) -> dict[str, np.ndarray]:
 
 
 def unlike(one: dict, other: dict) -> list[str]:
-    """Return the names of the properties that are not bit-identical."""
+    """Return the names of properties that differ in any bit."""
     same = {name for name in one if name in other and one[name].tobytes() == other[name].tobytes()}
     return sorted((one.keys() | other.keys()) - same)
 
 
 def without_ways(text: str) -> str:
-    """Return an input without the variables that do not change the results."""
+    """Return an input text without the variables that must not change the results."""
     return re.sub(r"  (search|queue) = .*\n", "", text)
 
 
 def faults(program: Path, seed: str) -> list[str]:
-    """Return the faults found for the changes of a random system."""
+    """Return descriptions of all faults found in simulations of a random system."""
     course = Course(program, seed)
     first = course.run()
     for name in ("again", "other"):
@@ -367,7 +369,7 @@ def test_a_changed_simulation_continues_exactly(program, tmp_path, monkeypatch, 
 
 
 def test_a_change_suppresses_no_collision():
-    """Two disks collide again through the sides; the local times of both are that of the change."""
+    """After the change two disks collide again across periodic sides, at the time of the change."""
     gas = Simulation(
         """&box boundary = 'periodic', 'periodic' /
         &species name = 'a' radius = 0.1 position = 0.3, 0.5, 0.7, 0.5 velocity = 1, 0, 0, 0 /"""
@@ -380,7 +382,7 @@ def test_a_change_suppresses_no_collision():
 
 @pytest.mark.parametrize("pull", [-1e35, -1e50, -1e90])
 def test_extreme_accelerations_leave_the_caller_in_control(pull):
-    """`advance` returns after a limited time."""
+    """`advance` returns after a limited time even if disks are accelerated extremely."""
     script = f"""
 from ricochet import Simulation
 disks = {{"count": 50, "packing_fraction": 0.1, "speed": 1}}
@@ -393,7 +395,7 @@ assert gas._go_on((1.0, 2**62, 2**62), 0.05) and gas.events > events"""
 
 @pytest.mark.parametrize("factor", [1e-3, 1e-9, 1e-11])
 def test_a_gas_that_was_slow_for_long_is_exact_when_it_is_fast_again(factor):
-    """Times are relative to the change, so that overlaps are rounding errors of the fast gas."""
+    """Overlaps are not larger than rounding errors, because times are relative to the change."""
     disks = {"count": 50, "packing_fraction": 0.2, "speed": 1}
     gas = Simulation({"species": disks}).advance(time=0.5)
     gas.velocity = factor * gas.velocity
@@ -419,7 +421,7 @@ def test_a_gas_that_was_slow_for_long_is_exact_when_it_is_fast_again(factor):
 def test_a_cold_gas_ends_at_the_same_time_in_memory_and_by_the_program(
     program, tmp_path, monkeypatch, act, reached
 ):
-    """The gas soon cools by 1e-25; after a change this is relative to the changed velocities."""
+    """A gas stops after cooling by 1e-25, relative to the velocities after the last change."""
     monkeypatch.chdir(tmp_path)
     text = "&box upper = 1, 1 boundary = 'periodic', 'periodic' /\n&contact restitution = 0.1 /\n"
     text += "&species name = 'a' radius = 0.1 position = 0.3, 0.5, 0.7, 0.5"
@@ -434,7 +436,7 @@ def test_a_cold_gas_ends_at_the_same_time_in_memory_and_by_the_program(
 
 
 def test_a_piston_without_force_does_work():
-    """Disks push the piston, which pushes other disks."""
+    """Disks transfer energy to the piston, and the piston transfers energy to other disks."""
     disks = {"name": "a", "count": 30, "packing_fraction": 0.1, "speed": 1}
     piston = {"name": "right", "motion": "piston", "mass": 10, "force": 0}
     gas = Simulation({"species": disks, "side": piston}).advance(events=300)
@@ -443,7 +445,7 @@ def test_a_piston_without_force_does_work():
 
 
 def test_a_held_piston_is_released_where_it_is_and_held_there():
-    """This is possible at any time; the saved input contains the position."""
+    """A piston can be stopped and released at any time; the saved input contains its position."""
     disks = {"name": "a", "count": 30, "packing_fraction": 0.1, "speed": 1}
     gas = Simulation({"species": disks}).advance(time=0.5)
     gas.change({"side.right.motion": "piston", "side.right.mass": 20, "side.right.force": 25})
@@ -458,7 +460,7 @@ def test_a_held_piston_is_released_where_it_is_and_held_there():
 
 
 def test_a_changed_simulation_whose_start_would_not_fit_is_saved(program, tmp_path, monkeypatch):
-    """An initial disk overlaps the position at which the side is now held."""
+    """The side is fixed at a position that one of the initial disks overlaps."""
     monkeypatch.chdir(tmp_path)
     disks = {"name": "a", "radius": 0.05, "position": [0.3, 0.5, 0.94, 0.5], "speed": 1}
     side = {"name": "right", "motion": "constant_velocity", "velocity": 0.5, "end_time": 1}

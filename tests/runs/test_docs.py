@@ -1,4 +1,4 @@
-"""The pages say what is there: current reference, no dead links, commands that exist."""
+"""Tests of the documentation: links, names of procedures, commands, examples and numbers."""
 
 import importlib.util
 import json
@@ -23,14 +23,14 @@ ELSEWHERE = ("http://", "https://", "mailto:", "#")
 
 
 def section(page, heading):
-    """The text in docs/ under a heading, and the headings below it."""
+    """Return the text below a heading of a page in docs/, including subheadings."""
     text = (ROOT / "docs" / f"{page}.md").read_text()
     level = len(heading) - len(heading.lstrip("#"))
     return re.search(rf"^{heading}$(.*?)(?=^#{{1,{level}}} |\Z)", text, re.M | re.S)[1]
 
 
 def script_in_docs(name):
-    """A script in docs/ as a module."""
+    """Import a script of docs/ as a module."""
     source = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
     module = importlib.util.module_from_spec(source)
     source.loader.exec_module(module)
@@ -54,7 +54,7 @@ def test_the_queues_on_the_page_are_those_of_the_engine(program):
 
 
 def sections_of(page):
-    """The headings of a page as links name them."""
+    """Return the headings of a page in the form that links use."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(), re.M)
     return [re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings]
 
@@ -83,7 +83,7 @@ def test_the_readme_leads_to_every_page():
     ("page", "heading"), [("limits", "## Promises"), ("inside", "## Invariants")]
 )
 def test_promises_are_held_by_tests_and_modules_that_exist(page, heading):
-    """In the tables the second column names files and tests, a third one modules and scripts."""
+    """The second column of each table names tests, and the third column modules or scripts."""
     sources = [*ROOT.glob("tests/**/*.py"), *ROOT.glob("tests/**/*.pf")]
     known = re.findall(
         r"^def test_(\w+)|^  subroutine (\w+)", "".join(p.read_text() for p in sources), re.M
@@ -102,14 +102,14 @@ def test_promises_are_held_by_tests_and_modules_that_exist(page, heading):
 
 
 def procedures_of(module):
-    """The names of all procedures of a module, named as in `physics/collisions`."""
+    """Return the names of all procedures of a module such as `physics/collisions`."""
     path = ROOT / "src" / f"{module}.f90"
     code = path.read_text() if path.exists() else ""
     return re.findall(r"^ *(?!end\b)[^!'\"\n]*?\b(?:subroutine|function) +(\w+) *\(", code, re.M)
 
 
 def test_procedures_that_are_named_exist():
-    """On docs/inside.md `folder/file: procedure` is one in src/."""
+    """Each name `folder/file: procedure` in docs/inside.md is the name of a procedure in src/."""
     page = (ROOT / "docs" / "inside.md").read_text()
     named = re.findall(r"`((?:\w+/)?\w+): (\w+)`", page)
     assert len(named) > 30
@@ -121,7 +121,7 @@ def test_procedures_that_are_named_exist():
 
 
 def called(build, *words, cwd):
-    """The (module, procedure) pairs that a run of a program built with --coverage calls."""
+    """Return the (module, procedure) pairs that a run calls, if built with --coverage."""
     for counts in build.glob("*.gcda"):
         counts.unlink()
     ran(build / "ricochet", *words, cwd=cwd)
@@ -170,7 +170,7 @@ def test_procedures_that_are_named_are_called_in_their_examples(tmp_path):
 
 @pytest.mark.parametrize("folder", sorted(p.name for p in ROOT.glob("src/*/")))
 def test_every_folder_introduces_its_modules_and_says_which_tests_protect_it(folder):
-    """After "Protected by" its README names files, or folders, in tests/."""
+    """The README of each folder names existing tests after the words "Protected by"."""
     page = (ROOT / "src" / folder / "README.md").read_text()
     modules = [path.stem for path in (ROOT / "src" / folder).glob("*.f90")]
     assert [name for name in modules if not re.search(rf"`{name}\b", page)] == []
@@ -182,7 +182,7 @@ def test_every_folder_introduces_its_modules_and_says_which_tests_protect_it(fol
 
 
 def test_options_that_are_named_exist(program):
-    """Options of ricochet in code blocks of the pages."""
+    """All options of ricochet in code blocks of the pages exist."""
     known = ran(program, "--help", check=True).stdout
     for page in PAGES:
         for line in page.read_text().splitlines():
@@ -202,7 +202,7 @@ def test_the_numbers_of_the_tasks_are_those_of_their_tables():
 
 @pytest.mark.check
 def test_the_studies_give_the_numbers_of_the_tasks(program, tmp_path, monkeypatch):
-    """Cases that take less than a minute; from other trajectories, within their errors."""
+    """The exercises that take less than a minute are repeated, and agree within their errors."""
     (tmp_path / "runs").mkdir()
     for script in (ROOT / "runs").glob("*.sh"):
         shutil.copy(script, tmp_path / "runs")
@@ -293,7 +293,7 @@ def test_the_code_that_the_page_on_output_shows_runs_the_program(program, tmp_pa
 
 
 def test_the_code_that_the_page_on_output_shows_finds_how_disks_move(program, tmp_path):
-    """Of a tenth of the disks, in a box as dense, for a twentieth of the time."""
+    """The example is executed with a tenth of the disks and a twentieth of the time."""
     page = section("output", "## How disks move and are arranged")
     blocks = [textwrap.dedent(one) for one in re.findall(r"(?:^    .*\n)+", page, re.M)]
     assert len(blocks) == 3
@@ -317,7 +317,7 @@ def test_the_code_that_the_page_on_output_shows_finds_how_disks_move(program, tm
 
 
 def test_the_code_that_the_page_on_output_shows_finds_what_disks_carry(program, tmp_path):
-    """Of two seeds, for a thousandth of the time."""
+    """The example is executed with two seeds and a thousandth of the time."""
     page = section("output", "## What disks carry")
     blocks = [textwrap.dedent(one) for one in re.findall(r"(?:^    .*\n)+", page, re.M)]
     (tmp_path / "runs").mkdir()
@@ -335,7 +335,7 @@ def test_the_code_that_the_page_on_output_shows_finds_what_disks_carry(program, 
 
 
 def test_there_is_one_version(program):
-    """The version of the program, the newest section of the changes, and the date to cite."""
+    """Program, CHANGELOG and citation file contain the same version and date."""
     said = ran(program, "--version", check=True).stdout
     init = (ROOT / "post/ricochet/__init__.py").read_text()  # pip takes it from there
     packaged = re.search(r'^__version__ = "(.*)"$', init, re.M)[1]
@@ -349,7 +349,7 @@ COMPLETION = ROOT / "docs" / "ricochet-completion.bash"
 
 
 def completed(program, *words):
-    """The proposals of bash for the last word."""
+    """Return the completions that bash proposes for the last word."""
     script = """source "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _ricochet
     printf '%s\\n' "${COMPREPLY[@]}" """
     command = ["bash", "-c", script, "bash", COMPLETION, program, *words]
@@ -396,7 +396,7 @@ def test_completion_knows_ensembles(program, tmp_path):
 
 
 def replace_lines(text: str, old: list[str], new: list[str]) -> str:
-    """The text with some whole lines, found by all but their indent, replaced once."""
+    """Replace complete lines of a text, which are found without regard to their indentation."""
     pattern = "".join(rf"^( *){re.escape(line.strip())}\n" for line in old)
     (found,) = re.finditer(pattern, text, re.MULTILINE)
     lines = [f"{found[1]}{line}\n" if line.strip() else "\n" for line in new]
@@ -404,7 +404,7 @@ def replace_lines(text: str, old: list[str], new: list[str]) -> str:
 
 
 def carry_out_recipes(page: str, root: Path) -> int:
-    """Makes the changes to the sources that a page describes: new files, and blocks of lines."""
+    """Apply the changes of the source code that a page describes: new files and new lines."""
     for name, code in re.findall(r"`(src/\S+)`, a new file:\n\n((?:    .*\n|\n)+)", page):
         (root / name).write_text(textwrap.dedent(code).rstrip("\n") + "\n")
     changes = 0
@@ -420,7 +420,7 @@ def carry_out_recipes(page: str, root: Path) -> int:
 
 
 def look_at_bars(run, folder):
-    """The bar is on the pages of Python; paths are known that meet it more than once."""
+    """Check the results of the recipe for a bar in Python and in the paths of disks."""
     ran(*run, "--set", "contact.wall_rule=normal", "--force", cwd=folder, check=True)
     code = """if True:
         from ricochet import read_run
@@ -500,11 +500,11 @@ def test_the_recipes_work(tmp_path):
         assert (hits.sum(1) == file["observables/side_collisions/value"][:].sum(1)).all()
 
 
-# --- the notebook runs from its first cell to its last, and shows what it promises ---
+# --- the notebook: all cells can be executed, and show the results that its text describes ---
 
 
 def test_one_command_installs_what_the_notebook_needs():
-    """Jupyter, its kernel, and what the cells and the methods that they call import."""
+    """The command installs Jupyter, its kernel, and all packages that the cells import."""
     wanted = {"ipykernel", "jupyterlab", "pandas"}
     lines = (ROOT / "requirements.txt").read_text().splitlines()
     installed = {line.split("==")[0] for line in lines if re.search(r"==.*#.*\bnotebook\b", line)}
@@ -527,7 +527,7 @@ def test_the_page_says_all_that_a_run_can_do():
 
 @pytest.mark.check
 def test_each_cell_shows_what_it_promises(program, monkeypatch):
-    """Figures, a film with buttons, a conserved energy, a mistake that is told; no warning."""
+    """The cells show figures, a film, a conserved energy and an error message, but no warning."""
     nbclient = pytest.importorskip("nbclient")
     import nbformat
 
@@ -547,7 +547,7 @@ def test_each_cell_shows_what_it_promises(program, monkeypatch):
 
 
 def shown(cell):
-    """The output of a cell as one text."""
+    """Return the output of a notebook cell as one text."""
     return "\n".join(
         str(output.get("text", "")) + "\n".join(map(str, output.get("data", {}).items()))
         for output in cell.outputs
@@ -555,6 +555,6 @@ def shown(cell):
 
 
 def showing(cells, code):
-    """The output of the only cell that contains this code."""
+    """Return the output of the only notebook cell that contains this code."""
     (found,) = [output for source, output in cells if code in source]
     return found

@@ -1,7 +1,8 @@
-"""Sheared boxes, driving, moving sides and walls with collision rules, in special cases.
+"""Special cases of sheared boxes, driving, moving sides and collision rules of walls.
 
-Bits, balances, momentum and gaps are asserted of all systems (test_random_systems.py), what baths,
-noise, swimming disks, viscosity and bouncing come to in the validation.
+General properties such as bit-identical results and conservation laws are tested with random
+systems in test_random_systems.py.  Physical results for heat baths, noise, active disks, viscosity
+and bouncing disks are tested in tests/validation.
 """
 
 import numpy as np
@@ -14,7 +15,7 @@ from whole_runs import BROKEN, FINISHED, contents, one_line, write_input
 
 @pytest.fixture
 def performed(ricochet, tmp_path):
-    """`performed(text, *settings)`: the path of the output, a file of its own, and what is said."""
+    """Return a function that performs a run and returns the path of its output and its messages."""
 
     def run(text: str, *settings: str):
         write_input(tmp_path, text)
@@ -33,11 +34,11 @@ def run_of(performed):
 
 @pytest.fixture
 def observed(performed):
-    """`observed(text, *settings)` is all that the run of an input writes."""
+    """Return a function that performs a run of an input and returns all data of its output."""
     return lambda *words: contents(performed(*words)[0])
 
 
-# --- shear ---
+# --- sheared boxes ---
 
 SHEARED = """&run seed = 3 /
 &box lower = -3, 1 upper = 7, 9 boundary = 'periodic', 'periodic' shear_rate = 0.7 /
@@ -48,7 +49,7 @@ SHEARED = """&run seed = 3 /
 
 
 def test_a_pair_meets_across_the_seam_as_inside(run_of):
-    """By Galilean invariance, the disk beyond the top has the velocity of its image."""
+    """A collision across the sheared boundary is equivalent to a collision inside the box."""
     slip, lift = 0.3 * 10, np.array([0, 4.5])
     place = np.array([[3, 5], [4.2, 5.9]])
     velocity = np.array([[0.5, 0.3], [-0.6, -0.4]])
@@ -69,7 +70,8 @@ def test_a_pair_meets_across_the_seam_as_inside(run_of):
     assert len(inside.event_log().time) == len(across.event_log().time) == 1
     assert across.event_log().time == pytest.approx(inside.event_log().time, rel=1e-13)
     assert across.event_log().impulse == pytest.approx(inside.event_log().impulse, rel=1e-13)
-    # b is now as it was: below the seam, and slower by the slip, or above it
+    # Disk b is now below the sheared boundary and slower by the velocity of the image, or above the
+    # boundary.
     rows = across.image[-1][1, 1] - across.image[0][1, 1]
     frame = np.array([[0, 0], [slip * (1 + rows), 0]])
     assert across.velocity[-1] + frame == pytest.approx(inside.velocity[-1], rel=1e-12)
@@ -78,7 +80,7 @@ def test_a_pair_meets_across_the_seam_as_inside(run_of):
 
 
 def test_a_free_disk_goes_straight_on(run_of):
-    """Its unwrapped path is straight across all sides."""
+    """The unwrapped path of a free disk is straight, also across periodic sides."""
     run = run_of(
         """&box lower = -1, 2 upper = 2, 4 boundary = 'periodic', 'periodic' shear_rate = -0.4 /
         &species name = 'a' radius = 0.1 position = 0.5, 2.5 velocity = 0.3, 1.7 /
@@ -125,9 +127,9 @@ def test_kicks_are_relative_to_the_profile(run_of):
     assert run.observable("all/temperature").value[-1] == pytest.approx(2, rel=5 / np.sqrt(3000))
 
 
-# --- kicks ---
+# --- driving: changes of velocities at fixed intervals ---
 
-#: One disk without collisions.
+#: Input of one disk that does not collide.
 ONE = """&box boundary = 'periodic', 'periodic' upper = 50, 50 /
 &species count = 1 radius = 0.1 mass = 2 temperature = 0.6 /
 &output frames_every_time = {} /
@@ -145,7 +147,7 @@ ONE = """&box boundary = 'periodic', 'periodic' upper = 50, 50 /
 def test_kicks_are_at_multiples_of_the_interval_and_no_events(
     observed, every, interval, end, steps, kicked
 ):
-    """The velocity changes only at kicks; with time steps, at the end of the step."""
+    """The velocity changes only at kicks, or at the end of a time step that contains a kick."""
     drive = f"&drive kind = 'brownian' interval = {interval} temperature = 1 / &stop time = {end} /"
     found = observed(ONE.format(every) + drive + steps)
     velocity = found["/particles/disks/velocity/value"][:, 0]
@@ -155,7 +157,7 @@ def test_kicks_are_at_multiples_of_the_interval_and_no_events(
 
 
 def test_energy_balances_where_kinetic_and_potential_energy_cancel(observed):
-    """The sum over many disks is much smaller than its terms, but equally exact."""
+    """The total energy of many disks is much smaller than its parts, but equally accurate."""
     found = observed(
         """&box lower = -0.5, 9.5 upper = 0.5, 10.5 gravity = 0, 0.1 /
         &species count = 5000 packing_fraction = 0.1 temperature = 1 /
@@ -169,7 +171,7 @@ def test_energy_balances_where_kinetic_and_potential_energy_cancel(observed):
 
 
 def test_what_was_met_last_is_met_again_after_a_kick(observed):
-    """Two adjacent disks are repeatedly kicked together; no collision is left out."""
+    """Two touching disks are repeatedly driven against each other, and no collision is missed."""
     found = observed(
         "&species count = 2 radius = 0.1 position = 0.1, 0.5, 0.3, 0.5 /"
         "&box upper = 0.400001, 1 / &contact restitution = 0.99 contact_time = 1e-12 /"
@@ -180,7 +182,7 @@ def test_what_was_met_last_is_met_again_after_a_kick(observed):
 
 
 def test_the_kicks_of_a_disk_are_its_own(observed):
-    """Kicks do not depend on other disks, nor on the position of a disk in memory."""
+    """The kicks of a disk do not depend on other disks, or on the place of the disk in memory."""
     drive = "&drive kind = 'brownian' interval = 0.1 temperature = 1e-4 / &stop time = 1 /"
     disk = "&species count = 1 radius = 0.01 position = 0.9, 0.9 /"
     others = "&species grid = 20, 20 radius = 0.01 region = 0, 0.8, 0, 0.8 /"
@@ -192,14 +194,14 @@ def test_the_kicks_of_a_disk_are_its_own(observed):
 
 
 def test_a_gas_at_rest_waits_for_its_kick(performed):
-    """No event can occur before the kick, and no stop rule contains a time."""
+    """A run of disks at rest ends correctly after the first kick, without a time in stop rules."""
     drive = "&drive kind = 'noise' interval = 7 strength = 1 / &stop collisions = 1000 /"
     _, said = performed("&species count = 100 radius = 0.01 /" + drive)
     assert "note" not in said and "kicks = 1\n" in said and "collisions = 1000\n" in said
 
 
 def test_a_driven_gas_does_not_end_for_being_cold(performed):
-    """Its temperature falls below 1e-25 of the first between two kicks."""
+    """The temperature of a driven gas may fall below 1e-25 of its first value between kicks."""
     _, said = performed(
         "&box boundary = 'periodic', 'periodic' /"
         "&species count = 50 packing_fraction = 0.4 temperature = 1 /"
@@ -209,7 +211,7 @@ def test_a_driven_gas_does_not_end_for_being_cold(performed):
     assert "note" not in said and "time = 2e16" in said
 
 
-# --- sides and walls ---
+# --- moving sides, and collision rules of walls ---
 
 BOUNCE = """&box gravity = 0, -1 upper = 1, 1000 /
 &side name = 'bottom' motion = 'sine' amplitude = 0.03 period = 1 restitution = 0.8 /
@@ -219,7 +221,7 @@ BOUNCE = """&box gravity = 0, -1 upper = 1, 1000 /
 
 
 def test_a_disk_between_two_walls_knows_them_apart(observed):
-    """The disk leaves the left wall with half its speed and the right wall with its full speed."""
+    """The left wall halves the speed of the disk, and the right wall conserves its speed."""
     found = observed(
         """&side name = 'left' restitution = 0.5 / &species count = 1 radius = 0.1
         position = 0.5, 0.5 velocity = 1, 0 / &stop time = 6 / &output frames_every_events = 1 /"""
@@ -238,7 +240,7 @@ def test_a_disk_between_two_walls_knows_them_apart(observed):
     ],
 )
 def test_disks_grow_between_walls_whatever_their_law(observed, law):
-    """The positions of `dense` disks are those between elastic walls."""
+    """The initial positions of `dense` disks do not depend on the collision rules of walls."""
     places = [
         observed(
             f"&obstacle centre = 0.5, 0.5 radius = 0.2 {words} /"
@@ -253,7 +255,7 @@ def test_disks_grow_between_walls_whatever_their_law(observed, law):
 
 @pytest.mark.parametrize("dynamics", ["events", "steps"])
 def test_a_side_shakes_a_bed_at_rest(observed, dynamics):
-    """Nothing moves at the start, without gravity; the first event is caused by the side."""
+    """All disks are at rest and there is no gravity; the moving side causes the first event."""
     found = observed(
         """&side name = 'bottom' motion = 'sine' amplitude = 0.05 period = 1 /
         &run dt = 1e-3 / &species count = 300 radius = 0.02 / &stop time = 3 /""".replace(
@@ -265,7 +267,7 @@ def test_a_side_shakes_a_bed_at_rest(observed, dynamics):
 
 
 def test_a_side_that_crushes_disks_ends_the_run(ricochet, tmp_path):
-    """The packing fraction is between jamming and 1; a value of 1 is refused at once."""
+    """If a side compresses the disks beyond jamming, the run ends with an error."""
     write_input(
         tmp_path,
         """&side name = 'right' motion = 'constant_velocity' velocity = 0.5 end_time = 1 /
@@ -277,7 +279,7 @@ def test_a_side_that_crushes_disks_ends_the_run(ricochet, tmp_path):
 
 
 def test_a_stroke_goes_from_begin_to_end_and_stays(observed):
-    """A disk hits the side before and during the stroke; the side stops the disk and moves away."""
+    """A disk collides with the side before and during the motion of the side."""
     found = observed(
         """&side name = 'right' motion = 'constant_velocity' velocity = -0.5
         start_time = 1 end_time = 4 /
@@ -292,7 +294,7 @@ def test_a_stroke_goes_from_begin_to_end_and_stays(observed):
 
 @pytest.mark.parametrize("placement", ["random", "dense", "grid"])
 def test_sides_start_where_their_position_is(observed, placement):
-    """Fixed sides stay, moving sides begin there; disks start between them and remain between."""
+    """Sides start at `position`, and all disks start and remain between the sides."""
     grid = " grid = 15, 6 region = 0.2, 1.5, -0.3, 0.8" * (placement == "grid")
     found = observed(
         f"""&box upper = 2, 1 / &side name = 'right' position = 1.5 /
@@ -322,7 +324,7 @@ def test_sides_start_where_their_position_is(observed, placement):
 
 
 def test_disks_meet_wherever_a_side_that_they_push_goes(observed):
-    """This includes positions far beyond the box, unequal disks, and two moving sides."""
+    """All collisions occur, even if a piston moves far outside the initial box."""
     cells, pairs = (
         observed(
             f"""&run search = '{search}' /
@@ -337,7 +339,7 @@ def test_disks_meet_wherever_a_side_that_they_push_goes(observed):
 
 
 def test_a_side_that_disks_push_keeps_momentum_and_energy(observed):
-    """The balance includes the piston, the force, the disks and the losses."""
+    """The balances of momentum and energy include disks, piston, force and dissipation."""
     found = observed(
         """&box upper = 2, 1 / &side name = 'right' motion = 'piston' mass = 20 force = 300 /
         &species count = 200 packing_fraction = 0.2 temperature = 1 / &stop time = 4 /
@@ -361,7 +363,7 @@ def test_a_side_that_disks_push_keeps_momentum_and_energy(observed):
 
 
 def test_time_steps_come_close_to_events(observed):
-    """The times of several bounces of a disk on a moving floor are compared at a small step."""
+    """At a small time step, bounces on a moving floor occur at the event-driven times."""
     times = [
         observed(BOUNCE, *options)["/particles/disks/velocity/time"][1:6]
         for options in ([], ["run.dynamics=steps", "run.dt=1e-5"])
@@ -377,7 +379,7 @@ RAMP = "&wall from = 0, 0.3 to = 1, 0.1 /"
 @pytest.mark.parametrize("on", [SHAKEN.format("sine"), SHAKEN.format("parabolic"), BOWL, RAMP])
 @pytest.mark.parametrize("lossy", [0, 0.5])
 def test_disks_rest_on_what_has_restitution_0(observed, on, lossy):
-    """They separate so slowly and rarely that the run continues, and they never overlap."""
+    """Disks at rest on a surface with restitution 0 do not overlap, and the run continues."""
     found = observed(
         f"""{on} &box gravity = 0, -1 / &contact contact_time = 1e-3
         restitution = {lossy} wall_restitution = 0 wall_rule = 'normal' / &stop time = 3 /
@@ -395,7 +397,7 @@ PRESSED = """lower = -1.5, 10 upper = 1.5, 11 /
 @pytest.mark.parametrize(
     ("floor", "disk"),
     [  # it chatters to rest on a floor whose acceleration is less than gravity, or has no room; or
-        # a side that a force presses on it does
+        # a side that a force presses against the disk does
         (FLOOR.format("sine' amplitude = 0.01"), "0.1 position = 0.5, 0.3"),
         (FLOOR.format("parabolic' amplitude = 0.01"), "0.1 position = 0.5, 0.3"),
         (FLOOR.format("sine' amplitude = 0.5"), "0.3 position = 0.5, 0.6"),

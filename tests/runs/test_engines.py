@@ -1,6 +1,7 @@
-"""Ensembles through Slurm and through GNU parallel over ssh, really run on this machine.
+"""Tests of sweeps with real Slurm and GNU parallel over ssh on this computer.
 
-Daemons listen on the loopback interface only; they are started here and ended by their process ids.
+The daemons listen only on the loopback interface.  The tests start the daemons, and end them by
+their process ids.
 """
 
 import contextlib
@@ -16,7 +17,7 @@ import pytest
 from synthetic_run import ROOT
 from whole_runs import PATIENCE, differences, environment, frames_in, ran, wait_for
 
-# Daemons, ports and signals across hosts: a minute that `.ci/run` and `make check` have.
+# The tests need daemons and take a minute; therefore only `.ci/run` and `make check` run them.
 pytestmark = pytest.mark.check
 
 SCRIPT = ROOT / "runs" / "ensemble.sh"
@@ -26,7 +27,7 @@ LONG = ("--set", "stop.collisions_per_disk=6000", "--set", "output.frames_every_
 
 
 def need(*programs: str) -> None:
-    """Skip with the names of what is missing."""
+    """Skip the test if programs are missing, and name these programs."""
     places = f"{os.environ['PATH']}:/usr/sbin:/sbin"
     missing = [name for name in programs if not shutil.which(name, path=places)]
     if missing:
@@ -41,7 +42,7 @@ def free_port() -> int:
 
 @contextlib.contextmanager
 def daemon(folder: Path, *command, ready):
-    """A process in the foreground until `ready()` and then until the end of the block."""
+    """Start a process, wait until `ready()` is true, and end the process after the block."""
     name = Path(command[0]).name
     command = [shutil.which(command[0], path=f"{os.environ['PATH']}:/usr/sbin"), *command[1:]]
     log = (folder / f"{name}.out").open("w")
@@ -66,7 +67,10 @@ def answers(port: int) -> bool:
 
 @pytest.fixture
 def ensemble(program, tmp_path):
-    """`ensemble(*arguments)` runs the script in a folder of its own; `start=True` does not wait."""
+    """Return a function that runs ensemble.sh in a separate folder.
+
+    With start=True the function does not wait for the end of the script.
+    """
 
     def run(*arguments, start=False):
         command = ["bash", SCRIPT, INPUT, "-d", "members", *map(str, arguments)]
@@ -78,7 +82,7 @@ def ensemble(program, tmp_path):
     return run
 
 
-# --- shares ---
+# --- shares of member runs ---
 
 
 def test_shares_are_the_whole_without_overlap(ensemble):
@@ -96,7 +100,7 @@ def test_shares_are_the_whole_without_overlap(ensemble):
 
 @pytest.fixture
 def hosts(tmp_path):
-    """A file of two hosts for GNU parallel: two names of an sshd of this test on loopback."""
+    """Write a file with two hosts for GNU parallel, which are two names of one ssh server."""
     need("parallel", "sshd", "ssh", "ssh-keygen")
     folder, port = tmp_path / "ssh", free_port()
     folder.mkdir(mode=0o700)
@@ -159,7 +163,7 @@ def test_parallel_reports_a_member_that_fails(ensemble):
 
 
 def test_term_reaches_members_on_other_hosts(ensemble, hosts, tmp_path):
-    """Then the same command ends well."""
+    """Signal TERM stops the member runs on other hosts, and the same command completes them."""
     arguments = ("--engine", "parallel", "--sshloginfile", hosts, "-j", 1, "--seeds", "1-2", *LONG)
     running, folder = ensemble(*arguments, start=True), tmp_path / "members"
     wait_for(lambda: sum(frames_in(path) > 0 for path in folder.glob("*.part")) == 2)
@@ -178,7 +182,7 @@ def test_term_reaches_members_on_other_hosts(ensemble, hosts, tmp_path):
 
 @pytest.fixture
 def cluster(tmp_path, monkeypatch):
-    """A Slurm cluster of this machine alone, on loopback, to which the environment leads."""
+    """Start a Slurm cluster that consists of this computer, and set its environment variables."""
     need("munged", "slurmctld", "slurmd", "sbatch", "squeue", "scontrol")
     if os.getuid() != 0:
         pytest.skip("Slurm's daemons need root")

@@ -1,6 +1,7 @@
-"""runs/ensemble.sh with a substitute for the program: runs, skips, resumes and reports.
+"""Tests of runs/ensemble.sh: starting, skipping, resuming and reporting member runs.
 
-With the program itself: neither faults nor the order of the work show in the results.
+Most tests replace the simulation program by a script.  Tests with the real program check that
+interruptions and the order of member runs do not change the results.
 """
 
 import contextlib
@@ -22,9 +23,10 @@ from whole_runs import within, write_input
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "runs" / "ensemble.sh"
 
-# Notes each start in OUT.starts; waits until the file HOLD is gone; TERM makes a checkpoint.
-# `outcome.exit=N` fails with N, 2 with --check, too; 9 is a kill; after 4 it has broken off, and
-# does not resume.  No member can be continued with other settings.
+# This script replaces the simulation program.  It records each start in OUT.starts, and waits while
+# the file HOLD exists.  On TERM it writes a checkpoint.  With `outcome.exit=N` it fails with the
+# exit status N: 2 also makes --check fail, 9 means that it is killed, and after 4 the run cannot be
+# resumed.  A member run cannot be continued with other settings.
 PROGRAM = """while (($#)); do
   case $1 in
   -o) out=${2%.h5} && shift ;;
@@ -53,7 +55,7 @@ echo data >"$out.h5"
 
 @pytest.fixture
 def lab(tmp_path):
-    """Return a folder with the substitute and an input file with a blank in its name."""
+    """Return a folder with the replacement script, and an input file with a blank in its name."""
     folder = tmp_path / "a lab"
     folder.mkdir()
     executable(folder / "program", PROGRAM, "bash")
@@ -114,19 +116,19 @@ def workers_of(launcher) -> list[int]:
 
 
 def waits(launcher) -> bool:
-    """Return whether a launcher and its workers are idle."""
+    """Return whether the launcher and its worker processes are all waiting."""
     return all(map(is_asleep, [launcher.pid, *workers_of(launcher)]))
 
 
 def starts(lab):
-    """Member -> one line per start, 'anew' or 'resumed' and the overrides."""
+    """Return for each member run a line per start: 'anew' or 'resumed', and the overrides."""
     return {
         path.stem: path.read_text().splitlines() for path in sorted((lab / "out").glob("*.starts"))
     }
 
 
 def test_members_are_seeds_times_values(lab):
-    """Vector values are separated by semicolons."""
+    """A sweep has a member run for each seed and value; semicolons separate vector values."""
     scan = ["--scan", "species.ball.velocity=0,-1;0,-2", "--set", "contact.restitution=0.5"]
     result = ensemble(lab, "--seeds", "1-2,5", *scan)
     assert result.returncode == 0
@@ -149,7 +151,7 @@ def test_members_take_a_core_each_whatever_the_cluster_says(lab, monkeypatch):
 
 
 def test_names_and_values_may_be_anything(lab):
-    """This includes using the list in the folder as the manifest of another sweep."""
+    """Any names and values are allowed, also if a list of member runs is used as a manifest."""
     names = ["*", "@", "$HOME", "a;b", "[x]", "'", '"', "!", "~", "a&b"]
     names += ["%s", "\\n", "ü", "one two"]
     rest = "--set run.title=a b --set species.ball.velocity=0,-1"
@@ -176,7 +178,7 @@ def test_finished_members_are_skipped_and_checkpoints_resumed(lab):
 
 @pytest.mark.parametrize("jobs", ["1", "3"])
 def test_one_failure_does_not_stop_the_others(lab, jobs):
-    """The member is tried once, not by every worker; a stopped member has not failed."""
+    """A failed member run is attempted once; a stopped member run does not count as failed."""
     manifest = lab / "members.txt"
     manifest.write_text("a\nb\t--set outcome.exit=4\nc\nd\t--set outcome.exit=75\n")
     result = ensemble(lab, "--manifest", str(manifest), "-j", jobs)
@@ -213,7 +215,7 @@ def test_a_signal_reaches_each_member_once_and_the_command_goes_on(lab, how):
     )
 
 
-# A cluster that runs all tasks of an array at once, two at most.
+# This script replaces Slurm; it starts all tasks of an array at once, but at most two tasks.
 SLURM = {
     "sbatch": """echo 1 >>"$LAB/jobs"
 for word; do
@@ -238,7 +240,7 @@ echo 7
 
 @pytest.fixture
 def slurm(lab):
-    """`slurm(*options)`: what the script says of an ensemble on a cluster."""
+    """Return a function that runs a sweep on the simulated cluster and returns the messages."""
     (lab / "bin").mkdir()
     for name, text in SLURM.items():
         executable(lab / "bin" / name, text, "bash")
@@ -255,7 +257,7 @@ def lines_of(path) -> list[str]:
 
 
 def test_slurm_gives_up_what_failed_and_says_who_when_and_where(lab, slurm):
-    """A killed member continues, a failed one only with --retry or a corrected input."""
+    """A killed member run continues; a failed one is repeated with --retry or a corrected input."""
     manifest = lab / "members.txt"
     manifest.write_text("a\nb\t--set outcome.exit=4\nc\t--set outcome.exit=9\n")
     members = ("--manifest", str(manifest))
@@ -294,8 +296,9 @@ def test_members_share_tasks_and_the_site_has_numbers_for_them(lab, slurm, optio
     assert slurm("--seeds", "1-5").returncode == 0 and len(starts(lab)) == 5
 
 
-# Read by a shell at its start: TERM comes just before the command MOMENT, or the MOMENTth one of a
-# shell. One that meets a worker goes to the launcher as well.
+# Each bash reads this script at its start.  It sends TERM just before the command MOMENT, or before
+# command number MOMENT of the shell.  If a worker process receives the signal, the launcher
+# receives it as well.
 AT_A_COMMAND = """if [[ $0 == */ensemble.sh ]]; then
 set -T
 trap 'if [[ $BASH_COMMAND == "$MOMENT" || $((++commands_so_far)) == "$MOMENT" ]] &&
@@ -305,7 +308,7 @@ trap 'if [[ $BASH_COMMAND == "$MOMENT" || $((++commands_so_far)) == "$MOMENT" ]]
 fi' DEBUG
 fi
 """
-#: The commands behind `&`, and one just before it.
+#: Commands that are started with `&`, and a command just before such a command.
 NARROW_MOMENTS = ["child=$!", "workers+=($!)", 'arguments+=(--set "$pair")']
 RANDOM_MOMENTS = [str(random.Random(1).randrange(10, 500)) for _ in range(200)]
 
@@ -319,7 +322,7 @@ RANDOM_MOMENTS = [str(random.Random(1).randrange(10, 500)) for _ in range(200)]
     ],
 )
 def test_a_signal_at_any_command_leaves_nothing_behind(lab, moment):
-    """The signal is sent to the launcher, and to a worker while it starts a member."""
+    """After TERM at any command of the launcher or of a worker, no process remains."""
     assert moment.isdigit() or moment in SCRIPT.read_text()
     (lab / "hold").touch()
     (lab / "at_a_command").write_text(AT_A_COMMAND)
@@ -344,7 +347,7 @@ def processes_of(folder) -> dict[int, list[str]]:
 
 @pytest.mark.parametrize("shares", [1, 2, 3, 9])
 def test_each_member_of_a_manifest_is_in_one_share(lab, shares):
-    """Also if lines are no members, and if there are more shares than members."""
+    """Each member run is in exactly one share, also if there are more shares than member runs."""
     manifest = lab / "members.txt"
     manifest.write_text("# members\na\nb\t--set run.seed=2\n\nc\nd\ne")
     for k in range(1, shares + 1):
@@ -435,7 +438,7 @@ def test_what_cannot_name_a_member_is_one_line(lab, name):
 @pytest.mark.parametrize("how", ["link", "link to nothing", "hard link", "pipe", "folder", "file"])
 @pytest.mark.parametrize("name", ["seed_2.log", "input.nml", "manifest.txt"])
 def test_only_files_of_its_own_are_written(lab, name, how):
-    """Other files in their place are reported in one line before any member runs."""
+    """If foreign files have names that the script uses, it reports them at the start."""
     (lab / "out").mkdir()
     precious = lab / "precious"
     precious.write_text("precious")
@@ -501,7 +504,7 @@ def test_dry_run_starts_nothing(lab):
 
 
 def test_dry_run_checks_the_first_member(program, tmp_path):
-    """An invalid input is refused before any run; an element of a vector can be scanned."""
+    """An invalid input is refused before any run starts; elements of vectors can be scanned."""
     input_file = write_input(tmp_path, MIXTURE)
 
     def dry(scan):
@@ -565,7 +568,7 @@ def differences_of(one, other) -> list[str]:
 
 @pytest.mark.parametrize("times", [5, pytest.param(20, marks=pytest.mark.check)])
 def test_a_disturbed_ensemble_equals_an_undisturbed_one(real, tmp_path, times):
-    """TERM and KILL are sent at random times, and the command is repeated."""
+    """A sweep that is interrupted by TERM and KILL at random times has the same results."""
     begin = time.monotonic()
     assert finish(real("calm", "-j", "2")) == 0
     duration = time.monotonic() - begin

@@ -1,4 +1,4 @@
-"""Each system call of a run fails or is interrupted: the run prints one line and loses no data."""
+"""If a system call of a run fails or is interrupted, the run prints one line and loses no data."""
 
 import os
 import re
@@ -13,17 +13,20 @@ import pytest
 from whole_runs import FILES, FINISHED, PATIENCE, STOPPED, USAGE
 from whole_runs import committed, differences, is_beginning, one_line, ran, write_input
 
-#: Few calls, but of every kind: frames of a planned number, observables and events of an unknown
-#: one, so that the file is rebuilt at the end, and two checkpoints.
+#: This input leads to few system calls, but to all kinds of them.  The number of frames is known in
+#: advance, but the numbers of observables and events are not; therefore the file is rebuilt at the
+#: end.  The run writes two checkpoints.
 SMALL = """&box boundary = 'periodic', 'wall' /
 &species name = 'gas' file = 'gas.txt' radius = 0.03 temperature = 1 /
 &stop events = 2 /
 &output observables_every_collisions = 2 event_log = .true. checkpoint_every = 1e-6 /
 """
 COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet"]
-#: How the run begins: over an earlier result, from a stopped run, from a finished one.
+#: Options with which the run starts: it replaces a result, resumes a stopped run, or extends a
+#: finished run.
 OPTIONS = ("--force", "--resume", "--resume --quiet")
-#: Calls of the program, and how each fails: once, or with + from then on.
+#: System calls of the program, and how they fail; the sign + means that all later calls fail as
+#: well.
 WAYS = {
     "openat": ["EIO", "EIO+"],
     "read": ["EIO", "EIO+"],
@@ -42,9 +45,9 @@ WAYS = {
 
 @pytest.fixture(scope="module")
 def stage(program, tmp_path_factory):
-    """Return a folder with the expected result, folders to copy for each option, and traces.
+    """Return a folder with the expected result, starting folders for each option, and traces.
 
-    Each is named after the options of the run.
+    The folders and traces have the names of the options.
     """
     if not shutil.which("strace"):
         pytest.skip("strace is not installed")
@@ -72,7 +75,7 @@ def stage(program, tmp_path_factory):
 
 
 def copy_folder(source, target):
-    """Copy a folder with `cp`, which preserves holes of files in contrast to Python's functions."""
+    """Copy a folder with `cp`, because functions of Python do not preserve holes of files."""
     subprocess.run(["cp", "-a", source, target], check=True)
 
 
@@ -89,7 +92,7 @@ def traced(program, folder, option, *what):
 
 
 def positions(stage, option, call, first="gas.nml") -> range:
-    """Return the numbers of the calls of one kind after the first line that contains a text."""
+    """Return the numbers of all calls of one kind after the first trace line with a given text."""
     lines = (stage / f"trace{option}").read_text().splitlines()
     begin = next(k for k, line in enumerate(lines) if first in line)
     calls = [k for k, line in enumerate(lines) if re.match(rf"\d+ +{call}\(", line)]
@@ -97,14 +100,14 @@ def positions(stage, option, call, first="gas.nml") -> range:
 
 
 def chosen(stage, option, call, step) -> list[int]:
-    """Return random calls and the last ones, when HDF5 truncates the file and it is renamed."""
+    """Return the numbers of random calls, and of the last calls, which complete the file."""
     numbers = positions(stage, option, call)
     last = {"pwrite64": 6, "ftruncate": 2, "rename": 2, "unlink": 2}.get(call, 1)
     return sorted({*numbers[::step], *numbers[-last:]})
 
 
 def outcome(check, program, stage, option, call, inject) -> str:
-    """Return the faults after a run with a disturbed call; empty without faults."""
+    """Return a list of faults after a run in which one system call was disturbed."""
     folder = stage / f"{option} {call} {inject}"
     copy_folder(stage / option, folder)
     try:
@@ -117,13 +120,13 @@ def outcome(check, program, stage, option, call, inject) -> str:
 
 
 def same_results(stage, result) -> bool:
-    """Compare bytes except times, which is a hundred times faster than comparing all objects."""
+    """Return whether results are equal except for wall times, by a fast comparison of bytes."""
     whole = stage / "whole" / "gas.h5"
     return timeless(whole) == timeless(result) or differences(whole, result) == []
 
 
 def timeless(path) -> bytes:
-    """Return the content of a file without the times of the run."""
+    """Return the bytes of a file without the wall times of the run."""
     content = path.read_bytes()
     with h5py.File(path, locking=False) as file:
         for name in ("wall_time", "collisions_per_second"):
@@ -164,7 +167,7 @@ def go_on(program, stage, folder, option):
 
 
 def check_after_kill(program, stage, folder, option, call, inject):
-    """Check that the final file is an earlier or complete result and the other file continues."""
+    """Check that after a kill the result is old or complete, and that the run can continue."""
     result = folder / "gas.h5"
     earlier = result.read_bytes() if result.exists() else None
     run = traced(program, folder, option, "-e", f"trace={call}", "-e", inject)
@@ -200,11 +203,11 @@ def check_after_signal(program, stage, folder, option, call, inject):
 
 
 def contents_of(folder) -> dict[str, bytes]:
-    """Return the contents of files by name."""
+    """Return the contents of all files in a folder by name."""
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "trace"}
 
 
-#: Disturbances of a call in the words of strace, and the property that must hold then.
+#: Disturbances of a call in the syntax of strace, and the property that is checked for each.
 KILLED = ("pwrite64", "ftruncate", "fsync", "rename", "unlink", "openat")
 MEETINGS = [(check_after_failure, call, [f"error={way}" for way in WAYS[call]]) for call in WAYS]
 MEETINGS += [(check_after_signal, call, ["signal=SIGTERM"]) for call in WAYS]
@@ -214,7 +217,7 @@ MEETINGS += [(check_after_kill, call, ["signal=SIGKILL"]) for call in KILLED]
 @pytest.mark.parametrize(("check", "call", "ways"), MEETINGS)
 @pytest.mark.parametrize("step", [250, pytest.param(1, marks=pytest.mark.check)])
 def test_whatever_meets_a_call_costs_nothing(program, stage, check, call, ways, step):
-    """A failure prints one line, a signal stops the run, a kill preserves the last state."""
+    """After a failed call, a signal or a kill, no data are lost."""
     cases = [
         (option, f"inject={call}:{what}:when={number}{again}")
         for option in OPTIONS
@@ -233,7 +236,7 @@ def test_whatever_meets_a_call_costs_nothing(program, stage, check, call, ways, 
 @pytest.mark.parametrize("error", ["EINTR", "EAGAIN"])
 @pytest.mark.parametrize("forever", ["", "+"])
 def test_a_reluctant_standard_output_is_no_failure(program, stage, error, forever):
-    """The result is complete."""
+    """The result is complete even if writing to standard output fails."""
     folder = stage / f"{error}{forever}"
     copy_folder(stage / "--force", folder)
     (number,) = positions(stage, "--force", "write", first="write(1<")

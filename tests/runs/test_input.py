@@ -33,7 +33,7 @@ PLACE = r'f(:\d+)?: (\S+|".*"): |--set '
 
 @pytest.fixture
 def checked(ricochet, tmp_path):
-    """Return a function that runs --check on a file gas.nml with given content."""
+    """Return a function that runs --check on a file gas.nml with the given contents."""
 
     def run(content, *options, **more):
         data = content.encode() if isinstance(content, str) else content
@@ -44,7 +44,7 @@ def checked(ricochet, tmp_path):
 
 
 def lines_of(run) -> list[str]:
-    """Return the lines on stderr, which must not contain messages of the run-time library."""
+    """Return the lines on stderr, and check that none is from the Fortran run-time library."""
     assert not re.search(r"backtrace|SIG[A-Z]{3}|libgfortran|Fortran runtime", run.stderr)
     return run.stderr.splitlines()
 
@@ -128,7 +128,7 @@ def spelt(rng: random.Random, value: object) -> str:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_values_in_all_their_spellings_are_printed(ricochet, tmp_path, seed):
-    """This includes inputs whose values are refused because they are incompatible."""
+    """All spellings of a value are read equally, also in inputs with incompatible values."""
     rng = random.Random(seed)
     table = json.loads(ricochet("--print-variables").stdout)
     text, written = rng.choice(["", "\ufeff"]), []
@@ -349,7 +349,7 @@ def test_wrong_usage_is_one_line(ricochet, command):
 
 
 def test_the_limits_that_are_printed_are_those_that_hold(ricochet, checked):
-    """For every variable, absurd but allowed values are valid or refused with another message."""
+    """No variable is refused as out of range if its value is within the printed limits."""
     instance = {"species": ".gas", "obstacle": ".pin", "wall": ".ramp", "side": ".top"}
     numbers = [
         (group, name, row)
@@ -397,7 +397,7 @@ def report(ricochet, folder, text) -> tuple[int, list[str]]:
 
 
 def is_told(words: str, line: str) -> bool:
-    """Return whether a message contains the words of the table in the same order."""
+    """Return whether a message contains the expected words in the same order."""
     return bool(re.search(".*".join(map(re.escape, words.strip().split(" ... "))), line))
 
 

@@ -1,4 +1,4 @@
-"""Kills, signals, full disks, concurrent runs and readers never damage a run."""
+"""Kills, signals, full disks, concurrent runs and readers do not damage the results of a run."""
 
 import contextlib
 import itertools
@@ -19,27 +19,28 @@ from whole_runs import committed, differences, ended_soon, filled_pipe, frames_i
 from whole_runs import held, is_asleep, is_beginning, let_work, one_line, ran, wait_for, with_fsync
 from whole_runs import write_input
 
-#: Frequent frames in a growing file, with occasional checkpoints.
+#: Input of a run that writes many frames to a growing file, and a few checkpoints.
 BUSY = """&species name = 'gas' count = 100 radius = 0.02 speed = 1 /
 &stop collisions = 20000 /
 &output frames_every_events = 9 observables_every_events = 5 checkpoint_every = 0.05 /
 """
-#: The same with all space allocated at the start.
+#: Input of a run whose output file has its final size from the start.
 PLANNED = """&species name = 'gas' count = 100 radius = 0.02 speed = 1 /
 &stop time = 30 /
 &output frames_every_time = 0.01 observables_every_time = 0.004 checkpoint_every = 0.05 /
 """
 LONG = ["--set", "stop.collisions=1000000000", "--set", "output.checkpoint_every="]
-#: An output that is rebuilt at the end, because the length of the event log is unknown.
+#: Input of a run whose output file is rebuilt at the end, because the length of the event log is
+#: unknown.
 LOGGED = """&box boundary = 'periodic', 'wall' /
 &species name = 'gas' count = 60 radius = 0.03 temperature = 1 /
 &stop time = 30 /
 &output frames_every_time = 0.4 observables_every_time = 0.4 event_log = .true.
   checkpoint_every = 600 /
 """
-#: Message of a run on a full disk: file, required size, free size ...
+#: First part of the message on a full disk: file, required size and free size.
 NO_ROOM = r"^disk/gas\.h5(\.part)?: .*(\d+ bytes needed, \d+ bytes free|.* are free)"
-#: ... and advice, at the start and later.
+#: Last part of the message on a full disk: advice, at the start and later.
 MAKE_ROOM = NO_ROOM + "(; choose fewer frames or make room)?$"
 GO_ON = NO_ROOM + "; --resume continues from the last checkpoint$"
 
@@ -47,7 +48,7 @@ GO_ON = NO_ROOM + "; --resume continues from the last checkpoint$"
 @pytest.mark.parametrize("text", [BUSY, PLANNED], ids=["growing", "planned"])
 @pytest.mark.parametrize("tries", [8, pytest.param(200, marks=pytest.mark.check)])
 def test_kills_cost_no_committed_sample_and_no_result(ricochet, started, tmp_path, text, tries):
-    """The remaining file is valid, and the run continues from its last committed state."""
+    """After a kill the file is valid, and the run continues from the last complete state."""
     write_input(tmp_path, text.replace("0.05", "0.001"))
     assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
     whole = committed(tmp_path / "whole.h5")
@@ -86,7 +87,7 @@ def let_write(process, part, frames):
 
 
 def test_files_never_take_the_place_of_closed_standard_streams(program, tmp_path):
-    """Otherwise messages would be written into these files."""
+    """If a standard stream is closed, no output file gets its descriptor."""
     command = [program, write_input(tmp_path, BUSY), "-o", "gas.h5", *LONG]
     shell = ["bash", "-c", 'exec "$@" <&- >&- 2>&-', "bash", *map(str, command)]
     process = subprocess.Popen(shell, cwd=tmp_path)
@@ -136,7 +137,7 @@ def shown_until_stopped(program, folder, enough):
     ids=["run", "placing"],
 )
 def test_progress_stays_on_one_line_of_the_terminal(program, tmp_path, text, shown, last):
-    """The line is truncated, not wrapped; the message about a signal has a separate line."""
+    """The line with the progress is truncated, not wrapped; a signal message has its own line."""
     write_input(tmp_path, text)
     shares = []
     for line in shown_until_stopped(program, tmp_path, lambda: len({*shares}) >= 3):
@@ -149,7 +150,7 @@ def test_progress_stays_on_one_line_of_the_terminal(program, tmp_path, text, sho
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGINT", "SIGHUP", "SIGXCPU"])
 @pytest.mark.parametrize("times", [1, 2])
 def test_a_signal_stops_the_run_with_a_checkpoint(started, tmp_path, name, times):
-    """This includes a second signal within a moment, as sent by launchers."""
+    """A signal, or two signals in quick succession as launchers send them, lead to a checkpoint."""
     process, number = start_long(started, tmp_path), getattr(signal, name)
     if times == 1:
         message = ended_soon(process, number)
@@ -172,7 +173,7 @@ def test_usr1_makes_a_checkpoint_and_the_run_goes_on(started, tmp_path):
 
 
 def wait_for_checkpoint(folder):
-    """Wait until the first checkpoint of a new run is valid: it is stored in the other place."""
+    """Wait until the first checkpoint of a new run is valid."""
 
     def is_there():
         with h5py.File(folder / "gas.h5.part", "r", locking=False) as file:
@@ -182,7 +183,7 @@ def wait_for_checkpoint(folder):
 
 
 def test_a_later_second_signal_ends_the_run_at_once(started, tmp_path):
-    """This holds for a blocked program, which here waits for a disk that does not respond."""
+    """A second signal ends the run, even while it waits for a disk that does not respond."""
     endless = with_fsync(tmp_path, "while (1) usleep(100000);")
     process = started(write_input(tmp_path, BUSY), "-o", "gas.h5", *LONG, env=endless)
     wait_for((tmp_path / "gas.h5.part").exists)
@@ -215,7 +216,7 @@ def stopped_in_time(process, *codes):
 def test_a_signal_ends_a_run_that_is_still_being_set_up(
     started, tmp_path, count, packing, placement, options
 ):
-    """Nothing is lost: no disk has moved yet."""
+    """A signal during the preparation ends the run, because no data can be lost."""
     text = f"""&species count = {count} packing_fraction = {packing} placement = '{placement}' /
     &stop collisions = 1 /"""
     write_input(tmp_path, text)
@@ -227,10 +228,10 @@ def test_a_signal_ends_a_run_that_is_still_being_set_up(
 
 
 def test_a_slow_disk_does_not_slow_the_run_down(ricochet, tmp_path):
-    """A run with slow checkpoints makes as many steps between them as another run.
+    """Slow checkpoints do not increase the number of checkpoints of a run.
 
-    The disk takes twice as long as the run means to compute between two looks at the clock; the
-    run is over after a few dozen checkpoints, not after one at each collision.
+    Writing to the simulated storage takes twice as long as the interval at which the run reads the
+    clock.  The run ends after a few dozen checkpoints, and does not write one at each collision.
     """
     slow = with_fsync(tmp_path, "static int n; usleep(60000); if (++n > 300) _exit(9); return 0;")
     text = "&species count = 10 radius = .01 speed = 1 / &stop events = 20000 /"
@@ -239,7 +240,7 @@ def test_a_slow_disk_does_not_slow_the_run_down(ricochet, tmp_path):
 
 
 def test_a_run_whose_samples_cease_still_makes_checkpoints(started, tmp_path):
-    """Sixty pairs collide successively, each with a sample, and stop; one disk flies on."""
+    """A run writes checkpoints even if no more samples occur, because the disks are at rest."""
     pairs = "".join(f"0.1, {y}, {0.2 + y / 100}, {y}, " for y in range(1, 61))
     speeds = "1, 0, -1, 0, " * 60
     text = f"""&box upper = 1, 62 /
@@ -268,7 +269,7 @@ def test_a_run_whose_samples_cease_still_makes_checkpoints(started, tmp_path):
     ],
 )
 def test_many_disks_stop_in_time(started, tmp_path, method, side):
-    """Signals arrive during the search, sorting, moving, writing and reading of disks."""
+    """A run of many disks stops quickly, in whichever part of the program the signal arrives."""
     text = f"""&run {method} /
     &species grid = {side}, {side} packing_fraction = 0.3 temperature = 1 /
     &stop events = 1000000000 /"""
@@ -282,7 +283,7 @@ def test_many_disks_stop_in_time(started, tmp_path, method, side):
 
 
 def test_a_stuck_summary_does_not_keep_a_finished_run(started, tmp_path):
-    """The reader of its standard output may have stopped reading."""
+    """A run ends even if the process that reads its standard output has stopped reading."""
     write_input(tmp_path, "&species count = 10 radius = .01 / &stop time = 1 /")
     with filled_pipe() as inlet:
         process = started("gas.nml", "-o", "gas.h5", stdout=inlet)
@@ -292,7 +293,7 @@ def test_a_stuck_summary_does_not_keep_a_finished_run(started, tmp_path):
 
 
 def test_ignored_signals_stay_ignored(program, tmp_path):
-    """A run started with nohup continues after the terminal is closed."""
+    """A run that ignores signals, for example one started with nohup, continues after a signal."""
     write_input(tmp_path, BUSY)
     command = ["nohup", program, "gas.nml", "-o", "gas.h5"]
     silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -306,7 +307,7 @@ def test_ignored_signals_stay_ignored(program, tmp_path):
 @pytest.mark.parametrize("text", [PLANNED, BUSY], ids=["planned", "growing"])
 @pytest.mark.parametrize("polls", [30, pytest.param(1000, marks=pytest.mark.check)])
 def test_a_running_file_can_be_read(ricochet, started, tmp_path, text, polls):
-    """Repeated reading causes no errors and never returns wrong numbers."""
+    """A file can be read repeatedly during the run, without errors and with correct numbers."""
     write_input(tmp_path, text)
     assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
     whole, part = committed(tmp_path / "whole.h5"), tmp_path / "gas.h5.part"
@@ -366,7 +367,10 @@ def test_of_twins_started_at_once_one_runs(started, ricochet, tmp_path):
 )
 @pytest.mark.parametrize("sizes", [4, pytest.param(40, marks=pytest.mark.check)])
 def test_a_full_disk_costs_nothing(ricochet, tmp_path, small_disk, text, sizes):
-    """Disks have 64 kB (too small for the layout) to 4 MB; with more space the run continues."""
+    """No data are lost if a file system of 64 kB to 4 MB is full.
+
+    With more space the run continues.
+    """
     write_input(tmp_path, text)
     assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
     whole = committed(tmp_path / "whole.h5")
@@ -402,7 +406,7 @@ def test_a_limit_on_the_size_of_files_is_a_full_disk(program, tmp_path):
 
 @pytest.mark.parametrize(("limit", "left"), [("f 2000", []), ("n 4", []), ("n 5", ["gas.h5.part"])])
 def test_a_limit_of_the_process_is_named(program, tmp_path, limit, left):
-    """The limit is not the disk: the event log is too large, or the end needs a second file."""
+    """If a limit of the process prevents writing, the message names this limit."""
     write_input(tmp_path, LOGGED)
     command = f'ulimit -{limit}; exec "$0" gas.nml -o gas.h5'
     run = ran("bash", "-c", command, program, cwd=tmp_path)
@@ -412,7 +416,7 @@ def test_a_limit_of_the_process_is_named(program, tmp_path, limit, left):
 
 
 def test_a_disk_for_reading_only_is_left_as_it_is(ricochet, tmp_path, small_disk):
-    """This applies to a new run, to a new folder and to a stopped run that should continue."""
+    """Files on a read-only file system are not changed, and the message names the reason."""
     write_input(tmp_path, MIXTURE)
     folder = small_disk(4000)
     stopped = ["gas.nml", "-o", "disk/gas.h5", "--set", "stop.wall_clock=1e-9"]
@@ -437,7 +441,7 @@ def test_the_planned_output_is_compared_with_the_room(ricochet, tmp_path, small_
 
 
 def start_long(started, folder, *options):
-    """Start a long run, and return it after several frames were written."""
+    """Start a long run, and return its process after several frames have been written."""
     write_input(folder, BUSY)
     process = started("gas.nml", "-o", "gas.h5", *LONG, *options)
     wait_for(lambda: frames_in(folder / "gas.h5.part") > 10)

@@ -1,7 +1,7 @@
-"""The engine in this process is bit-identical to the program and never ends the process.
+"""A simulation in memory is bit-identical to a run of the program, and never ends the process.
 
-That slices of time, a save and a load leave no trace in any random system is one of the ways of
-`test_random_systems.py`.
+`test_random_systems.py` tests with random systems that advancing in small steps, saving and loading
+do not change the results.
 """
 
 import copy
@@ -46,7 +46,7 @@ ENDLESS = {"contact.restitution": 1, "contact.tangential_restitution": 1}
 
 @pytest.fixture(scope="module")
 def whole(program, tmp_path_factory):
-    """Return the settings that the program reads from an input."""
+    """Return the settings of an input, and the output file of a complete run."""
     folder = tmp_path_factory.mktemp("whole")
     (folder / "gas.nml").write_text(GAS)
     ran(program, "gas.nml", "-o", "gas.h5", "--quiet", cwd=folder, check=True)
@@ -54,7 +54,7 @@ def whole(program, tmp_path_factory):
 
 
 def test_a_simulation_shows_what_the_file_of_its_run_has(whole):
-    """Arrays, observables, counts and next collisions agree at the start and at the end."""
+    """Arrays, observables, counts and next collisions agree with the output file of a run."""
     with Simulation(GAS) as gas:
         assert {*COLUMNS} < {*dir(gas)}
         log = whole.event_log()
@@ -73,7 +73,7 @@ def test_a_simulation_shows_what_the_file_of_its_run_has(whole):
 
 
 def test_arrays_are_read_only_and_are_assigned_whole():
-    """Writing into a copy would have no effect; in-place operators return a new array."""
+    """Arrays are read-only copies; a complete array can be assigned."""
     with Simulation(GAS) as gas:
         for name in {*COLUMNS} & {*dir(gas)}:
             array = getattr(gas, name)
@@ -117,7 +117,7 @@ def states(*simulations):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_copy_and_a_pickle_continue_with_the_same_bits(seed):
-    """Copies are independent, for any earlier calls; a pickle continues in another process, too."""
+    """Copies and pickles of a simulation continue independently with bit-identical results."""
     random.seed(seed)
     gas = Simulation(GAS, {"run.seed": seed}, threads=1 + seed)
     gas.advance(events=random.randrange(300))
@@ -143,7 +143,7 @@ def test_a_copy_and_a_pickle_continue_with_the_same_bits(seed):
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_each_event_is_reported_in_the_state_of_its_moment(whole, threads):
-    """The events are those of the log, and the function does not change the motion."""
+    """The reported events are equal to the event log, and reporting does not change the motion."""
     log, seen = whole.event_log(), []
 
     def see(event):
@@ -187,7 +187,7 @@ def test_a_function_of_events_may_stop_and_change_the_simulation():
 
 @pytest.mark.parametrize("boundary", ["wall", "periodic"])
 def test_positions_are_set_and_their_energy_is_work(boundary):
-    """The simulation continues like one with this start; equal positions are no change."""
+    """After positions are set, the simulation continues as if it had started with them."""
     gas = Simulation(GAS, {"box.boundary": [boundary, "wall"], **ENDLESS}).advance(events=77)
     gas.position = before = gas.position
     assert gas.changes == []
@@ -221,7 +221,7 @@ def test_a_moved_disk_keeps_the_periods_that_it_has_crossed():
 
 
 def test_a_moment_where_a_slice_has_ended_is_reached_again():
-    """A single call reaches the bit-identical state within an epoch and at its end."""
+    """A simulation that is advanced in one call reaches the same state to the last bit."""
     text = "&box boundary = 'periodic', 'periodic' /\n&species name = 'a' count = 200"
     text += " packing_fraction = 0.6 placement = 'dense' temperature = 1 /\n"
     with Simulation(text) as one, Simulation(text) as other:
@@ -233,7 +233,7 @@ def test_a_moment_where_a_slice_has_ended_is_reached_again():
 
 
 def test_handles_share_nothing_and_give_all_back():
-    """This includes handles that are never closed and invalid inputs."""
+    """Simulations are independent, and all memory is released, also for invalid inputs."""
     one, other = Simulation(GAS), Simulation(GAS, {"run.seed": 2})
     for k in range(1, 21):
         one.advance(events=10 * k)
@@ -256,7 +256,7 @@ def test_handles_share_nothing_and_give_all_back():
 
 
 def test_an_interrupt_leaves_the_simulation_whole():
-    """Ctrl-C raises quickly; the simulation then continues bit-identically."""
+    """Ctrl-C raises an exception quickly, and the simulation can then continue unchanged."""
     gas = Simulation(GAS, ENDLESS)
     timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
     timer.start()
@@ -271,7 +271,7 @@ def test_an_interrupt_leaves_the_simulation_whole():
 
 
 def test_other_threads_of_python_run_meanwhile():
-    """The lock of the interpreter is released while the engine works."""
+    """Other Python threads run during `advance`, because the interpreter lock is released."""
     gas, counted = Simulation(GAS, ENDLESS), [0]
     worker = threading.Thread(target=gas.advance, kwargs={"events": 10**6})
     worker.start()
@@ -343,7 +343,7 @@ def kept(system) -> Simulation:
     ],
 )
 def test_wrong_use_is_said_in_one_line(act, error, words, tmp_path, monkeypatch):
-    """The process and other simulations continue."""
+    """Wrong use raises an exception with one line; other simulations continue."""
     monkeypatch.chdir(tmp_path)
     gas = Simulation(GAS)
     with pytest.raises(error, match=re.escape(words)) as caught:
@@ -353,7 +353,7 @@ def test_wrong_use_is_said_in_one_line(act, error, words, tmp_path, monkeypatch)
 
 
 def test_the_table_says_what_may_change_in_a_running_simulation(program):
-    """Every other variable is refused for this reason before other checks."""
+    """A variable that the table does not mark as changeable is refused for this reason."""
     table = json.loads(ran(program, "--print-variables", check=True).stdout)
     system = GAS + "&side name = 'top' / &wall name = 'w' from = 0.4, 0.5 to = 0.6, 0.5 /"
     system += "&obstacle name = 'o' centre = 0.5, 0.5 radius = 0.01 /"
@@ -373,7 +373,7 @@ def test_the_table_says_what_may_change_in_a_running_simulation(program):
 
 
 def test_a_simulation_that_breaks_off_says_so():
-    """Every attempt to continue raises the message and exit code of the program."""
+    """A simulation that has failed raises the message of the program at every further call."""
     words = """&box gravity = 0, -1 /
     &species count = 1 radius = 0.1 position = 0.5, 0.5 velocity = 0, 0 /
     &contact wall_restitution = 0 /
@@ -386,7 +386,7 @@ def test_a_simulation_that_breaks_off_says_so():
 
 
 def test_a_saved_simulation_goes_on_in_the_program_and_back(program, tmp_path, whole):
-    """The end is bit-identical to that of an uninterrupted run."""
+    """The final state is bit-identical to the final state of an uninterrupted run."""
     (tmp_path / "gas.nml").write_text(GAS)
     Simulation(GAS).advance(events=150).save(tmp_path / "gas.h5")
     with pytest.raises(ProgramError, match="exists already"):
@@ -401,7 +401,7 @@ def test_a_saved_simulation_goes_on_in_the_program_and_back(program, tmp_path, w
 
 
 def test_a_side_is_held_moved_and_released_where_it_is():
-    """The energy balance holds, and the saved input starts with the side in its position."""
+    """The energy balance holds, and the saved input contains the position of the side."""
     side = "side.right"
     system = {
         "box": {"upper": [2, 1]},
@@ -436,7 +436,7 @@ def test_a_side_is_held_moved_and_released_where_it_is():
 
 
 def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypatch):
-    """The program continues with the saved input; the initial input is refused by name."""
+    """The program continues with the saved input, and refuses the initial input."""
     monkeypatch.chdir(tmp_path)
     Path("gas.nml").write_text(GAS)
     gas = Simulation("gas.nml", {"run.seed": 5}).advance(events=50)
@@ -468,7 +468,7 @@ def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypa
 
 
 def test_numbers_that_c_may_give_are_refused_or_count_as_none():
-    """The header describes such numbers, which Python never passes."""
+    """The header file describes these numbers, which the Python package never passes."""
     engine, gas, room = library(), Simulation(GAS), 200
     message = ctypes.create_string_buffer(room)
     with gas._open() as handle:
@@ -501,7 +501,7 @@ NAMES = "position", "image", "mass", "", "x", "input", "parameters", "changes", 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_random_calls_in_c_have_an_answer(seed):
-    """For any numbers and texts, no call crashes, hangs or accepts an invalid number."""
+    """Whatever numbers and texts are passed, no call crashes, hangs or accepts invalid numbers."""
     engine, chance = library(), random.Random(seed)
     text, values = ctypes.create_string_buffer(20_000), np.empty((600, 6))
     message = ctypes.create_string_buffer(500)
@@ -535,7 +535,7 @@ def test_random_calls_in_c_have_an_answer(seed):
 
 
 def test_files_that_are_refused_leave_no_memory_behind(tmp_path):
-    """The files are missing, not HDF5, foreign HDF5, runs of another program, or damaged."""
+    """Refused files (missing, damaged or foreign) do not cause memory leaks."""
     places = [tmp_path / name for name in ("none.h5", "text.h5", "other.h5", "old.h5", "cut.h5")]
     places[1].write_text("not HDF5")
     with h5py.File(places[2], "w") as file:
@@ -560,7 +560,7 @@ def test_files_that_are_refused_leave_no_memory_behind(tmp_path):
 
 
 def test_a_damaged_input_in_a_file_is_called_damaged(tmp_path):
-    """The message is one line for any damaged bits."""
+    """For any damaged bits the message consists of one line."""
     text = GAS.replace("event_log = .true.", "")  # which is allocated as a whole
     path = Simulation(text).save(tmp_path / "gas.h5")
     whole = path.read_bytes()
@@ -575,7 +575,7 @@ def test_a_damaged_input_in_a_file_is_called_damaged(tmp_path):
 
 
 def test_a_simulation_reaches_each_representable_time():
-    """A time since the epoch that is rounded down would stay before the intended time for ever."""
+    """If rounding errors kept the simulation before the requested time, `advance` would not end."""
     for seed in range(1, 251):
         rng = random.Random(seed)
         few = {"species": {"count": 5, "radius": 0.05, "temperature": 1}, "run": {"seed": seed}}
@@ -589,7 +589,7 @@ def test_a_simulation_reaches_each_representable_time():
 
 
 def test_a_settled_time_is_reached_exactly_by_another_simulation():
-    """A change at that time then has the same effect to the last bit."""
+    """A change at a settled time therefore has the same effect to the last bit."""
     for seed in range(1, 251):
         rng = random.Random(seed)
         few = {"species": {"count": 5, "radius": 0.05, "temperature": 1}, "run": {"seed": seed}}
@@ -630,7 +630,7 @@ def test_a_settled_time_is_reached_exactly_by_another_simulation():
     ],
 )
 def test_a_simulation_needs_no_stop(groups, program, tmp_path, monkeypatch):
-    """This holds for any schedule; a saved input without &stop continues with a stop rule."""
+    """A simulation in memory needs no stop rule; the program can continue it with a stop rule."""
     monkeypatch.chdir(tmp_path)
     system = {"species": {"name": "a", "count": 20, "radius": 0.01, "speed": 1}} | groups
     box = Simulation(system).advance(time=0.25)
@@ -645,7 +645,7 @@ def test_a_simulation_needs_no_stop(groups, program, tmp_path, monkeypatch):
 
 
 def test_an_input_is_saved_over_nothing_but_a_saved_one(tmp_path, monkeypatch):
-    """The check is made before any file is written."""
+    """An input is saved only over a file that was saved before, which is checked in advance."""
     monkeypatch.chdir(tmp_path)
     gas = Simulation(GAS)
     Path("mine.nml").write_text("! my comments\n")
@@ -669,7 +669,7 @@ def test_an_input_is_saved_over_nothing_but_a_saved_one(tmp_path, monkeypatch):
 
 
 def test_the_library_has_no_fault_that_checks_would_find(program):
-    """All tests of this file run with a library that contains run-time checks."""
+    """All tests of this file succeed with a library that contains run-time checks."""
     checked = Path(program).parent / "tests"
     if not (checked / "libricochet_files.so").is_file():
         pytest.skip("`make test` builds it")
@@ -689,7 +689,7 @@ def test_the_library_needs_no_hdf5_and_shows_its_functions_only():
 
 
 def test_the_example_in_the_header_is_a_complete_program(tmp_path):
-    """It compiles without warnings, and its simulation stops at the number of collisions."""
+    """The example compiles without warnings, and stops at the requested number of collisions."""
     header = Path(__file__).resolve().parents[2] / "src/ricochet.h"
     folder = Path(library()._name).parent
     example = re.search(r"^ {7}#include .*?^ {7}\}$", header.read_text(), re.MULTILINE | re.DOTALL)
@@ -703,7 +703,7 @@ def test_the_example_in_the_header_is_a_complete_program(tmp_path):
 
 
 def test_a_fork_and_an_interpreter_that_ends_do_no_harm():
-    """A child process continues independently; the interpreter can end during `advance`."""
+    """A child process continues independently, and the interpreter can end during `advance`."""
     script = f"""
 import os, threading
 from ricochet import Simulation

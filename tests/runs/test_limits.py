@@ -23,7 +23,8 @@ def options(words) -> list[str]:
 def memory_of(program, tmp_path):
     """Return a function that measures the memory of a run of an input [bytes].
 
-    It is measured in a small process: a program inherits the largest size its parent ever had.
+    A small process starts the program, because a program inherits the maximum memory size of its
+    parent process.
     """
 
     def run(text, *words) -> int:
@@ -98,7 +99,7 @@ def test_whatever_the_limit_of_memory_the_result_is_right_or_one_line(
 
 @pytest.mark.parametrize("count", [10**8, 10**9, 10**12])
 def test_a_file_that_declares_absurdly_many_disks_is_refused_at_once(ricochet, tmp_path, count):
-    """Its datasets take no room on the disk."""
+    """A file with an absurd number of disks is refused immediately; its datasets are empty."""
     with h5py.File(tmp_path / "many.h5", "w") as file:
         species = {"shape": (count,), "dtype": "i4", "chunks": (2**20,)}
         file.create_dataset("particles/disks/species", **species)
@@ -113,7 +114,7 @@ def test_a_file_that_declares_absurdly_many_disks_is_refused_at_once(ricochet, t
 
 
 def test_the_memory_of_a_run_does_not_grow(memory_of):
-    """Arrays that samples, sorting and checkpoints allocate do not fragment the memory."""
+    """The memory does not grow when samples, sorting and checkpoints allocate arrays."""
     text = "&box upper = 1000, 0.001 / " + GAS.format(count=1000, collisions=10**9)
     words = ("species.gas.packing_fraction=1e-4", "output.checkpoint_every=1e-9")
     words += ("output.observables_every_events=1",)  # at least one checkpoint per sample
@@ -143,13 +144,13 @@ placement = 'lattice' velocities = 'maxwell' /
     ],
 )
 def test_a_run_takes_the_memory_that_is_assumed(memory_of, ricochet, count, length, words):
-    """The runs have no domains, frames and periodic sides, or domains."""
+    """The memory agrees with the estimate in runs with and without domains."""
     measured = memory_of(LATTICE.format(count=count, length=length), *words)
     assert measured == pytest.approx(assumed_memory(ricochet, *words), rel=0.05)
 
 
 def test_the_size_of_the_output_is_told_before_it_is_written(ricochet, tmp_path):
-    """Two frames of 36 bytes per disk, and 24 bytes and two checkpoints of 72."""
+    """The output has two frames of 36 bytes, 24 bytes and two checkpoints of 72 bytes per disk."""
     (tmp_path / "gas.nml").write_text(GAS.format(count=1_000_000, collisions=1))
     grid = ["--set", "species.gas.count=", "--set", "species.gas.grid=1000,1000"]
     run = ricochet("gas.nml", "--check", *grid)
@@ -176,7 +177,7 @@ def test_the_size_of_the_output_is_told_before_it_is_written(ricochet, tmp_path)
     ],
 )
 def test_a_run_uses_no_more_memory_than_is_foretold(memory_of, words, count):
-    """410 bytes per disk, and 25 MB: see `start/memory`."""
+    """The memory is at most 410 bytes per disk and 25 MB, as estimated in `start/memory`."""
     text = GAS.format(count=count, collisions=1000)
     used = memory_of(text, "output.frames_every_collisions=500", *words.split())
     assert 0.4 < used / (410 * count + 25e6) < 1
@@ -185,7 +186,7 @@ def test_a_run_uses_no_more_memory_than_is_foretold(memory_of, words, count):
 @pytest.mark.check
 @pytest.mark.parametrize("threads", [1, 2])
 def test_domains_use_at_most_275_bytes_per_disk(memory_of, threads):
-    """Another 25 MB are allowed, besides samples, up to the end on a single core."""
+    """In addition to 275 bytes per disk and the samples, the program may use 25 MB."""
     text = GAS.format(count=500_000, collisions=2_500_000)
     assert memory_of(text, f"run.threads={threads}") < 275 * 500_000 + 25e6
 
@@ -203,7 +204,7 @@ def test_a_million_disks_need_no_stack(limited, words):
 
 
 def test_a_long_input_needs_no_stack(limited, monkeypatch):
-    """The input has three megabytes of comments and walls."""
+    """The input consists of three megabytes of comments and walls."""
     walls = "".join(f"&wall from = 0.1, {k}e-4 to = 0.9, {k}e-4 /\n" for k in range(1, 5000))
     text = GAS.replace("count = {count}", "count = {count} region = 0, 1, 0.6, 1")
     monkeypatch.setitem(globals(), "GAS", text + walls + "! and so on\n" * 230_000)

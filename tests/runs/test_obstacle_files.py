@@ -1,4 +1,4 @@
-"""Many obstacles as one group: circles and straight walls from files, and polylines."""
+"""Groups of many obstacles: circles and straight walls from files, and polylines."""
 
 import sys
 from itertools import pairwise
@@ -25,7 +25,7 @@ POINTS = [(1, 1), (2, 1.5), (2, 2.5), (1, 1)]
 
 
 def scatterers() -> np.ndarray:
-    """(n, 3) circles that overlap here and there."""
+    """Return circles (n, 3), some of which overlap."""
     rng = np.random.default_rng(4)
     cells = np.stack(np.meshgrid(*2 * [np.arange(SIDE) + 0.5]), axis=-1).reshape(-1, 2)
     places = cells + rng.uniform(-0.4, 0.4, cells.shape)
@@ -33,7 +33,7 @@ def scatterers() -> np.ndarray:
 
 
 def walls() -> np.ndarray:
-    """(n, 4) some straight walls."""
+    """Return straight walls (n, 4)."""
     start = np.random.default_rng(5).uniform(1, SIDE - 1, (20, 2))
     return np.column_stack([start, start + np.array([0.3, -0.2])])
 
@@ -47,7 +47,7 @@ def table(names: str, rows: np.ndarray) -> str:
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """Inputs with the same obstacles, in groups of many and one by one."""
+    """Write inputs with equal obstacles, as groups of many obstacles and as single obstacles."""
     (tmp_path / "circles.txt").write_text(table("x y radius", scatterers()))
     (tmp_path / "walls.txt").write_text(table("X1 y1 x2 y2", walls()))
     points = ", ".join(f"{x}, {y}" for x, y in POINTS)
@@ -147,7 +147,7 @@ def test_mistakes_in_a_file_are_named_with_their_line(program, folder, text, mes
 
 
 def test_a_script_makes_random_scatterers(program, tmp_path, monkeypatch):
-    """They fill the box that it names, and any seed gives other places."""
+    """The scatterers fill the printed box, and their positions depend on the seed."""
     monkeypatch.chdir(tmp_path)
     script, many = str(ROOT / "post/scatterers.py"), ["400", "0.01", "--radius", "0.9"]
     for seed in ("1", "2"):
@@ -183,7 +183,7 @@ def test_too_many_groups_are_refused_in_one_line(program, tmp_path):
 
 
 def crowded(seed: int) -> str:
-    """A few disks among many obstacles; some with gravity, sides that move, losses, a big disk."""
+    """Return a random system of a few disks among many obstacles."""
     rng = np.random.default_rng(seed)
     edges, many = rng.permutation([4.0, 7.0]), int(rng.integers(30, 200))
     scale = np.sqrt(np.prod(edges) / many)

@@ -1,6 +1,7 @@
 """Output files of runs: layout, parameters, sampling schedules and refused paths.
 
-The meaning of its numbers is asserted of all systems (test_random_systems.py, tests/unit/).
+The correctness of the numbers is tested with random systems in test_random_systems.py, and in
+tests/unit/.
 """
 
 import time
@@ -132,7 +133,7 @@ def test_the_origin_is_there(ran):
     ],
 )
 def test_samples_are_at_the_very_multiples_and_at_the_end(ran, track, cadence, end, expected):
-    """A schedule on the command line replaces that of the same samples in the input only."""
+    """A schedule on the command line replaces the schedule of the same samples in the input."""
     file = ran(MIXTURE, f"--set=output.{track}_{cadence}", "--set=stop.time=", f"--set=stop.{end}")
     disks, seen = file["particles/disks"], file["observables"]
     times, number = disks["position/time"][:], seen["collisions/value"][:]
@@ -160,7 +161,7 @@ COLUMNS = "velocity", "event_count", "image", "angular_velocity", "orientation"
 
 @pytest.mark.parametrize("wanted", [["position"], COLUMNS[:1], COLUMNS[1:4:2], COLUMNS])
 def test_frames_have_the_columns_that_are_asked_for(ran, wanted):
-    """Positions are always written, other columns if the run has them; other data do not change."""
+    """Frames contain positions and the requested columns; all other data do not change."""
     whole = ran(TURNING, name="whole")["particles/disks"]
     words = ", ".join(f"'{name}'" for name in wanted)
     part = ran(TURNING, f"--set=output.frame_columns={words}", name="part")["particles/disks"]
@@ -192,7 +193,7 @@ def test_counts_in_frames_grow_longer_where_they_must(ricochet, tmp_path, cut):
 
 
 def test_the_same_input_gives_the_same_bytes(ran, tmp_path):
-    """Exceptions are two numbers for the cost; build and host are the same."""
+    """Two runs of an input write equal files, except for two numbers about the computing time."""
     every = ["--set", "output.frames_every_time=", "--set", "output.frames_every_events=7"]
     ran(MIXTURE, *every, name="one").close()
     time.sleep(1.1)  # a second later: no time stamps
@@ -255,7 +256,7 @@ def test_impossible_places_are_refused_in_one_line(ricochet, tmp_path):
 
 
 def test_a_species_has_no_name_that_the_file_uses_itself(ricochet, ran, tmp_path):
-    """The names of other members of the group of species are not allowed."""
+    """A species cannot have a name that another object of the same HDF5 group has."""
     file = ran(MIXTURE)
     used = {*file["observables"], *file["parameters/species"]} - {"light", "heavy"}
     assert {"all", "committed", "momentum", "names", "counts"} < used

@@ -19,12 +19,12 @@ SHORT = """&species name = 'gas' count = 20 radius = 0.02 speed = 1 /
 ENDLESS = SHORT.replace("time = 1 ", "time = 1e6 ").replace("0.1", "5")
 COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet"]
 AT_ONCE = ["--set", "stop.wall_clock=1e-9"]
-#: The first one finds the results complete, except what is written at the end: there it stops.
+#: In the first case, the results are complete except for the data written at the end of a run.
 PAUSE = "static int n; if (!n++) raise(SIGSTOP); return 0;"
 
 
 def everything_in(folder) -> dict[str, object]:
-    """Return the paths below a folder with the contents of files and targets of links."""
+    """Return all paths in a folder, with the contents of files and the targets of links."""
     return {str(path): what_stands(path) for path in Path(folder).rglob("*")}
 
 
@@ -35,7 +35,7 @@ def everything_in(folder) -> dict[str, object]:
 def test_what_no_run_has_made_is_neither_written_through_nor_removed(
     ricochet, tmp_path, place, kind
 ):
-    """This holds for new runs, with or without --force, and for continued runs."""
+    """No run writes through a link or removes a foreign object, with or without --force."""
     write_input(tmp_path, SHORT)
     precious = tmp_path / "home" / "precious"
     precious.parent.mkdir()
@@ -78,7 +78,7 @@ def test_what_a_killed_run_has_half_made_is_in_nobodys_way(ricochet, tmp_path):
 
 
 def test_a_run_that_was_killed_before_its_first_checkpoint_goes_on(ricochet, started, tmp_path):
-    """The run starts again; only --force deletes the file."""
+    """A run without a checkpoint starts again from its initial state."""
     write_input(tmp_path, ENDLESS)
     process = started(*COMMAND)
     wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > 10)
@@ -154,16 +154,16 @@ def test_outputs_that_differ_in_any_letter_share_nothing(ricochet, tmp_path):
         assert differences(tmp_path / "x", tmp_path / name) == []
 
 
-# --- what a run replaces at its end: the very file that was there when it began ---
+# --- at its end a run replaces only the file that existed at its start ---
 
-#: How a run begins: with the option that it starts with where a finished run is.
+#: Options with which a run starts if the result of an earlier run exists.
 BEGINNINGS = {"in an empty place": [], "from a finished run": ["--resume"], "over one": ["--force"]}
 EARLY = ["--set", "stop.time=0.5"]
 
 
 @pytest.fixture(params=BEGINNINGS)
 def beginning(request, ricochet, tmp_path):
-    """Return the options of a run with or without an earlier result at its path."""
+    """Return the options of a run, with or without an earlier result at the path of the output."""
     write_input(tmp_path, SHORT)
     if BEGINNINGS[request.param]:
         assert ricochet(*COMMAND, *EARLY).returncode == FINISHED
@@ -171,7 +171,7 @@ def beginning(request, ricochet, tmp_path):
 
 
 def put(kind, place, other):
-    """Create an object at the path of the result."""
+    """Create a file, folder or link at the path of the result."""
     if kind == "another run":
         shutil.copy(other, place.with_name("copy"))
         place.with_name("copy").replace(place)
@@ -196,7 +196,7 @@ def put(kind, place, other):
 
 
 def what_stands(place):
-    """Return the object with a name in a form that can be compared."""
+    """Return a description of the object at a path that can be compared."""
     return place.readlink() if place.is_symlink() else place.is_file() and place.read_bytes()
 
 
@@ -211,7 +211,10 @@ def what_stands(place):
 def test_what_has_come_since_the_run_began_is_left(
     ricochet, started, tmp_path, beginning, kind, moment
 ):
-    """The results stay in the .part file, which is renamed when the path is free."""
+    """If an object appears at the path of the output during the run, it is not replaced.
+
+    The results stay in the .part file.
+    """
     other, place = tmp_path / "other.h5", tmp_path / "gas.h5"
     assert ricochet("gas.nml", "-o", other, *EARLY, "--set", "run.seed=2").returncode == FINISHED
     if moment == "while it runs":
@@ -238,7 +241,7 @@ def test_what_has_come_since_the_run_began_is_left(
 
 
 def test_a_copy_of_the_earlier_result_is_another_file(ricochet, tmp_path, beginning):
-    """In another folder the run continues if there is no result, and keeps an existing one."""
+    """A run that was copied to another folder can continue there, but does not replace a result."""
     assert ricochet(*COMMAND, *beginning, *AT_ONCE).returncode == STOPPED
     folder = tmp_path / "elsewhere"
     folder.mkdir()
@@ -271,7 +274,7 @@ def test_force_means_what_is_there_when_it_is_said(ricochet, tmp_path):
 
 
 def test_a_lock_that_was_removed_and_taken_anew_stays(started, tmp_path):
-    """The end of the first run must not unlock the second run."""
+    """When the first run ends, it must not remove the lock of the second run."""
     write_input(tmp_path, ENDLESS)
     process = started(*COMMAND)
     wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > 10)
@@ -302,7 +305,7 @@ def test_a_run_needs_the_right_to_make_files_not_to_list_them(program, mode, sta
 
 
 def test_a_disk_that_cannot_synchronize_has_the_result(ricochet, tmp_path):
-    """Some file systems refuse fsync of a folder, or at all."""
+    """The result is complete even if the file system does not support fsync."""
     write_input(tmp_path, SHORT)
     refused = with_fsync(tmp_path, "errno = EINVAL; return -1;")
     run = ricochet(*COMMAND, "--set", "output.checkpoint_every=1e-6", env=refused)

@@ -1,11 +1,13 @@
 """Random systems, run with many methods: results are bit-identical and satisfy general laws.
 
-Each runs plainly; on several threads; with another search and queue; in parts, that end by the
-clock, by TERM and by kill -9, each resumed in another way; to an earlier end, from which it is
-continued; with other samples; in memory; and in other units. All must end alike: with the same exit
-code, the same message and the same bytes; and what the plain run has written obeys `run_laws`.
+Each system is simulated in several ways: with default settings; on several threads; with another
+search and event queue; in parts that are ended by a time limit, by TERM or by kill -9 and then
+resumed; to an earlier end, from which the run is continued; with other samples; in memory; and in
+other units.  All runs of a system must end with the same exit code, the same message and the same
+bytes.  The results of the run with default settings must obey the laws in `run_laws`.
 
-`SYSTEMS=200 SEED=20270131` takes other systems and more of them, as `make check` does each day.
+The environment variables SYSTEMS and SEED set the number of systems and the seed, for example
+`SYSTEMS=200 SEED=20270131`.  `make check` uses another seed every day.
 """
 
 import contextlib
@@ -41,7 +43,7 @@ KILLED = (STOPPED, -signal.SIGTERM, -signal.SIGKILL)
 NOT_THE_END = ("placing disks:", "warning:", "note:", "stopped; the run is finished")
 #: Message for systems whose disks do not fit into the box.
 NO_ROOM = re.compile(r"species\.(radius|placement|file|position): ")
-#: Data that describe the computation and not the results.
+#: Data about the execution of a run, which may differ between runs with equal results.
 ASIDE = re.compile(
     r"^/parameters(/run@(search|queue)|/overrides|/output@checkpoint_every|/stop@wall_clock)$"
 )
@@ -51,17 +53,17 @@ MOVING_SIDE = re.compile(r"/observables/sides/\w+/(position|velocity)/value")
 
 
 class End(NamedTuple):
-    """Exit code and last message of a run; `endless` if it exceeded its processor time."""
+    """Exit code and last message of a run; `endless` means that it used too much processor time."""
 
     code: int
     message: str
 
 
 class Case:
-    """A random system with its folder."""
+    """A random system, and the folder with its input file."""
 
     def __init__(self, program: Path, folder: Path, seed: str):
-        """Draw systems until one is accepted, and write its input."""
+        """Draw random systems until the program accepts one, and write its input file."""
         self.program, self.folder, self.rng = program, folder, random.Random(seed)
         self.system = accepted(program, folder, self.rng)
 
@@ -74,7 +76,7 @@ class Case:
         return end_of(self.begin(name, *options, **more))
 
     def result(self, name: str) -> Path:
-        """Return the output file of a run, finished or not."""
+        """Return the path of the output file of a finished or unfinished run."""
         path = self.folder / f"{name}.h5"
         return path if path.exists() else Path(f"{path}.part")
 
@@ -96,7 +98,7 @@ class Case:
         return self.whole(name, *self.way())
 
     def in_parts(self, name: str, seconds: float) -> End:
-        """Run in parts that are stopped at once and then by signals at random times."""
+        """Perform a run in parts: the first part ends at once, and signals end further parts."""
         end, options = End(STOPPED, ""), ["--set=output.checkpoint_every=1e-3"]
         for part in range(PARTS):
             first = ["--set=stop.wall_clock=1e-9"] if part == 0 else ["--resume"]
@@ -112,7 +114,7 @@ class Case:
         return End(FINISHED, "") if end.code == -signal.SIGKILL else end
 
     def continued(self, name: str, _seconds: float) -> End:
-        """End a run early, by time or by collisions, and continue it to a later end."""
+        """Perform a run with an early end, and continue it to the final end."""
         with h5py.File(self.result("plain")) as file:
             last = float(file["particles/disks/position/time"][-1])
             collisions = int(file["observables/collisions/value"][-1])
@@ -131,7 +133,7 @@ class Case:
         return self.whole(name, *self.way(), *resume)
 
     def in_memory(self, name: str, _seconds: float) -> End:
-        """Run in this process in parts, save and load, and end the run with the program."""
+        """Simulate in parts in this process, save and load, and finish the run with the program."""
         with h5py.File(self.result("plain")) as file:
             last = float(file["particles/disks/position/time"][-1])
         pairs = (word.removeprefix("--set=").split("=") for word in self.way())
@@ -159,7 +161,7 @@ class Case:
         return self.whole(name, *self.way(), *self.samples(self.rng.randint(3, 20)))
 
     def samples(self, count: int) -> list[str]:
-        """Return options for about the given number of samples."""
+        """Return options with which a run writes about the given number of samples."""
         tracks = ("frames_every", "observables_every")
         names = [f"{track}_{kind}" for track in tracks for kind in CADENCES]
         words = [f"{name}=" for name in names if name in self.system.text]
@@ -167,7 +169,10 @@ class Case:
         return [f"--set=output.{word}" for word in words]
 
     def nearly_stands_still(self) -> bool:
-        """Return whether disks or spins are so slow that squares underflow: then units matter."""
+        """Return whether speeds are so small that their squares underflow.
+
+        In this case the results depend on the units.
+        """
         self.whole("often", *self.samples(500), "--set=output.precision='double'")
         found = contents(self.result("often"))
         moving = [found[p] for p in found if p.endswith(("velocity/value", "orientation/value"))]
@@ -175,7 +180,7 @@ class Case:
         return any(np.any((value != 0) & (np.abs(value) < least)) for value in moving)
 
     def in_other_units(self, name: str, _seconds: float) -> End:
-        """Return the input with lengths, velocities and masses multiplied by powers of two."""
+        """Perform the run with lengths, velocities and masses multiplied by powers of two."""
         length, speed, mass = (2.0 ** self.rng.randint(-30, 30) for _ in range(3))
         self.units = {"length": length, "velocity": speed, "mass": mass, "s": 1}
         self.units |= {"time": length / speed, "energy": mass * speed**2}
@@ -189,7 +194,7 @@ class Case:
         return self.whole(name, *self.way(), text="other.nml")
 
 
-#: Units of the data of frames, observables and columns of starting files.
+#: Units of the quantities in frames, observables and starting files.
 UNITS = {
     "/particles/disks/position/value": "length",
     "/particles/disks/position/time": "time",
@@ -226,7 +231,7 @@ def rescaled(line: str, units: dict, table: dict) -> str:
 
 
 def end_of(process: subprocess.Popen) -> End:
-    """Return the end of a process."""
+    """Wait for the end of a process, and return its exit code and last message."""
     try:
         lines = process.communicate(timeout=PATIENCE)[1].splitlines()
     except subprocess.TimeoutExpired:
@@ -246,7 +251,10 @@ def accepted(program: Path, folder: Path, rng: random.Random, **options: int) ->
 
 
 def is_accepted(program: Path, folder: Path, system: System) -> bool:
-    """Writes its files; it may be refused for lack of room, but not for two features at a time."""
+    """Write the files of a system, and return whether the program accepts the system.
+
+    The program may refuse the system only if its disks do not fit into the box.
+    """
     (Path(folder) / "start.txt").write_text(starting_file(system.columns, system.table))
     (Path(folder) / "case.nml").write_text(system.text)
     command = [*within(5), program, "case.nml", "--check"]
@@ -257,10 +265,10 @@ def is_accepted(program: Path, folder: Path, system: System) -> bool:
 
 
 def last_samples(found: dict) -> dict:
-    """Return the values of the last samples without their numbers.
+    """Return the values of the last samples without their sample numbers.
 
-    A run in which nothing will ever happen ends at its last sample, whenever that is. Sides that
-    move depend on this time, and on nothing else.
+    A run without any further event ends at its last sample.  The time of this sample affects only
+    the positions of moving sides.
     """
     return {
         name: value[-1:]
@@ -272,7 +280,7 @@ def last_samples(found: dict) -> dict:
 
 
 def faults(program: Path, folder: Path, seed: str) -> str:
-    """Return the faults of a random system; empty without faults."""
+    """Return descriptions of all faults found in the runs of a random system."""
     case = Case(program, folder, seed)
     began = time.monotonic()
     plain = case.whole("plain")
@@ -291,7 +299,8 @@ def faults(program: Path, folder: Path, seed: str) -> str:
             said.append(f"ends otherwise: {name} {end}, plain {plain}")
             continue
         own, other = found, contents(case.result(name))
-        # For a collapse the number of collisions is compared, because times have other units.
+        # If a collapse occurs, the numbers of collisions are compared, because the times have
+        # different units.
         notes = {bytes(file["/provenance@note"]).split(b", the first")[0] for file in (own, other)}
         nearly = way == case.in_other_units and case.nearly_stands_still()
         if len(notes) > 1 and not nearly:
@@ -313,13 +322,13 @@ def test_all_ways_end_alike_and_the_laws_hold(program, tmp_path, seed):
     assert not (said := faults(program, tmp_path, seed)), said
 
 
-# --- what the harness itself promises ---
+# --- tests of the random systems themselves ---
 
-#: Variables of the execution of a run, or that require another run.
+#: Variables that concern the execution of a run, or that require another run.
 NOT_DRAWN = {"run.title", "run.search", "run.queue", "run.threads", "stop.wall_clock"}
 NOT_DRAWN |= {"species.scale_positions", "obstacle.file"}
 NOT_DRAWN |= {"wall.file"}
-#: Features that are refused together, or that exclude each other in a system.
+#: Pairs of features that the program refuses, or that a random system cannot combine.
 APART = [
     ("box.shear_rate", r"obstacle|wall|side|box\.gravity|run\.d|stop\.energy"),
     (
@@ -341,7 +350,10 @@ APART = [
 
 
 def test_the_systems_draw_every_variable(program, tmp_path):
-    """If a variable is missing by chance, use another SEED."""
+    """The random systems use every input variable.
+
+    If a variable is missing by chance, use another SEED.
+    """
     table = table_of(program)
     known = {f"{group}.{name}" for group in table for name in table[group]}
     rngs = (random.Random(seed) for seed in SEEDS)
@@ -350,7 +362,7 @@ def test_the_systems_draw_every_variable(program, tmp_path):
 
 
 def test_many_systems_draw_every_pair_of_features_that_goes_together(program, tmp_path):
-    """The program accepts these systems."""
+    """Random systems contain every allowed pair of features, and the program accepts them."""
     pairs, features = set(), set()
     for seed in range(6000):
         system = random_system(random.Random(seed))

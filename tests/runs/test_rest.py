@@ -1,4 +1,4 @@
-"""Disks that come to rest: `stop.at_rest`, and reports if time no longer advances."""
+"""Disks that come to rest: the stop rule `stop.at_rest`, and messages if time does not advance."""
 
 import re
 from math import pi, sqrt, tan
@@ -23,7 +23,7 @@ COMMAND = ["gas.nml", "-o", "gas.h5"]
 @pytest.mark.parametrize("restitution", [0, 0.1, 0.5, 0.9, 0.98])
 @pytest.mark.parametrize("rule", ["", "wall_rule = 'normal'"])
 def test_a_ball_comes_to_rest_when_its_bounces_have_ended(ricochet, tmp_path, restitution, rule):
-    """The time includes the fall and the bounces, whose durations form a geometric series."""
+    """The ball comes to rest at the time predicted by the geometric series of its bounces."""
     write_input(tmp_path, BALL.format(height=2, restitution=restitution, more=rule))
     run = ricochet(*COMMAND)
     assert run.returncode == FINISHED and "note" not in run.stderr + run.stdout
@@ -39,7 +39,7 @@ def test_a_ball_comes_to_rest_when_its_bounces_have_ended(ricochet, tmp_path, re
 
 
 def test_a_run_that_comes_to_rest_ends_alike_in_all_ways(ricochet, tmp_path):
-    """The ways are: in parts, with another search and queue, and in memory."""
+    """The run ends equally in parts, with another search and event queue, and in memory."""
     write_input(tmp_path, BALL.format(height=2, restitution=0.7, more=""))
     assert ricochet(*COMMAND).returncode == FINISHED
     other = ["--set=run.search='pairs'", "--set=run.queue='heap'", "--set=run.threads=2"]
@@ -70,7 +70,7 @@ PAIR = """&box gravity = 0, -1 upper = 2, 2 /
 
 
 def test_a_disk_that_rests_while_another_moves_breaks_the_run_off(ricochet, tmp_path):
-    """Two disks that come to rest at the same time do not stop the run."""
+    """If one disk comes to rest while another disk moves, the run ends with a message."""
     write_input(tmp_path, PAIR.format(height=1.3))
     run = ricochet(*COMMAND)
     assert run.returncode == BROKEN and "disk 1 (ball) and the bottom side" in one_line(run)
@@ -116,7 +116,7 @@ RING = """&box lower = -1, -1 upper = 1, 1 /
 @pytest.mark.parametrize("velocity", ["0, 1", "1e-9, 1", "0, -1e-5"])
 @pytest.mark.parametrize("contact_time", ["", "contact_time = 1e-6", "contact_time = 1e-2"])
 def test_sliding_along_a_ring_is_named(ricochet, tmp_path, velocity, contact_time):
-    """Sliding is not a collapse, and a contact time does not prevent it."""
+    """The message names the sliding along a ring, which is not an inelastic collapse."""
     write_input(tmp_path, RING.format(velocity, 1, contact_time))
     run = ricochet(*COMMAND, "--quiet")
     assert run.returncode == BROKEN and "slides along a concave obstacle" in one_line(run)
@@ -124,8 +124,8 @@ def test_sliding_along_a_ring_is_named(ricochet, tmp_path, velocity, contact_tim
     assert "collapse" not in run.stderr and "contact_time" not in run.stderr
 
 
-#: Collapses: a bouncing ball, two on top of each other, a row that is struck, one that presses
-#: itself against a container.
+#: Systems with an inelastic collapse: a bouncing ball, two balls on top of each other, a row of
+#: disks that is struck, and a row that is pressed against a container.
 COLLAPSES = {
     "ball": PAIR.replace("1.5, {height}", "1.5, 0.7").replace("at_rest = .true.", "time = 9"),
     "tower": """&box gravity = 0, -1 / &contact restitution = 0.6 / &stop time = 9 /

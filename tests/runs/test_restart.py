@@ -1,6 +1,6 @@
-"""A stopped, damaged or finished run continues exactly, or states why it cannot continue.
+"""Stopped, damaged and finished runs continue exactly, or state why they cannot continue.
 
-That the bits are the same whatever the system and the way is asserted by `test_random_systems.py`.
+`test_random_systems.py` tests with random systems that continued runs have bit-identical results.
 """
 
 import random
@@ -22,7 +22,7 @@ GROWING = """&output frames_every_time = 0.05 observables_every_collisions = 30
 event_log = .true. /\n"""
 AT_ONCE = ["--set", "stop.wall_clock=1e-9"]
 COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet"]
-#: A ball whose bounces become faster and lower.
+#: Input of a ball whose bounces become lower and more frequent.
 COLLAPSE = """&box gravity = 0, -1 /
 &species name = 'ball' radius = 0.05 position = 0.5, 0.5, 0.3, 0.3 /
 &contact restitution = 0.5 /
@@ -33,7 +33,7 @@ COLLAPSE = """&box gravity = 0, -1 /
 
 @pytest.fixture(params=["stopped", "finished"])
 def before(request, ricochet, tmp_path):
-    """Return the output of a run that continues with COMMAND and a later end."""
+    """Return the output file of a run that COMMAND continues to a later end."""
     write_input(tmp_path, MIXTURE)
     end = AT_ONCE if request.param == "stopped" else ["--set", "stop.time=0.5"]
     run = ricochet(*COMMAND, *end)
@@ -44,7 +44,7 @@ def before(request, ricochet, tmp_path):
 
 
 def test_stops_between_and_at_samples_and_before_the_first_event(ricochet, tmp_path):
-    """The limit of wall time stops a run at once; each part makes a small step."""
+    """A run can be stopped and continued at any point; here wall time limits each part."""
     write_input(tmp_path, GAS + GROWING)
     short = ["gas.nml", "--set", "species.gas.count=3", "--set", "species.gas.radius=0.15"]
     short += ["--set", "run.search='pairs'", "--set", "stop.time=1", "-o"]
@@ -108,7 +108,7 @@ def flip(path, slot, rng):
 
 @pytest.mark.parametrize("trials", [10, pytest.param(200, marks=CHECK)])
 def test_of_two_checkpoints_one_may_be_damaged(ricochet, tmp_path, trials):
-    """The run continues from the other checkpoint; with two damaged ones it is refused."""
+    """If one checkpoint is damaged, the run continues from the other checkpoint."""
     write_input(tmp_path, MIXTURE)
     assert ricochet("gas.nml", "-o", "whole.h5", "--set", "stop.time=1").returncode == FINISHED
     command, rng = [*COMMAND, "--set", "stop.time=1"], random.Random(trials)
@@ -128,7 +128,7 @@ def test_of_two_checkpoints_one_may_be_damaged(ricochet, tmp_path, trials):
 
 @pytest.mark.parametrize("trials", [6, pytest.param(200, marks=CHECK)])
 def test_a_file_that_is_damaged_is_refused_in_one_line(ricochet, before, trials):
-    """The file is truncated, missing, foreign, or without valid checkpoints."""
+    """A truncated, missing or foreign file, or one without valid checkpoints, is refused."""
     whole = before.read_bytes()
     for k in range(trials):
         before.write_bytes(whole[: k * len(whole) // trials])
@@ -152,7 +152,7 @@ def test_a_file_that_is_damaged_is_refused_in_one_line(ricochet, before, trials)
 
 
 def test_a_run_that_breaks_off_leaves_its_last_state_and_makes_way(ricochet, tmp_path):
-    """The same command replaces the file and reports this; the run cannot be resumed."""
+    """A run that ended with an error keeps its last state, but cannot be resumed."""
     write_input(tmp_path, COLLAPSE)
     run = ricochet("gas.nml", "-o", "gas.h5", "--quiet")
     assert run.returncode == BROKEN and "collapse" in one_line(run)
@@ -176,7 +176,7 @@ def test_a_run_that_breaks_off_leaves_its_last_state_and_makes_way(ricochet, tmp
 
 
 def test_a_run_that_passed_a_collapse_says_so(ricochet, tmp_path):
-    """All outputs report the collapse; the proposed contact time prevents it."""
+    """All outputs report the collapse, and the proposed contact time prevents the collapse."""
     crater = [CRATER, "-o", tmp_path / "crater.h5", "--force"]
     run = ricochet(*crater, "--set=contact.contact_time=0", "--set=output.event_log=T")
     found = contents(tmp_path / "crater.h5")
@@ -193,7 +193,7 @@ def test_a_run_that_passed_a_collapse_says_so(ricochet, tmp_path):
     assert run.returncode == FINISHED and "collapse" not in run.stderr + run.stdout
 
 
-#: Touching disks in a row, a triangle and two lattices, and a disk that strikes them.
+#: Disks that touch each other in a row, a triangle and two lattices, and a disk that strikes them.
 DIAGONAL = 0.125 * 3**0.5 / 2
 TOUCHING = {
     "cradle": [(0.75 + 0.125 * k, 1) for k in range(5)],
@@ -213,7 +213,7 @@ TOUCHING = {
 @pytest.mark.parametrize("restitution", [0.75, 0.9, 0.95, 0.999])
 @pytest.mark.parametrize("name", TOUCHING)
 def test_disks_that_touch_and_are_struck_are_no_collapse(ricochet, tmp_path, name, restitution):
-    """Below the threshold no collapse is reported, and scripts accept the run."""
+    """No collapse is reported if touching disks are struck, and the scripts accept the run."""
     places = [(0.125, 1), *TOUCHING[name]]
     write_input(
         tmp_path,
@@ -227,10 +227,10 @@ def test_disks_that_touch_and_are_struck_are_no_collapse(ricochet, tmp_path, nam
     assert "collapsed" not in read_run(tmp_path / "gas.h5").nature
 
 
-# --- a finished run goes on ---
+# --- continuation of a finished run ---
 
 
-#: Three collisions at t = 0.5, and wall collisions from t = 2.25 on.
+#: Input with three collisions at t = 0.5, and collisions with walls after t = 2.25.
 TOGETHER = """&box upper = 8, 8 /
 &species radius = 0.25 position = 1,1, 2,1, 1,3, 2,3, 1,5, 2,5
   velocity = 0.5,0, -0.5,0, 0.5,0, -0.5,0, 0.5,0, -0.5,0 /
@@ -265,7 +265,7 @@ def test_the_last_frame_of_steps_is_after_the_kick_whatever_the_cadence(ricochet
 def test_a_sample_between_collisions_of_one_moment_is_not_that_of_the_moment(
     ricochet, tmp_path, end
 ):
-    """The time is not complete, neither for samples nor for `stop.time`."""
+    """A sample between simultaneous collisions does not count as the sample of their time."""
     cadences = "&output frames_every_time = 0.25 observables_every_time = 0.5 /"
     write_input(tmp_path, TOGETHER + cadences)
     for time in (0.5, 3):
@@ -324,7 +324,7 @@ def test_a_check_of_a_run_that_goes_on_changes_nothing(ricochet, before):
 
 
 def test_a_finished_run_that_is_continued_needs_room(ricochet, small_disk, tmp_path):
-    """Without sufficient space the existing run is not changed."""
+    """If the file system has too little space, the existing run is not changed."""
     disk = small_disk(2000)
     write_input(tmp_path, MIXTURE)
     command = ["gas.nml", "-o", "disk/gas.h5", "--quiet", "--set"]
@@ -340,7 +340,7 @@ def test_a_finished_run_that_is_continued_needs_room(ricochet, small_disk, tmp_p
 
 
 def test_a_run_knows_its_overrides(ricochet, tmp_path):
-    """The command sets stop rules and schedules; other overrides keep their text."""
+    """A continued run uses stop rules and schedules of its command, and all earlier overrides."""
     write_input(tmp_path)
     fixed = ["run.seed=8", "species.heavy.mass=7", "Contact.restitution=0.9", "run.title=a = b"]
     sets = [f"--set={word}" for word in fixed]

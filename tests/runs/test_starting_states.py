@@ -1,4 +1,4 @@
-"""Initial states: from files, stretched, compressed, or with an exact temperature."""
+"""Initial states from files, with stretched boxes, compression, or an exact temperature."""
 
 import math
 
@@ -24,7 +24,7 @@ NEXT = """&species name = 'light' radius = {radius} file = 'gas.h5' {more} /
 
 @pytest.fixture
 def onward(ricochet, tmp_path):
-    """`onward(size, radius, more)`: a run from the last frame of a gas in a box of another size."""
+    """Return a function that starts a run from the last frame of a gas in a box of another size."""
     write_input(tmp_path, GAS)
     assert ricochet("gas.nml", "-o", "gas.h5").returncode == FINISHED
 
@@ -38,7 +38,7 @@ def onward(ricochet, tmp_path):
 
 
 def last_and_first(folder):
-    """Return final positions and velocities of a run and the initial ones of the next run."""
+    """Return the final positions and velocities of a run, and the initial ones of the next run."""
     with h5py.File(folder / "gas.h5") as one, h5py.File(folder / "next.h5") as other:
         names = [f"particles/disks/{name}/value" for name in ("position", "velocity")]
         return [one[name][-1] for name in names], [other[name][0] for name in names]
@@ -74,7 +74,7 @@ def test_disks_that_a_smaller_box_makes_overlap_are_named(onward):
 
 
 def test_disks_grow_from_the_places_in_a_file(ricochet, tmp_path):
-    """In a crystal the disks remain on their sites during compression."""
+    """Disks are compressed from the positions in a file; in a crystal they keep their sites."""
     box = "&box boundary = 'periodic', 'periodic' upper = {!r}, {!r} /\n"
     edges = np.array([10, 5 * math.sqrt(3)])
     light = "&species name = 'light' count = 100 packing_fraction = 0.75 placement = 'lattice'"
@@ -95,7 +95,7 @@ def test_disks_grow_from_the_places_in_a_file(ricochet, tmp_path):
 
 
 def nearest(vector, edges):
-    """Return displacements to the nearest images."""
+    """Return the displacements to the nearest periodic images."""
     return vector - np.round(vector / edges) * edges
 
 
@@ -105,7 +105,7 @@ def test_what_cannot_grow_is_told(onward):
 
 
 def test_a_temperature_is_exact_if_wanted(onward, tmp_path):
-    """This holds for velocities from a file and for random ones, whose mean is kept."""
+    """The temperature is exact for velocities from a file and for random velocities."""
     for more in ("", "velocities = 'maxwell'"):
         assert onward(1, 0.02, f"exact_temperature = 0.01 {more}").returncode == FINISHED
         for name in ("light", "heavy"):

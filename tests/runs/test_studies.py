@@ -1,4 +1,4 @@
-"""The scripts of runs/ in a copy in which substitutes record the calls."""
+"""Tests of the scripts in runs/, with scripts that replace the programs and record the calls."""
 
 import os
 import shutil
@@ -15,7 +15,7 @@ SYSTEMS = sorted(p.stem for p in (ROOT / "runs").glob("*.sh") if p.stem not in N
 
 @pytest.fixture
 def study(tmp_path):
-    """`study(script, *options)` runs a script of the copy; nothing is simulated or drawn."""
+    """Return a function that runs a script of runs/ without simulations and figures."""
     for folder in ("runs", "input"):
         (tmp_path / folder).mkdir()
         for path in (ROOT / folder).iterdir():
@@ -78,7 +78,7 @@ def test_help_says_what_a_study_does_and_starts_nothing(study, tmp_path, script)
 
 
 def test_threads_are_measured_by_turns_and_drawn(study, tmp_path):
-    """Nothing is measured twice, and a run that fails ends it with its reason."""
+    """Existing measurements are not repeated, and a failed run ends the script with its message."""
     executable(tmp_path / "ricochet", f"echo $1 $2 $3 $6 >>'{tmp_path}/runs.txt'\n: >\"$3\"")
     sizes = {"SIZES": "100", "THREADS": "1 4", "RUNS": "2"}
     for _ in range(2):

@@ -1,4 +1,4 @@
-"""Sums over collisions agree with the event log, whatever the masses."""
+"""Sums over collisions agree with the event log for arbitrary masses."""
 
 import random
 
@@ -17,7 +17,7 @@ HEAVY = """&box upper = 4, 2 /
 
 
 def masses(rng: random.Random) -> str:
-    """Return a system with masses over up to 30 decades and equal speeds or temperatures."""
+    """Return a system whose masses extend over up to 30 powers of ten."""
     mass = sorted(10 ** rng.uniform(-15, 15) for _ in range(rng.randint(1, 4)))
     words = []
     for k, m in enumerate(mass):
@@ -40,7 +40,7 @@ def masses(rng: random.Random) -> str:
 
 
 def sums_and_logs(found: dict) -> dict:
-    """Return pairs, by name, of final sums and the corresponding sums over the log."""
+    """Return the final sums in the file, and the corresponding sums over the event log, by name."""
     log = {name: found[f"/events/{name}"] for name in ("i", "j", "momentum_change")}
     radius = found["/particles/disks/radius"]
     change = log["momentum_change"].astype(np.longdouble)

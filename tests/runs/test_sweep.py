@@ -1,4 +1,4 @@
-"""Sweeps from Python, which also continue members of the script, and tables of members."""
+"""Tests of sweeps from Python, and of tables of member runs."""
 
 import os
 import re
@@ -31,7 +31,7 @@ def _tools(program, monkeypatch):
 
 @pytest.mark.usefixtures("_tools")
 def test_a_sweep_and_the_script_go_on_with_each_others_members(tmp_path):
-    """Members have equal names, inputs and overrides, and no member is run twice."""
+    """A sweep from Python and ensemble.sh can continue each other's member runs."""
     text = GAS.replace("temperature = 1", "")
     table = sweep(text, VALUES, tmp_path)
     assert table.member[0] == "restitution_0.8_a.velocity_1_-1_seed_1"
@@ -52,7 +52,7 @@ def test_a_sweep_and_the_script_go_on_with_each_others_members(tmp_path):
 
 @pytest.mark.usefixtures("_tools")
 def test_finished_members_are_extended_with_the_same_bits(program, tmp_path):
-    """A later stop and another schedule extend members; a stop already reached does not."""
+    """Finished member runs are extended if the sweep has a later end."""
     values = {"contact.restitution": [0.9, 1], "run.seed": [1, 2]}
     longer = GAS.replace("disk = 5", "disk = 9") + "&output frames_every_time = 0.1 /\n"
     whole = sweep(longer, values, tmp_path / "whole")
@@ -73,7 +73,7 @@ def test_finished_members_are_extended_with_the_same_bits(program, tmp_path):
 
 @pytest.mark.usefixtures("_tools")
 def test_the_script_extends_finished_members_with_the_same_bits(tmp_path):
-    """By another input or --set; a stop that is reached leaves them, other changes are refused."""
+    """ensemble.sh extends finished member runs if the input or --set specifies a later end."""
     (tmp_path / "gas.nml").write_text(GAS)
 
     def run(folder, *words):
@@ -167,7 +167,7 @@ TEXTS = ["a b", "a_b", "a, b", "a,b", "x --set run.seed=7", "it's --set", "''", 
 
 @pytest.mark.usefixtures("_tools")
 def test_texts_reach_the_program_as_they_are(tmp_path):
-    """Each is a member of its own, whoever runs it, and keeps its name when more are added."""
+    """Texts are passed to the program unchanged, and each text defines a separate member run."""
     first = sweep(GAS, {"run.title": TEXTS[1::2], "run.seed": 3}, tmp_path)
     for path in tmp_path.glob("*.h5"):
         path.unlink()  # the script is to run it
@@ -183,7 +183,7 @@ def test_texts_reach_the_program_as_they_are(tmp_path):
 
 @pytest.mark.usefixtures("_tools")
 def test_values_of_several_variables_may_belong_together(tmp_path):
-    """A list of dictionaries is a list of members, or of combinations; names may be nested."""
+    """A list of dictionaries specifies the values of several variables for each member run."""
     linked = [
         {"contact": {"restitution": xi}, "stop.collisions": n} for xi, n in ((0.9, 5), (1, 9))
     ]
@@ -263,7 +263,7 @@ def test_overrides_have_their_types(word, value):
 
 @pytest.mark.parametrize("link", [Path.symlink_to, Path.hardlink_to])
 def test_nothing_is_written_through_a_link(tmp_path, link):
-    """Files with several names are not written to either."""
+    """The sweep does not write through symbolic links, or to files with several hard links."""
     (tmp_path / "mine").write_text("mine")
     (tmp_path / "runs").mkdir()
     link(tmp_path / "runs/seed_1.log", tmp_path / "mine")

@@ -1,7 +1,6 @@
-"""Runs on several cores: numbers of threads, and ends that random systems rarely reach.
+"""Runs on several cores: numbers of threads, and special cases of the end of a run.
 
-That threads change no bit, whatever is written and however a run is stopped, is asserted of all
-systems (test_random_systems.py).
+`test_random_systems.py` tests with random systems that threads do not change the results.
 """
 
 import os
@@ -12,7 +11,7 @@ import pytest
 
 from whole_runs import BROKEN, FINISHED, STOPPED, differences, ran, write_input
 
-#: Enough disks for several cores.
+#: Input of a gas with enough disks for several cores.
 GAS = "&species name = 'gas' count = 10000 packing_fraction = 0.3 temperature = 1 /\n"
 
 
@@ -31,7 +30,7 @@ def threads_of(path: Path) -> int:
 
 @pytest.mark.parametrize("log", ["", "&output event_log = .true. /\n"], ids=["plain", "log"])
 def test_a_collapse_ends_a_run_on_several_cores_as_on_one(ricochet, tmp_path, log):
-    """The length of a window is bounded; the run stops in the same state."""
+    """After an inelastic collapse, a run on several cores ends in the same state as on one core."""
     lossy = "&contact restitution = 0.3 / &stop collisions_per_disk = 200 /\n"
     write_input(tmp_path, GAS.replace("10000", "5000") + lossy + log)
     one, two = (
@@ -65,7 +64,7 @@ def test_more_threads_than_cores_are_warned_of(ricochet, gas, options, environme
 
 
 def test_the_threads_are_those_of_the_last_part(ricochet, gas):
-    """A run that is too small, or of a kind without domains, uses one core."""
+    """The output file contains the number of threads of the last part of a run."""
     command = ["gas.nml", "-o", "many.h5", "--quiet"]
     begin = ["--set=stop.wall_clock=1e-9", "--set=run.threads=3"]
     assert ricochet(*command, *begin).returncode == STOPPED
@@ -77,7 +76,7 @@ def test_the_threads_are_those_of_the_last_part(ricochet, gas):
 
 
 def test_moments_of_a_run_that_goes_on_on_several_cores_count_from_its_start(ricochet, tmp_path):
-    """The kicks, too, in a later epoch than the first, where nothing has happened before."""
+    """Times of samples and kicks in a continued run are relative to the start of the first run."""
     helfand = (
         "&drive kind = 'brownian' interval = 0.1 temperature = 1 / &output helfand = .true. /\n"
     )
@@ -90,7 +89,7 @@ def test_moments_of_a_run_that_goes_on_on_several_cores_count_from_its_start(ric
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_run_says_what_it_did_on_one_core_though_it_had_two(ricochet, gas, threads):
-    """Summary and file report one core, because two do not pay for few events."""
+    """The summary and the file report one core if the program used only one of two cores."""
     few = "--set=stop.collisions=9000"
     done = ricochet("gas.nml", "-o", "two.h5", few, f"--set=run.threads={threads}")
     said = [line for line in done.stdout.splitlines() if line.startswith("events_on_one_core")]
@@ -101,7 +100,7 @@ def test_a_run_says_what_it_did_on_one_core_though_it_had_two(ricochet, gas, thr
 
 
 def test_too_little_memory_for_domains_is_said(program, gas):
-    """As on a machine that has enough of it for one core, and not for several."""
+    """The program prints a message if the memory is sufficient for one core but not for several."""
     facts = Path("/proc/meminfo").read_text().splitlines()
     facts = [line for line in facts if not line.startswith("MemAvailable")]
     (gas / "meminfo").write_text("\n".join(["MemAvailable: 14000 kB", *facts]))
