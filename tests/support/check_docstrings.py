@@ -2,8 +2,8 @@
 
     python tests/support/check_docstrings.py
 
-Prints one line for each problem.  The public names are those in `__all__` of the package and of
-`MODULES`.
+The script prints one line for each problem.  It checks the names in `__all__` of the package and of
+the modules in `MODULES`.
 """
 
 import sys
@@ -25,7 +25,7 @@ MODULES = (
     "fields",
     "streams",
 )
-#: Rules that do not apply here, with reasons.
+#: Rules of numpydoc that do not apply to this project, with reasons.
 IGNORED = {
     "GL01": "the summary stands on the line of the quotes, as everywhere in the project",
     "ES01": "a summary that says all needs no more text",
@@ -38,10 +38,10 @@ IGNORED = {
     "RT05": "likewise",
     "YD01": "generators have Yields only where a caller uses them",
 }
-#: Classes whose public methods and properties are checked as well.
+#: Classes whose public methods and properties are also checked.
 CLASSES = ("Run", "Simulation")
 METHODS = (FunctionType, classmethod, staticmethod)
-#: Named tuples, which need no example because functions return them.
+#: Rules that do not apply to named tuples, which need no examples because functions return them.
 OF_CLASSES = {"EX01", "PR01", "PR02"}
 
 
@@ -62,7 +62,7 @@ def problems() -> list[str]:
 
 
 def of_methods(name: str) -> list[str]:
-    """Return the problems of the methods and properties of a class of the package."""
+    """Return all problems in the methods and properties of a class of the package."""
     from numpydoc.validate import validate
 
     found = []

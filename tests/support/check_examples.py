@@ -1,9 +1,10 @@
-"""Write the Python examples of the pages to files for a type checker.
+"""Write the Python examples of the documentation to files, for a type checker.
 
     python tests/support/check_examples.py FOLDER
 
-Each section of README.md and of the pages in docs/ that has an example becomes one file; a section
-that imports nothing continues the previous one.  The cells of the tour form one file as well.
+The script writes one file for each section of README.md, and of the pages in docs/, that contains
+an example.  A section without imports is added to the file of the previous section.  The code cells
+of the notebook docs/tour.ipynb form another file.
 """
 
 import ast
@@ -25,7 +26,7 @@ def blocks_of(section: str) -> list[str]:
 
 
 def is_python(block: str) -> bool:
-    """Return whether a block is Python code and not shell or Fortran."""
+    """Return whether a block of code is Python code, and not a shell command or Fortran code."""
     try:
         nodes = [*ast.walk(ast.parse(block))]
     except SyntaxError:
@@ -34,7 +35,7 @@ def is_python(block: str) -> bool:
 
 
 def examples_of(page: str) -> list[str]:
-    """Return the programs on a page."""
+    """Return the Python programs on a page."""
     found: list[str] = []
     for section in re.split(r"^#+ ", page, flags=re.MULTILINE):
         code = "\n".join(blocks_of(section))
@@ -46,14 +47,14 @@ def examples_of(page: str) -> list[str]:
 
 
 def cells_of(notebook: str) -> str:
-    """Return the code of a notebook as one program."""
+    """Return the code cells of a notebook as one program."""
     cells = json.loads(notebook)["cells"]
     code = ["".join(cell["source"]) + "\n" for cell in cells if cell["cell_type"] == "code"]
     return "\n".join(["from IPython.display import display", *code])
 
 
 def main(folder: Path) -> None:
-    """Write the files."""
+    """Write the Python examples of all pages to a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*.py"):
         old.unlink()

@@ -1,12 +1,13 @@
-"""Check the sources against rules of the design that no other tool checks.
+"""Check the source code for violations of design rules that no other tool checks.
 
     python tests/support/check_style.py [FOLDER]
 
-The script prints one line per problem.  It checks the dependences between folders (arrows in the
-pictures of src/README.md and post/ricochet/README.md), the lengths of files, procedures and
-argument lists, comments before procedures, privacy, names, the absence of preprocessor directives,
-help texts, first words of sentences, a few denied words, and the absence of paths of single
-machines.
+The script prints one line per problem.  It checks that dependences between folders agree with the
+arrows in src/README.md and post/ricochet/README.md.  It checks the lengths of files, procedures and
+argument lists, the comments before procedures, the visibility of names, and the choice of names.
+It also checks the help texts, the first words of sentences, and the use of a few forbidden words.
+Finally it checks that there are no preprocessor directives and no paths that exist only on one
+computer.
 """
 
 import ast
@@ -33,12 +34,12 @@ TYPES = "type|class|real|integer|logical|character|procedure"
 DECLARATION = re.compile(rf"(?:use|import|implicit)\b|(?:{TYPES})\b.*::")
 EMPTY_WORDS = re.compile(r"(?:get|set(?!_in_)|do|handle)_|(?:\w+_)?(?:manager|utils?)(?:_|$)")
 MACHINE_PATH = re.compile(r"""(?:^|[\s"'=(:])/(?:home|root|Users|work|tmp|mnt|scratch)/\w""")
-# The help of a variable begins with the quantity: a capitalised noun, not a preposition, pronoun or
-# verb.
+# The help text of a variable begins with a capitalised noun that names the quantity, and not with a
+# preposition, pronoun or verb.
 HELP = re.compile(r'variable_t\("(\w*)", "(\w+)", "\w+", \d+, "\w+", "[^"]*",[ &\n]*"(\w*)')
 NO_NOUN = {"Of", "In", "On", "At", "By", "With", "For", "From", "To", "How", "Whether", "When"}
 NO_NOUN |= {"What", "That", "Those", "Where", "Which", "Use", "Set", "Give", "The", "It", "This"}
-# The subject of a sentence with one of these first words is a clause or a pronoun, not a noun.
+# If a sentence begins with one of these words, its subject is a clause or a pronoun and not a noun.
 NO_SUBJECT = re.compile(
     r"(?:^|[.!?] +)((?:What|Whom)\b(?![^.]*\?)|That which\b|(?:That|Those) (?:of|that|in)\b)"
 )
@@ -58,7 +59,7 @@ DENIED = {
 
 
 class Problem(NamedTuple):
-    """A violation of a rule, and its place."""
+    """A violation of a rule, with the file and line where it occurs."""
 
     path: Path
     line: int
@@ -69,12 +70,12 @@ class Problem(NamedTuple):
 
 
 def code_of(line: str) -> str:
-    """Return a line in lower case without strings and comment."""
+    """Return a line of code in lower case, without strings and without its comment."""
     return re.sub(r"'[^']*'|\"[^\"]*\"", "''", line).split("!")[0].lower()
 
 
 def arrows_of(page: str) -> dict[str, set[str]]:
-    """Return the folders that each folder may use, from lines such as `one --> other & another`."""
+    """Return the folders that each folder may use, from lines like `one --> other & another`."""
     arrows: dict[str, set[str]] = {}
     for start, ends in ARROWS.findall(page):
         arrows.setdefault(start, set()).update(re.findall(r"\w+", ends))
@@ -84,7 +85,7 @@ def arrows_of(page: str) -> dict[str, set[str]]:
 def arrow_problems(
     path: Path, lines: list[str], homes: dict[str, str], arrows: dict[str, set[str]]
 ) -> Iterator[Problem]:
-    """Return the `use` statements without `only`, or without an arrow in the picture."""
+    """Return `use` statements that have no `only`, or that contradict the arrows."""
     own = path.parent.name
     for number, line in enumerate(lines, start=1):
         use = USE.match(line)
@@ -99,9 +100,9 @@ def arrow_problems(
 
 
 def import_problems(root: Path, package: Path) -> Iterator[Problem]:
-    """Return the imports between folders of a Python package without an arrow in its picture.
+    """Return imports in a Python package that contradict the arrows between its folders.
 
-    A module at the top of the package counts as a folder; `__init__.py` may use all folders.
+    A module at the top level of the package counts as a folder; `__init__.py` may use all folders.
     """
     page = package / "README.md"
     arrows = arrows_of(page.read_text())
@@ -120,7 +121,7 @@ def import_problems(root: Path, package: Path) -> Iterator[Problem]:
 
 
 def imports_of(path: Path, package: Path) -> Iterator[tuple[int, str]]:
-    """Return line and first name below the package of each import in a file."""
+    """Return for each import in a file its line and the imported folder of the package."""
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ImportFrom) and node.level > 0:
             start = path.parents[node.level - 1].relative_to(package).parts
@@ -136,7 +137,7 @@ def imports_of(path: Path, package: Path) -> Iterator[tuple[int, str]]:
 
 
 def unit_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
-    """Return the files that are too long, or not one private module with the name of the file."""
+    """Return a problem if a file is too long or is not one private module with the file's name."""
     if len(lines) > MOST_LINES_OF_FILE:
         yield Problem(path, len(lines), f"more than {MOST_LINES_OF_FILE} lines")
     units = [unit for line in lines if (unit := UNIT.match(line))]
@@ -152,7 +153,7 @@ def unit_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
 
 
 def procedure_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
-    """Return the procedures that are too long, or whose name contains a meaningless word."""
+    """Return procedures that are too long, or whose names contain a meaningless word."""
     start = name = None
     for number, line in enumerate(lines, start=1):
         if END.match(line):
@@ -166,7 +167,10 @@ def procedure_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
 
 
 def statements_of(text: str) -> list[tuple[int, str]]:
-    """Return each statement, comment or empty line, joined to one line, with its line number."""
+    """Return statements, comments and empty lines with line numbers.
+
+    Continuation lines are joined to one line.
+    """
     statements: list[tuple[int, str]] = []
     continued = False
     for number, line in enumerate(text.splitlines(), start=1):
@@ -180,9 +184,9 @@ def statements_of(text: str) -> list[tuple[int, str]]:
 
 
 def heading_problems(path: Path, text: str) -> Iterator[Problem]:
-    """Return the procedures without `!>`, with long argument lists, or without an empty line.
+    """Return procedures without a comment or an empty line before them, or with many arguments.
 
-    Interfaces of C functions need no comment, because they have manual pages.
+    Interfaces of C functions need no comment, because manual pages describe these functions.
     """
     statements = statements_of(text)
     foreign = declared = inside = False
@@ -208,7 +212,7 @@ def heading_problems(path: Path, text: str) -> Iterator[Problem]:
 
 
 def name_problems(root: Path, paths: list[Path]) -> Iterator[Problem]:
-    """Return unused imported names, and unused public names except those of types."""
+    """Return imported and public names that are not used; public types are not checked."""
     tests = [*(root / "tests").rglob("*.pf"), *(root / "tests").rglob("*.f90")]
     uses = re.compile(r"use(?:, *intrinsic *::)? *(\w+) *, *only *: *(.*)")
     wanted = set()
@@ -231,7 +235,7 @@ def name_problems(root: Path, paths: list[Path]) -> Iterator[Problem]:
 
 
 def path_problems(root: Path) -> Iterator[Problem]:
-    """Return the paths of a single machine in files that are or could be committed."""
+    """Return paths that exist only on one computer, in files that are or could be committed."""
     command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
     for name in subprocess.check_output(command, cwd=root, text=True).splitlines():
         try:
@@ -244,7 +248,7 @@ def path_problems(root: Path) -> Iterator[Problem]:
 
 
 def comments_of(path: Path) -> Iterator[tuple[int, str]]:
-    """Return line and text of each docstring and of each block of comment lines."""
+    """Return the line number and the text of each docstring and each block of comment lines."""
     text = path.read_text()
     if path.suffix == ".py":
         for node in ast.walk(ast.parse(text)):
@@ -278,7 +282,7 @@ def comments_of(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def language_problems(root: Path) -> Iterator[Problem]:
-    """Return help texts that begin with no noun, sentences that begin badly, and denied words."""
+    """Return help texts that do not begin with a noun, badly begun sentences, and denied words."""
     for path in sorted((root / "src" / "variables").glob("*.f90")):
         text = path.read_text()
         for row in HELP.finditer(text):
@@ -304,14 +308,14 @@ def language_problems(root: Path) -> Iterator[Problem]:
 
 
 def denied_words(path: Path, line: int, words: str) -> Iterator[Problem]:
-    """Return the denied words in a text."""
+    """Return a problem for each denied word in a text."""
     for pattern, better in DENIED.items():
         if found := re.search(pattern, words):
             yield Problem(path, line, f"{found[0]!r}: write {better}")
 
 
 def problems_of(root: Path) -> Iterator[Problem]:
-    """Return all problems of the project in `root`."""
+    """Return all problems of the project in the folder `root`."""
     arrows = arrows_of((root / "src" / "README.md").read_text())
     paths = sorted((root / "src").rglob("*.f90"))
     homes = {path.stem: path.parent.name for path in paths}
@@ -340,7 +344,7 @@ def problems_of(root: Path) -> Iterator[Problem]:
 
 
 def main() -> int:
-    """Print the problems; return 1 if there are any, otherwise 0."""
+    """Print all problems, and return the exit status: 1 if there are problems, otherwise 0."""
     problems = list(problems_of(Path(sys.argv[1] if len(sys.argv) > 1 else ".")))
     print(*problems, sep="\n", end="\n" if problems else "")
     return 1 if problems else 0

@@ -1,14 +1,16 @@
-"""Run two builds of the program with every input, and compare their output bit for bit.
+"""Run two builds of the program with every input file, and compare the results bit for bit.
 
     python tests/support/compare_bits.py OLD NEW [MORE.nml...]
 
-OLD and NEW are programs, for example of two commits.  Random systems are compared as well.
-Provenance is left out.  The option --except names the paths of datasets whose layout changed on
-purpose.  With --sums 1e-13 sums over collisions may differ by this fraction of their largest value
-or of the energy.  With --old-names OLD is a program from before the renaming of the public names
-(tables OLD_WORDS and OLD_PATHS): its inputs contain the old names, and its datasets are compared
-under the present names.  The script prints one line for each run; an input that OLD refuses because
-of an unknown variable is "unknown to OLD".  The exit status is 1 if any runs differ.
+OLD and NEW are two builds of the program, for example of two commits.  The script compares the
+results for all input files and for random systems.  The group `provenance` of the output files is
+not compared.  The option --except names the paths of datasets whose layout was changed on purpose.
+With --sums 1e-13, sums over collisions may differ by this fraction of their largest value or of the
+energy.  With --old-names, OLD is a program with the former public names (tables OLD_WORDS and
+OLD_PATHS).  Its input files are written with the former names, and its datasets are compared with
+those of the present names.  The script prints one line for each run.  If OLD refuses an input
+because of an unknown variable, the line says "unknown to OLD".  The exit status is 1 if any runs
+differ.
 """
 
 import argparse
@@ -29,7 +31,7 @@ from whole_runs import contents, ran, unlike, write_input  # noqa: E402
 
 SYSTEMS = 60
 
-# Input for a program with the old names: for each group, patterns and the old words.
+# Former names in input files: for each group, patterns of present names and the former names.
 OLD_WORDS = {
     "side": {
         r"\bstart_time(?= *=)": "begin",
@@ -50,7 +52,7 @@ OLD_WORDS = {
     "contact": {r"\breference_speed(?= *=)": "restitution_speed"},
     "output": {r"\bdecades_from(?= *=)": "frames_from", "'event_count'": "'collisions'"},
 }
-# Names of its datasets: patterns of old names, and the present names.
+# Former names of datasets: patterns of former names, and the present names.
 OLD_PATHS = {
     r"(/parameters/(?:side/\w+@|obstacle/|wall/))speed$": r"\1surface_velocity",
     r"(/parameters/drive@)speed$": r"\1self_propulsion_speed",
@@ -76,7 +78,7 @@ OLD_VALUES = {
 
 
 def for_old(text: str) -> str:
-    """Return the input with the names of the old program."""
+    """Return an input text with the former names of variables."""
 
     def group(match: re.Match) -> str:
         text = match[0]
@@ -88,7 +90,7 @@ def for_old(text: str) -> str:
 
 
 def of_old(found: dict) -> dict:
-    """Return the output of an earlier program under the present names."""
+    """Return the datasets of an earlier program under the present names."""
     renamed = dict(found)
     for pattern, words in OLD_VALUES.items():
         for path in filter(re.compile(pattern).fullmatch, found):
@@ -99,7 +101,7 @@ def of_old(found: dict) -> dict:
 
 
 def random_inputs(folder: Path) -> list[Path]:
-    """Return random inputs, each in its own folder together with its starting file."""
+    """Write random input files and their starting files, each into a separate folder."""
     inputs = []
     for k in range(SYSTEMS):
         system, place = random_system(random.Random(k)), folder / f"random_{k}"
@@ -109,7 +111,7 @@ def random_inputs(folder: Path) -> list[Path]:
     return inputs
 
 
-#: Sums over collisions, whose rounding errors depend on their units.
+#: Sums over collisions, whose rounding errors depend on the order of summation and on their units.
 SUMS = re.compile(
     "/observables/(virial(_tensor|_pressure)?|side_impulse|dissipated_energy|heat|work|drive_energy"
     r"|heat_virial|helfand_\w+|(sides|obstacles)/\w+/\w+)/value"
@@ -117,7 +119,7 @@ SUMS = re.compile(
 
 
 def is_near(name: str, old: dict, new: dict, share: float) -> bool:
-    """Return whether two sums agree up to a fraction of their largest value or of the energy."""
+    """Return whether two sums are equal within a fraction of their largest value or the energy."""
     if not (SUMS.fullmatch(name) and name in old and name in new):
         return False
     a, b = old[name], new[name]
@@ -128,7 +130,7 @@ def is_near(name: str, old: dict, new: dict, share: float) -> bool:
 def compare(
     programs: tuple[str, str], path: Path, work: Path, share: float, old_names: bool
 ) -> list[str] | None:
-    """Return the differences between two programs: exit codes, or names of datasets.
+    """Return the differences between the results of two programs: exit codes, or dataset names.
 
     The result is None if the input contains a variable that the old program does not have.
     """

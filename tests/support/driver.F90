@@ -1,4 +1,4 @@
-!> Runs the suites that the generated list names. pFUnit brings its own driver, which reads the same list.
+!> Runs all test suites in the generated list. pFUnit has its own driver, which reads the same list.
 program unit_tests
   use funit, only: pf_begin, pf_finish
   implicit none

@@ -2,9 +2,10 @@
 # Searches for races between threads with the thread sanitizer, in the unit tests of domains and in whole runs of all kinds.
 # usage: find_races.sh BUILD     (a folder with `ricochet` and `unit_tests`, built with -fsanitize=thread)
 #
-# The sanitizer does not detect how GNU's OpenMP library synchronises threads. LLVM's OpenMP library has the same functions, and its
-# tool Archer reports the synchronisation to the sanitizer; this script therefore replaces GNU's library by LLVM's. The script first
-# tests that the sanitizer detects the race in a program with a race, and reports none in a program with synchronised threads.
+# The sanitizer cannot observe how the OpenMP library of GNU synchronises threads. The OpenMP library of LLVM has the same
+# functions, and its tool Archer reports the synchronisation to the sanitizer. Therefore this script uses the library of LLVM
+# instead of the library of GNU. The script first tests that the sanitizer reports a race in a program with a race, and no race in a
+# program with synchronised threads.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 build=$(realpath "$1")
@@ -18,7 +19,7 @@ trap 'rm -rf "$work"' EXIT
 ln -s "${archer%/*}/libomp.so" "$work/libgomp.so.1"
 export TSAN_OPTIONS=halt_on_error=1:exitcode=66:ignore_noninstrumented_modules=1
 
-# Runs a command with the libraries of the sanitizer.
+# Runs a command with the libraries that the sanitizer requires.
 watched() { LD_LIBRARY_PATH=$work OMP_TOOL_LIBRARIES=$archer "$@"; }
 
 # Arguments: the expected exit status, and the index of the element of n that an iteration of the loop changes.

@@ -12,18 +12,18 @@ module funit
   integer, parameter :: pair_length = 132     !! enough for two numbers; longer texts are cut
   character(len=*), parameter :: pair_format = "(""expected <"",g0,""> actual <"",g0,"">"")"
 
-  !> The first difference by the rules of `@assertEqual`; '' if there is none.
+  !> Returns the first difference between two values by the rules of `@assertEqual`, or '' if there is none.
   interface pf_unequal
     module procedure unequal_int32, unequal_int32_int64, unequal_int64, unequal_real64, unequal_logical, unequal_text
   end interface pf_unequal
 
   abstract interface
-    !> A test or fixture.
+    !> Interface of a test or fixture.
     subroutine test_body()
     end subroutine test_body
   end interface
 
-  !> A condition: a scalar or a vector.
+  !> Asserts a condition, which is a scalar or a vector.
   interface pf_holds
     module procedure holds_scalar, holds_vector
   end interface pf_holds
@@ -35,12 +35,12 @@ module funit
 
 contains
 
-  !> Whether the present test has failed. The call of a procedure with assertions is followed by this test.
+  !> Returns whether the present test has failed. The translated code calls this function after each procedure with assertions.
   logical function anyexceptions()
     anyexceptions = failed
   end function anyexceptions
 
-  !> Reads the only option: `-f text` runs the tests whose names contain the text.
+  !> Reads the command line. The only option `-f text` selects the tests whose names contain the text.
   subroutine pf_begin()
     integer :: length
     character(len=2) :: option
@@ -58,7 +58,7 @@ contains
     call get_command_argument(2, filter)
   end subroutine pf_begin
 
-  !> Runs one test between the `@before` and `@after` of the file; the latter also runs after a failure.
+  !> Runs the `@before` procedure of the file, one test, and the `@after` procedure, which runs even after a failure.
   subroutine pf_run(name, test, before, after)
     character(len=*), intent(in) :: name      !! suite.test
     procedure(test_body) :: test
@@ -80,7 +80,7 @@ contains
     end if
   end subroutine pf_run
 
-  !> Prints the report and returns the exit status 0 or 2. A file without tests is a failure as well.
+  !> Prints a summary, and returns the exit status 0 or 2. A file without tests also counts as a failure.
   subroutine pf_finish()
     write (output_unit, "(a)") ""
     if (failures == 0 .and. tests > 0) then
@@ -93,7 +93,7 @@ contains
     stop 2
   end subroutine pf_finish
 
-  !> Marks the present test as failed and records the place and the reason.
+  !> Marks the present test as failed, and stores the file, the line and the reason.
   subroutine pf_fail(file, line, what, message)
     character(len=*), intent(in) :: file, what
     integer, intent(in) :: line
@@ -107,7 +107,7 @@ contains
     if (what /= "") report = report//"  "//what//nl
   end subroutine pf_fail
 
-  !> Asserts a comparison of elements; it fails at the first wrong element.
+  !> Asserts a comparison of array elements. The assertion reports the first wrong element.
   subroutine pf_check(file, line, what, pairs, message)
     character(len=*), intent(in) :: file, what
     integer, intent(in) :: line
@@ -121,7 +121,7 @@ contains
     call pf_fail(file, line, what//" failed at element "//trim(number)//": "//trim(pairs(k)), message)
   end subroutine pf_check
 
-  !> Whether arrays have the same shape, or the expected value is a scalar.
+  !> Returns true if two arrays have the same shape, or if the expected value is a scalar.
   pure logical function pf_conform(expected, actual)
     integer, intent(in) :: expected(:), actual(:)  !! shapes
     pf_conform = size(expected) == 0
@@ -147,7 +147,7 @@ contains
     if (expected /= actual) write (pair, pair_format) expected, actual
   end function unequal_int64
 
-  !> Infinite values are equal to themselves; NaN is equal to nothing.
+  !> Compares two real numbers. Infinite values are equal to themselves, and NaN is not equal to any number.
   elemental character(len=pair_length) function unequal_real64(expected, actual) result(pair)
     real(real64), intent(in) :: expected, actual
     pair = pf_unordered(expected, actual, expected == actual)
@@ -159,7 +159,7 @@ contains
     if (expected .neqv. actual) write (pair, pair_format) expected, actual
   end function unequal_logical
 
-  !> Blanks at both ends are ignored.
+  !> Compares two texts; blanks at both ends are ignored.
   elemental character(len=pair_length) function unequal_text(expected, actual) result(pair)
     character(len=*), intent(in) :: expected, actual
     character(len=50) :: shown(2)
@@ -168,14 +168,14 @@ contains
     if (adjustl(expected) /= adjustl(actual)) write (pair, pair_format) trim(shown(1)), trim(shown(2))
   end function unequal_text
 
-  !> The first difference that exceeds an absolute tolerance.
+  !> Returns the first difference that exceeds an absolute tolerance.
   elemental character(len=pair_length) function pf_apart(expected, actual, tolerance) result(pair)
     real(real64), intent(in) :: expected, actual, tolerance
     pair = ""
     if (expected /= actual) pair = pf_unordered(expected, actual, abs(actual - expected) <= tolerance)
   end function pf_apart
 
-  !> Two numbers that do not satisfy a relation; '' if they do.
+  !> Returns the two numbers as text if they do not satisfy a relation, and '' otherwise.
   elemental character(len=pair_length) function pf_unordered(expected, actual, holds) result(pair)
     real(real64), intent(in) :: expected, actual
     logical, intent(in) :: holds

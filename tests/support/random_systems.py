@@ -1,9 +1,9 @@
-"""Random systems with all groups of the input, to find failures for which there is no test yet.
+"""Random systems that use all groups of the input, to find failures in cases without a test.
 
-Scale, shape, boundaries, disks, obstacles, contact laws, sampling and stop rules are drawn
-independently, with a preference for difficult cases: restitution of exactly 0, aligned velocities
-and lattices, clusters, strips, large ratios of size and mass. A system consists of an input text
-and its starting file.
+Scale, shape, boundaries, disks, obstacles, contact laws, sampling and stop rules are chosen
+independently at random.  Difficult cases are preferred: a restitution of exactly 0, parallel
+velocities, lattices, clusters, narrow boxes, and large ratios of size and mass.  A system consists
+of an input text and a starting file.
 """
 
 import math
@@ -16,12 +16,12 @@ import numpy as np
 MOST_EVENTS, MOST_OF_FEW = 40_000, 12_000  #: one or two epochs for many disks
 SIDES = ("left", "right", "bottom", "top")
 CADENCES = ("time", "collisions", "events", "collisions_per_disk")
-#: Variables whose value is a word that counts as a feature.
+#: Input variables whose value is a word; each word counts as a feature of the system.
 KINDS = r"(dynamics|motion|rule|law|placement|velocities|kind|side|precision) = '(\w+)'"
 
 
 class System(NamedTuple):
-    """An input file, the table of its starting file (empty: none), and a description."""
+    """A random system: its input text, the text of its starting file, and a description."""
 
     text: str
     columns: list[str]
@@ -31,7 +31,7 @@ class System(NamedTuple):
     draw: "Draw"  #: used to draw changes that are valid for the system
 
     def features(self) -> set[str]:
-        """Return the random choices: variables, kinds, and boundary conditions."""
+        """Return the features of the system: variables, kinds, and boundary conditions."""
         found = {"many disks"} if self.disks > 2500 else set()
         for group, words in re.findall(r"^&(\w+)(.*)/$", self.text, re.MULTILINE):
             found |= {f"{group}.{name}" for name in re.findall(r"(\w+) =", words)}
@@ -48,15 +48,15 @@ def starting_file(columns: list[str], table: np.ndarray) -> str:
 
 
 def numbers(*values: float) -> str:
-    """Return values in namelist format with all digits."""
+    """Return numbers as text in namelist format with full precision."""
     return ", ".join(repr(float(value)) for value in values)
 
 
 class Draw:
-    """One system under construction: earlier choices restrict later ones."""
+    """Random choice of one system, in which earlier choices restrict later choices."""
 
     def __init__(self, rng: random.Random, most: int):
-        """Draw the scales, on which other quantities depend."""
+        """Draw the scales of length, time and mass, on which other quantities depend."""
         self.rng = rng
         self.disks = rng.choice([rng.randint(1, 12), rng.randint(20, 400), rng.randint(2600, 6000)])
         self.disks = 1 + (self.disks - 1) % most
@@ -92,7 +92,7 @@ class Draw:
         return f" {words}" if self.chance(share) else ""
 
     def place(self, x: float, y: float) -> list[float]:
-        """Return the point of the box at these fractions of the edges."""
+        """Return the point of the box at the given fractions of its edge lengths."""
         return [
             low + part * edge
             for low, part, edge in zip(self.lower, (x, y), self.edges, strict=True)
@@ -121,10 +121,10 @@ class Draw:
             words += f" shear_rate = {rate * self.speed / self.edges[1]!r}"
         return words + " /"
 
-    # --- walls ---
+    # --- collision rules and motions of boundaries ---
 
     def law(self) -> str:
-        """Draw the contact law of one side, wall or obstacle, which is often the default law."""
+        """Draw the collision rule of one boundary, which is often the default rule."""
         rng = self.rng
         if self.chance(0.5):
             return ""
@@ -148,7 +148,7 @@ class Draw:
         return words
 
     def sides(self) -> list[str]:
-        """Draw the contact laws and motions of the sides of the box."""
+        """Draw the collision rules and motions of the sides of the box."""
         groups = []
         for k, name in enumerate(SIDES):
             if self.periodic[k // 2] or self.chance(0.65):
@@ -165,7 +165,7 @@ class Draw:
         return groups
 
     def side_motion(self) -> str:
-        """Draw the motion of a side."""
+        """Draw the motion of one side of the box."""
         rng = self.rng
         self.worked = True
         kinds = ["constant_velocity", "parabolic", "sawtooth", "sine"]
@@ -219,10 +219,10 @@ class Draw:
             self.packing = min(self.packing, 0.2)
         return groups
 
-    # --- disks ---
+    # --- species and initial states of the disks ---
 
     def region(self) -> tuple[float, float]:
-        """Draw a part of the box; return its widths, and store its variables as `self.where`."""
+        """Draw a region of the box, store it in `self.where`, and return its edge lengths."""
         self.where = ""
         if self.chance(0.9 if self.blocked else 0.7):
             return tuple(self.edges)
@@ -260,7 +260,7 @@ class Draw:
         return words
 
     def species(self, blocked: bool) -> list[str]:
-        """Draw up to three species, placed at random among obstacles, or one in a starting file."""
+        """Draw up to three randomly placed species, or one species in a starting file."""
         rng, groups, self.blocked = self.rng, [], blocked
         if not blocked and self.chance(0.2):
             return [rng.choice([self.from_file, self.from_file, self.by_position])()]
@@ -299,7 +299,7 @@ class Draw:
         return groups
 
     def of_many_sizes(self) -> list[str]:
-        """Draw species of about equal total area, in descending order of radius."""
+        """Draw species with about equal total areas, in descending order of radius."""
         kinds, ratio = self.rng.randint(3, 6), 10.0 ** self.rng.uniform(0.3, 2)
         wide, high = self.region()
         radii = [ratio ** (-k / (kinds - 1)) for k in range(kinds)]
@@ -322,7 +322,7 @@ class Draw:
         return self.rng.choice(["random", "random", "lattice", "grid", *few])
 
     def by_position(self) -> str:
-        """Draw a few disks in a row, some of them close to contact."""
+        """Draw a few disks in a row, some of which are almost in contact."""
         self.disks = count = self.rng.randint(3, 8)
         x = [self.place((k + 0.5) / count, self.rng.choice([0.5, 0.52])) for k in range(count)]
         radius = 0.5 * min(self.edges[0] / count, 0.9 * self.edges[1])
@@ -388,7 +388,7 @@ class Draw:
         return words + " /"
 
     def drive(self) -> str:
-        """Draw the driving, from many kicks per free flight to one kick per many free flights."""
+        """Draw the driving; its interval may be much shorter or much longer than a free flight."""
         if not self.driven:
             return ""
         rng = self.rng
@@ -456,7 +456,7 @@ class Draw:
 
 
 def random_system(rng: random.Random, most: int = 10**6) -> System:
-    """Return a system of at most about `most` disks; the program may refuse or abort it."""
+    """Return a random system of at most about `most` disks, which the program may refuse."""
     draw = Draw(rng, most)
     walls = draw.sides()
     obstacles = draw.obstacles()

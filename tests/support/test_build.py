@@ -1,4 +1,4 @@
-"""Tests of the Makefile: folders, parallel unit tests, linkers other than GNU's, installation."""
+"""Tests of the Makefile: folders, simultaneous unit tests, other linkers, and installation."""
 
 import json
 import os
@@ -17,7 +17,8 @@ import pytest
 from whole_runs import environment, executable, ran
 
 ROOT = Path(__file__).resolve().parents[2]
-#: Files that pages mention and that exist in a clone only, because they are not installed.
+#: Files that the documentation mentions but that are not installed; they exist only in the source
+#: tree.
 SOURCES = {"src", "post", "runs", "tests", "CONTRIBUTING.md"}
 PFUNIT_DIR = os.environ.get("PFUNIT_DIR", "")
 SUITE = """module test_it
@@ -53,7 +54,7 @@ def test_two_at_once_in_one_folder_both_succeed(small):
 
 
 def test_a_build_that_is_killed_while_it_links_is_finished_by_the_next(small, tmp_path):
-    """An empty program that is newer than its objects must be linked again."""
+    """If a build is killed while it links, the next build must link the program again."""
     script = """case "$*" in
 *" -o "*/unit_tests*)
   printf '' > "$(echo "$*" | sed 's/.* -o \\([^ ]*\\) .*/\\1/')"
@@ -76,7 +77,7 @@ esac"""
 
 @pytest.mark.skipif(not PFUNIT_DIR, reason="PFUNIT_DIR names no pFUnit")
 def test_runners_take_turns_in_one_folder(small, tmp_path):
-    """Each runner must run its own program, and not that of the other runner."""
+    """If two test runners use the same folder, each runner must execute its own program."""
     real = [*[word for word in small if not word.startswith(("shared", "PFUNIT"))]]
     real += ["shared=", f"PFUNIT_DIR={PFUNIT_DIR}"]
     for value, status in ((1, 0), (2, 2), (1, 0)):
@@ -87,7 +88,7 @@ def test_runners_take_turns_in_one_folder(small, tmp_path):
 
 
 def test_a_linker_that_cannot_redirect_gets_no_hints(small, tmp_path):
-    """A script in place of the linker refuses the option as such linkers do."""
+    """The test replaces the linker by a script that refuses an option, as some linkers do."""
     refusal = 'case "$*" in *--wrap*) echo unknown option: --wrap >&2; exit 1;; esac'
     compiler = executable(tmp_path / "gfortran", f'{refusal}\nexec gfortran "$@"')
     run = make(*small, f"FC={compiler}")
@@ -130,7 +131,7 @@ def test_a_film_takes_one_command(program, tmp_path):
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
-    """Yield a folder with all installed files; uninstall them afterwards."""
+    """Yield a folder with all installed files, and uninstall the files afterwards."""
     root = tmp_path_factory.mktemp("root")
     place = [f"DESTDIR={root}", "PREFIX=/usr"]
     assert make("install", *place).returncode == 0
@@ -154,7 +155,7 @@ def test_an_installed_program_and_its_scripts_run_from_anywhere(installed, tmp_p
 
 
 def test_an_installed_engine_is_found_by_its_module(installed, tmp_path):
-    """The settings of the modulefile are sufficient for a program in C and for the package."""
+    """The settings of the modulefile are sufficient for C programs and the Python package."""
     (module,) = (installed / "share/modulefiles/ricochet").iterdir()
     told = dict(re.findall(r"^prepend-path (\w+) {(.+)}$", module.read_text(), re.MULTILINE))
     assert module.read_text().startswith("#%Module") and told["PATH"] == "/usr/bin"
@@ -180,7 +181,7 @@ def test_who_installs_for_others_is_told_that_the_program_is_for_this_processor(
 
 
 def test_only_what_was_installed_goes(tmp_path):
-    """Other programs, and runs, notes and folders of users, remain after install and uninstall."""
+    """Installation and removal do not change other programs, or files and folders of users."""
     prefix = tmp_path / "it's a folder"
     shared, place, program = prefix / "share/ricochet", f"PREFIX={prefix}", prefix / "bin/ricochet"
     program.parent.mkdir(parents=True)
@@ -224,7 +225,10 @@ def test_only_what_was_installed_goes(tmp_path):
 
 
 def test_a_program_that_is_older_than_its_source_is_not_installed(program, tmp_path):
-    """It must not be built either, because the folder may belong to another user."""
+    """An outdated program is neither installed nor rebuilt.
+
+    The program is not rebuilt because the folder may belong to another user.
+    """
     build, prefix = tmp_path / "build", tmp_path / "usr"
     build.mkdir()
     copy = shutil.copy(program, build)
@@ -240,7 +244,7 @@ def test_a_program_that_is_older_than_its_source_is_not_installed(program, tmp_p
 
 
 def test_what_the_manual_pages_speak_of_is_installed(installed):
-    """All paths in the pages are absolute, and each page has the name of its command."""
+    """All paths in the manual pages are absolute, and each page has the name of its command."""
     pages = sorted(path.name for path in (installed / "share/man/man1").iterdir())
     assert pages == ["ricochet-ensemble.1", "ricochet.1"]
     version = ran(installed / "bin/ricochet", "--version").stdout.split()[1]
@@ -277,7 +281,7 @@ def test_what_the_manual_pages_speak_of_is_installed(installed):
 
 
 def test_pip_brings_program_library_package_commands_and_inputs(tmp_path):
-    """The environment uses the packages of this one, so that no network is required."""
+    """The new environment uses packages of the present environment and requires no network."""
     own = tmp_path / "venv"
     venv.create(own, symlinks=True)
     python = own / "bin/python"
@@ -306,7 +310,7 @@ def test_pip_brings_program_library_package_commands_and_inputs(tmp_path):
 
 @pytest.mark.parametrize("script", [".ci/set-up", "src/install.sh", "runs/ensemble.sh"])
 def test_scripts_that_need_a_later_bash_say_so(tmp_path, script):
-    """With the version number of an old bash they stop before any other action."""
+    """If the version of bash is too old, the script stops before any other action."""
     text = (ROOT / script).read_text()
     limit = re.search(r"BASH_VERSINFO.*>= (404)\b", text).span(1)
     copy = tmp_path / "script"

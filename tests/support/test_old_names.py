@@ -1,4 +1,4 @@
-"""Test that no old public name occurs outside the table of old names."""
+"""Test that former public names do not occur outside the table of former names."""
 
 import re
 import subprocess
@@ -34,7 +34,7 @@ OLD = [
 
 @pytest.mark.parametrize("pattern", OLD)
 def test_no_old_name_is_left(pattern):
-    """Old names are searched as whole words in all text files of the project."""
+    """Former names are searched as whole words in all text files of the project."""
     files = subprocess.run(
         ["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True
     ).stdout.split("\0")

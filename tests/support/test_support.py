@@ -1,4 +1,4 @@
-"""Tools of the tests: the substitute for pFUnit, the check of its runs, the style rules."""
+"""Tests of the test tools: the substitute for pFUnit, its runner, and the style rules."""
 
 import os
 import re
@@ -184,7 +184,7 @@ def test_translation_keeps_line_numbers_and_texts_with_commas_or_at_signs(tmp_pa
 
 
 def judged(tmp_path: Path, script: str, suite: str, **variables):
-    """Return the verdict on a script that replaces the program with the unit tests."""
+    """Return how run_unit_tests.sh judges a script that replaces the unit-test program."""
     program, path = executable(tmp_path / "unit_tests", script), tmp_path / "test_it.pf"
     path.write_text(suite)
     judge = SUPPORT / "run_unit_tests.sh"
@@ -295,7 +295,7 @@ def test_a_style_problem_is_reported_at_its_line(tmp_path, before, after, line, 
 
 
 def test_words_of_python_pages_and_helps_are_looked_at(tmp_path):
-    """Questions may begin with What; a help begins with a noun."""
+    """Only questions may begin with What; help texts begin with a noun."""
     folder = tmp_path / "src" / "variables"
     folder.mkdir(parents=True)
     row = 'variable_t("run", "dt", "real", 1, "optional", "0.1", &\n      "{}", positive)'
@@ -330,7 +330,7 @@ def test_folders_and_what_they_use_are_those_of_the_picture(tmp_path):
     ],
 )
 def test_imports_of_the_package_are_those_of_its_picture(tmp_path, line, used):
-    """Imports may be absolute or relative, and inside functions; the same folder is allowed."""
+    """Absolute and relative imports are checked, also inside functions, except in one folder."""
     package = tmp_path / "post" / "ricochet"
     ran("git", "init", "-q", tmp_path, check=True)
     for name in ("__init__", "commands", "reading/reader", "pages/live", "pages/lab"):

@@ -1,4 +1,5 @@
-!> Simulations for tests: states built from a line of text, advanced by any method, and compared; and random cases.
+!> Simulations for unit tests. The procedures create states from a line of text, advance them with any method, compare states, and
+!> create random cases.
 module test_systems
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: dp => real64, int32, int64, never
@@ -26,7 +27,7 @@ module test_systems
   public :: total_energy, momentum, tightest_gap
   public :: draw_between, draw_vector, draw_magnitude, meeting, time_to_contact
 
-  !> Systems in which all general properties must hold, with most combinations of features.
+  !> Systems with many combinations of features, in which all general properties must hold.
   character(len=*), parameter :: systems(*) = [character(len=40) :: "walls", "walls dilute", &
     "walls dense mixture", "walls few", "walls giant bed inelastic", "walls mixture smooth inelastic", &
     "walls gravity mixture", "walls gravity pegs inelastic contact", "walls round mixture", &
@@ -37,7 +38,7 @@ module test_systems
     "walls slants mixture", "channel gravity slants inelastic contact", "periodic slants pegs dilute", &
     "walls dense sizes", "channel dense sizes gravity", "periodic dense sizes inelastic", "walls sizes pegs", &
     "periodic giant sizes"]
-  !> These systems and others with moving sides.
+  !> All systems of the list `systems`, and further systems with moving sides.
   character(len=*), parameter :: every_system(*) = [character(len=40) :: systems, "walls shaken", &
     "walls shaken gravity mixture", "channel shaken gravity inelastic contact", "walls shaken bed dilute", &
     "walls shaken pegs inelastic contact", "walls shaken slants gravity", "walls shaken giants gravity", &
@@ -45,8 +46,8 @@ module test_systems
 
 contains
 
-  !> The simulation described by an input, as the program builds it, and the problems of the input, '' if there are none; without
-  !> `message` a problem ends the tests. An input without a stop rule ends at time 1.
+  !> Returns the simulation that an input text describes. `message` contains the problems of the input, or '' if there are none.
+  !> Without `message`, a problem ends the tests. If the input has no stop rule, the simulation ends at time 1.
   subroutine build(text, sim, message, input, overrides)
     character(len=*), intent(in) :: text
     type(simulation_t), intent(out) :: sim
@@ -69,7 +70,7 @@ contains
     message = error%message
   end subroutine build
 
-  !> A system of single disks, each a species of its own, in the unit box with elastic walls.
+  !> Returns a system of disks in the unit box with elastic walls. Each disk is a separate species.
   function few_disks(x, v, radius, mass) result(sim)
     real(dp), intent(in) :: x(:)           !! x1, y1, x2, y2, ... [length]
     real(dp), intent(in) :: v(:)           !! v1x, v1y, ... likewise [length/time]
@@ -94,7 +95,7 @@ contains
     end do
   end function few_disks
 
-  !> Allocates n disks, with the data of features that a test may switch on later.
+  !> Allocates n disks, including data for features that a test may use later.
   pure subroutine make_room(sim, n)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: n
@@ -102,7 +103,7 @@ contains
     if (.not. allocated(sim%extra)) allocate (sim%extra(n))
   end subroutine make_room
 
-  !> A gas of about a hundred disks with the features that the words name, in a box of 3 x 2 that does not contain the origin:
+  !> Returns a gas of about a hundred disks in a box of 3 x 2 that does not contain the origin. The words name the features:
   !> `periodic` or `channel` (periodic in x), otherwise walls; `gravity`; `pegs` and `slants` as obstacles and a `round` container;
   !> a `mixture` of two species; a `giant` or two `giants`; a `bed` at rest that is hit by the giant; many `sizes`; `inelastic`;
   !> `smooth` walls; `contact` duration; `shaken` sides; `few`, `dilute` or `dense`.
@@ -140,7 +141,7 @@ contains
 
   contains
 
-    !> One species of the gas.
+    !> Returns one species of the gas.
     function gas(name, mass, radius) result(text)
       character(len=*), intent(in) :: name, mass
       real(dp), intent(in) :: radius
@@ -155,7 +156,7 @@ contains
       has = index(words, word) > 0
     end function has
 
-    !> `text` if the words contain this one, otherwise `otherwise` or ''.
+    !> Returns `text` if the given word is one of the words, and otherwise `otherwise` or ''.
     pure function given(word, text, otherwise) result(this)
       character(len=*), intent(in) :: word, text
       character(len=*), intent(in), optional :: otherwise
@@ -177,8 +178,9 @@ contains
     allocate (box%obstacle(size(box%obstacle))%shape, source=shape)
   end subroutine add_obstacle
 
-  !> The dynamics for a method: `cells`, with neighbour lists where they pay; `lists` everywhere, which are `short` and often full;
-  !> `pairs` or `rescan`; with `heap`, otherwise a calendar.
+  !> Returns the dynamics for a method. `cells` uses neighbour lists where they are faster, and `lists` uses them everywhere. With
+  !> `short`, the lists are short and often full. Further methods are `pairs` and `rescan`. With `heap` the event queue is a heap,
+  !> otherwise a calendar.
   subroutine prepare(dynamics, method, sim)
     type(event_driven_t), intent(out) :: dynamics
     character(len=*), intent(in) :: method
@@ -192,7 +194,7 @@ contains
     call dynamics%start(sim)
   end subroutine prepare
 
-  !> Continues a simulation, as after a restart, up to a limit.
+  !> Continues a simulation up to a limit, in the same way as after a restart.
   subroutine evolve(sim, method, time, collisions, events, failure)
     type(simulation_t), intent(inout) :: sim
     character(len=*), intent(in) :: method                      !! as for `prepare`
@@ -212,8 +214,8 @@ contains
     if (allocated(error)) failure = error%message
   end subroutine evolve
 
-  !> The first difference between two states, to the last bit; '' if there is none. Data that search and queue store with the disks
-  !> are ignored.
+  !> Returns the first difference between two states, or '' if the states are bit-identical. Data that belong to the search or to
+  !> the event queue are not compared.
   pure function difference(a, b) result(text)
     type(simulation_t), intent(in) :: a, b
     character(len=:), allocatable :: text
@@ -244,14 +246,14 @@ contains
     end do
   end function difference
 
-  !> Whether two numbers differ in any bit.
+  !> Returns whether two numbers differ in any bit.
   elemental function differ(a, b) result(yes)
     real(dp), intent(in) :: a, b
     logical :: yes
     yes = transfer(a, 0_int64) /= transfer(b, 0_int64)
   end function differ
 
-  !> Kinetic and potential energy at the present time, plus the dissipated energy.
+  !> Returns the sum of kinetic, potential and dissipated energy at the present time.
   pure function total_energy(sim) result(energy)
     type(simulation_t), intent(in) :: sim
     real(dp) :: energy
@@ -272,8 +274,8 @@ contains
     end do
   end function momentum
 
-  !> The smallest gap between disks, sides and obstacles at the present time, in diameters of the disks involved; negative if any of
-  !> them overlap.
+  !> Returns the smallest gap between disks, sides and obstacles at the present time, in units of the disk diameter. The gap is
+  !> negative if any of these objects overlap.
   pure function tightest_gap(sim) result(gap)
     type(simulation_t), intent(in) :: sim
     real(dp) :: gap, x(2), dx(2), low(2), high(2)
@@ -295,7 +297,7 @@ contains
     end do
   end function tightest_gap
 
-  !> Vector from a point to the nearest image of another one.
+  !> Returns the vector from a point to the nearest periodic image of another point.
   pure function separation(box, a, b) result(dx)
     type(box_t), intent(in) :: box
     real(dp), intent(in) :: a(2), b(2)
@@ -305,7 +307,7 @@ contains
     dx = dx - merge(edges*anint(dx/edges), 0.0_dp, box%periodic)
   end function separation
 
-  !> Time until two disks touch, by the textbook formula.
+  !> Returns the time until two disks touch, calculated with the textbook formula.
   pure function time_to_contact(dx, dv, sigma) result(s)
     real(dp), intent(in) :: dx(2), dv(2), sigma
     real(dp) :: s, b, disc
@@ -315,7 +317,8 @@ contains
     if (b < 0 .and. disc > 0) s = max(dot_product(dx, dx) - sigma**2, 0.0_dp)/(sqrt(disc) - b)
   end function time_to_contact
 
-  !> Time when disk i collides with the other of two disks, by the kernel of all searches, if another event is known at a time.
+  !> Returns the time at which two disks collide, calculated by the procedure that all searches use. The argument `known` is the
+  !> time of another event.
   function meeting(disk, i, known) result(t)
     type(disk_t), intent(in) :: disk(2)
     integer, intent(in) :: i
@@ -342,7 +345,7 @@ contains
     u = low + (high - low)*u
   end subroutine draw_between
 
-  !> Draws a vector with components uniform in (-size, size).
+  !> Draws a vector whose components are uniform in (-size, size).
   subroutine draw_vector(stream, size, v)
     type(random_stream_t), intent(inout) :: stream
     real(dp), intent(in) :: size
@@ -351,7 +354,7 @@ contains
     call draw_between(stream, -size, size, v(2))
   end subroutine draw_vector
 
-  !> Draws a positive number of random size: 10**u, u uniform in (-decades, decades).
+  !> Draws a positive number of random order of magnitude: 10**u, where u is uniform in (-decades, decades).
   subroutine draw_magnitude(stream, decades, u)
     type(random_stream_t), intent(inout) :: stream
     real(dp), intent(in) :: decades

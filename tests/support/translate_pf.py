@@ -1,8 +1,8 @@
-"""Translate a pFUnit test file (.pf) into Fortran for the module `funit` beside this script.
+"""Translate a pFUnit test file (.pf) into Fortran code that uses the module `funit`.
 
-The script accepts the part of pFUnit's language that the tests need.  It refuses everything else,
-including text that pFUnit itself would accept or silently ignore, so that a file that runs here
-runs under pFUnit with the same result.  Each line is translated into one line, so that messages
+The script accepts only the part of the pFUnit language that the tests need.  It refuses everything
+else, even if pFUnit would accept or silently ignore it.  Therefore every accepted file has the same
+result under pFUnit.  Each line is translated into one line of Fortran; therefore compiler messages
 refer to lines of the .pf file.
 
     python translate_pf.py tests/unit/test_errors.pf build/tests/test_errors.F90
@@ -15,18 +15,18 @@ from typing import NamedTuple
 
 
 class Refused(Exception):
-    """Error for a line outside the supported part of the language."""
+    """Error for a line that is not in the supported part of the language."""
 
 
 class Suite(NamedTuple):
-    """The procedures of a file that the driver calls."""
+    """The procedures of a test file that the driver calls."""
 
     tests: list[str]
     fixtures: dict[str, str]
 
 
 ORDER = "pf_unordered(real(e_, pf_real), real(a_, pf_real), e_ {} a_)"
-# Condition under which `a_` fails where `e_` is expected.
+# Condition under which an assertion fails; `a_` is the actual value and `e_` the expected value.
 COMPARISON = {
     "equal": "pf_unequal(e_, a_)",
     "equal within": "pf_apart(e_, a_, {tolerance})",
@@ -40,13 +40,13 @@ SUBROUTINE = re.compile(r"\s*subroutine\s+(\w+)\s*(?:\(\s*\))?\s*(?:!.*)?$", re.
 
 
 def without_strings(line: str) -> str:
-    """Return the code of a line without comment, with strings replaced by blanks."""
+    """Return a line of code without its comment, with strings replaced by blanks."""
     blanked = re.sub(r"'[^']*'|\"[^\"]*\"", lambda text: " " * len(text[0]), line)
     return blanked.split("!")[0]
 
 
 def split_arguments(text: str) -> list[str]:
-    """Return the arguments of a call, separated at commas outside brackets and strings."""
+    """Return the list of arguments of a call, split at commas outside brackets and strings."""
     code = re.sub(r"'[^']*'|\"[^\"]*\"", lambda quoted: " " * len(quoted[0]), text)
     cuts, depth = [-1], 0
     for place, letter in enumerate(code):
@@ -81,13 +81,14 @@ def sort_arguments(text: str) -> tuple[list[str], dict[str, str]]:
 
 
 def assertion(name: str, arguments: str, place: str) -> str:
-    """Return the Fortran code of one `@assert`; `place` is the file and line for the report."""
+    """Return the Fortran code of one `@assert`; `place` is the file and line for messages."""
     values, keywords = sort_arguments(arguments)
     message = f", message={keywords['message']}" if "message" in keywords else ""
     kind = name.lower() + (" within" if "tolerance" in keywords else "")
     if kind in COMPARISON:
         expect_count(values, 2)
-        # Double brackets, because gfortran 14 reports a wrong size for a string in single brackets.
+        # Double brackets are used because gfortran 14 reports a wrong size for a string in single
+        # brackets.
         check = (
             f"associate (e_ => (({values[0]})), a_ => (({values[1]}))); "
             "if (.not. pf_conform(shape(e_), shape(a_))) then; "
@@ -105,13 +106,16 @@ def assertion(name: str, arguments: str, place: str) -> str:
 
 
 def expect_count(values: list[str], count: int) -> None:
-    """Refuse a wrong number of positional arguments; tolerance and message must be keywords."""
+    """Raise an error if the number of positional arguments is wrong.
+
+    Tolerance and message must be keyword arguments.
+    """
     if len(values) != count:
         raise Refused(f"{len(values)} positional arguments instead of {count}")
 
 
 def translate_line(line: str, place: str) -> str:
-    """Return one line of Fortran for one line of a .pf file."""
+    """Translate one line of a .pf file into one line of Fortran."""
     found = re.match(r"\s*@assert(\w+)\s*\((.*)\)\s*$", line, re.IGNORECASE)
     if found:
         return assertion(found[1], found[2], place)
@@ -123,7 +127,7 @@ def translate_line(line: str, place: str) -> str:
 
 
 def find_suite(lines: list[str], stem: str) -> Suite:
-    """Return the tests and fixtures of a file; its module must have the name of the file."""
+    """Return the tests and fixtures of a file, whose module must have the name of the file."""
     modules = [found[1] for line in lines if (found := re.match(r"\s*module\s+(\w+)\s*$", line))]
     if modules != [stem]:
         raise Refused(f"the file must hold one module, named {stem}")
@@ -149,7 +153,7 @@ def find_suite(lines: list[str], stem: str) -> Suite:
 
 
 def translate(source: Path) -> str:
-    """Return the Fortran text of a file: its module, and the subroutine that runs its tests."""
+    """Return the translated module of a file, and the subroutine that runs its tests."""
     lines = source.read_text().splitlines()
     suite = find_suite(lines, source.stem)
     fortran = [f'# 1 "{source}"']
@@ -171,7 +175,7 @@ def translate(source: Path) -> str:
 
 
 def main() -> int:
-    """Translate a file into another one; return 1 if the file is refused."""
+    """Translate the file named on the command line; return 1 if the file is refused."""
     source, target = map(Path, sys.argv[1:])
     try:
         target.write_text(translate(source))
