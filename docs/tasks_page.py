@@ -3,8 +3,8 @@
     make figures                     or runs/mixture.sh, cooling.sh, crater.sh, gravity.sh alone
     python docs/tasks_page.py        reads runs/figures into docs/tasks.json, and writes the page
 
-The file docs/tasks.json stores each number of the page with its error.  In the page, HTML comments
-enclose each text that this script replaces, and contain the name of the text.
+The file docs/tasks.json contains each number of the page together with its error.  In the page,
+HTML comments enclose each text that this script replaces, and contain the name of the text.
 """
 
 import csv

@@ -1,4 +1,4 @@
-"""Time correlations, diffusion and structure of a fluid: VACF, D, F_s, a2; g(r), S(k), psi6, g6(r).
+"""Time correlations, diffusion coefficient and structure functions of a fluid.
 
     python post/correlations.py runs/state/memory_*.h5 -o correlations.png --csv correlations.csv
 

@@ -1,4 +1,4 @@
-"""Table of the member runs of a sweep: their settings, states and results.
+"""Table of the settings, states and results of all member runs of a sweep.
 
     python post/gather.py runs/scan --csv scan.csv
 

@@ -7,11 +7,11 @@ same state and have frames at the same times.  The distance between two runs is 
 distance between the positions of all disks, calculated with the nearest periodic images.  This
 distance grows as exp(lambda t) until it reaches the size of the box.  A straight line is fitted to
 the logarithm of the distance of each pair, in the same interval of time for all pairs.  The
-interval ends when the first pair reaches the distance --largest, and begins at the fraction
---fit-from of its end.  Earlier times are not used, because the separation has not yet turned into
-the direction of fastest growth.  The Lyapunov exponent lambda is the mean slope of the fitted
-lines, and its error is the standard error of the mean.  The script rejects gases that cool, because
-their rate of divergence is not constant.
+interval ends at the time at which the first pair reaches the distance --largest.  The interval
+begins at the fraction --fit-from of this time.  Earlier times are not used, because the separation
+has not yet turned into the direction of fastest growth.  The Lyapunov exponent lambda is the mean
+slope of the fitted lines, and its error is the standard error of the mean.  The script rejects
+gases that cool, because their rate of divergence is not constant.
 """
 
 from typing import NamedTuple

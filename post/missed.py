@@ -3,12 +3,13 @@
     python post/missed.py runs/gravity/rates/*.h5 -o missed.png --csv missed.csv
 
 The script requires event-driven runs and time-stepped runs with the same seeds.  For each time step
-dt it computes the fraction of pair collisions that are missing relative to the event-driven run of
-the same seed.  The first --equilibration collisions per disk are not counted, and the fraction is
-averaged over the seeds.  The result is compared with the predicted fraction P, which is derived
-below.  If there is only one pair of runs, the error is determined from the fluctuations of the two
-collision rates in time.  For small time steps these fluctuations are larger than the fraction of
-missed collisions; therefore runs with several seeds are required.
+dt the script calculates the fraction of missed pair collisions, relative to the number of pair
+collisions in the event-driven run with the same seed.  The first --equilibration collisions per
+disk are not counted, and the fraction is averaged over the seeds.  The result is compared with the
+predicted fraction P, which is derived below.  If there is only one pair of runs, the error is
+determined from the fluctuations of the two collision rates in time.  For small time steps these
+fluctuations are larger than the fraction of missed collisions; therefore runs with several seeds
+are required.
 
 Two disks of diameter s with the relative speed g and the impact parameter b would overlap along a
 chord of length 2 l, where l = sqrt(s^2 - b^2).  They approach each other only along the first half

@@ -1,4 +1,4 @@
-"""Scattering angle against impact parameter, compared with the exact curve.
+"""Scattering angle against impact parameter, compared with the exact result.
 
     python post/scattering.py runs/scattering/*.h5 -o scattering.png --csv scattering.csv
 
@@ -8,7 +8,10 @@ the moving disk passes on the left.  R12 = r1 + r2 is the sum of the radii.  The
 the angle between the initial and the final velocity of the moving disk.  The exact result for a
 finite mass ratio M = m1 / m2 and restitution xi, with kappa = (1 + xi) / 2 * M / (1 + M), s = b /
 R12 and c^2 = 1 - s^2, is
-    tan theta = 2 kappa s c / (1 - 2 kappa c^2);   M infinite and xi = 1:  theta = 2 acos(s).
+
+    tan theta = 2 kappa s c / (1 - 2 kappa c^2).
+
+For infinite M and xi = 1, the scattering angle is theta = 2 acos(s).
 """
 
 from ricochet import Run

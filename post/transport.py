@@ -1,12 +1,13 @@
-"""Viscosities, thermal conductivity and diffusion coefficient of a gas, against Enskog's theory.
+"""Viscosities, thermal conductivity and diffusion coefficient, compared with Enskog's theory.
 
     python post/transport.py runs/driven/transport_*/*.h5 -o transport.png --csv transport.csv
 
-The disks must be elastic and the box periodic.  Runs are combined by packing fraction.  The files
-must contain the Helfand moments of momentum and energy (output.helfand), about four samples of the
-observables per mean free time (output.observables_every_time) and, for D, equally spaced frames.
-For mixtures the script computes only the viscosities, for two reasons.  The diffusion of the
-species also transports energy, and D differs between species (see correlations.py).
+The disks must be elastic, and the box must be periodic.  Runs with equal packing fraction are
+combined.  The output files must contain the Helfand moments of momentum and energy
+(output.helfand).  About four samples of the observables are required per mean free time
+(output.observables_every_time).  For D the frames must be equally spaced in time.  For mixtures the
+script computes only the viscosities, for two reasons.  The diffusion of the species also transports
+energy, and D differs between species (see correlations.py).
 
 The small panels show the coefficients as functions of the lag, divided by Enskog's coefficients.  A
 viscosity or the conductivity is half the slope of the mean square change of a Helfand moment

@@ -215,7 +215,7 @@ ensemble() {
 
 # instructions RADII PACKING COLLISIONS [OPTION...]: counts the instructions in the event loop and at the start of epochs.
 # Instructions in other parts of a run (start, output) are not counted, because their number depends on the time of day. The runs
-# have 1000 equal disks, or 4000 disks of many sizes.
+# have 1000 equal disks, or 4000 disks with many different radii.
 instructions() {
   local radii=$1 packing=$2 collisions=$3 name
   shift 3

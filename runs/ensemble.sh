@@ -59,7 +59,8 @@ fail() {
 
 die() { fail 2 "$@"; }
 
-# nearest WORD CHOICE...: prints "; did you mean --seeds?" if WORD is similar to one of the choices (requires Python).
+# nearest WORD CHOICE...: prints a suggestion such as "; did you mean --seeds?" if WORD is similar to one of the choices. This
+# function requires Python.
 nearest() {
   python3 -c 'import difflib, sys
 for near in difflib.get_close_matches(sys.argv[1], sys.argv[2:], 1): print(f"; did you mean {near}?")' \

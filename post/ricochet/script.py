@@ -180,7 +180,7 @@ def joined(words: Iterable[str]) -> list[str]:
 def command_line(
     doc: str, output: str, one: bool = False, csv: bool = True, repeated: bool = False, **defaults
 ) -> Parser:
-    """Return a parser whose help is the docstring `doc` of the script.
+    """Return a command-line parser, whose help text is the docstring `doc` of the script.
 
     The script accepts a single run if `one` is true, and any number of runs otherwise.  `output` is
     the default name of the output file.  Duplicate runs are ignored unless `repeated` is true.

@@ -1,1 +1,1 @@
-"""Output files: reading runs, their physical properties, and conversion for other programs."""
+"""Modules that read output files, determine traits of runs, and convert runs to other types."""

@@ -119,7 +119,7 @@ class TemporaryFolder:
         self.removal = Finalize(self, shutil.rmtree, (self.path, True), exitpriority=PRIORITY)
 
     def remove(self) -> None:
-        """Remove the folder now."""
+        """Remove the folder immediately."""
         self.removal()
 
     def keep(self) -> None:

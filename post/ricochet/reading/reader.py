@@ -402,8 +402,8 @@ class Run:
         Parameters
         ----------
         name : str
-            name in the file, such as "angular_velocity" or "orientation"; `disk_data` contains all
-            of these quantities
+            name in the file, such as "angular_velocity" or "orientation"; the attribute `disk_data`
+            contains all such quantities
 
         Returns
         -------
@@ -445,8 +445,8 @@ class Run:
         Parameters
         ----------
         name : str
-            name in the file, such as "total_energy" or "sides/left/impulse"; `observables` lists
-            all names
+            name in the file, such as "total_energy" or "sides/left/impulse"; the attribute
+            `observables` contains all names
 
         Returns
         -------
@@ -871,7 +871,7 @@ class Frame:
 
     @property
     def time(self) -> float:
-        """Time of the frame."""
+        """Time at which the frame was written."""
         return float(self.run.time[self.index])
 
     @property
