@@ -14,23 +14,24 @@ collisions per disk.  Dashed lines show the single species of a mixture.
 
 The time correlations are calculated by the module `ricochet.correlations`, whose docstring explains
 how pairs of frames are chosen.  They are the velocity autocorrelation <v(0) v(t)>, the mean square
-displacement, the self-intermediate scattering function F_s(k, t) = <exp(i k r)> at --wavenumber,
-and the non-Gaussian parameter alpha2 = <r^4> / (2 <r^2>^2) - 1. In theory the velocity
+displacement, the self-intermediate scattering function, and the non-Gaussian parameter.  The
+self-intermediate scattering function is F_s(k, t) = <exp(i k r)> at the wavenumber --wavenumber.
+The non-Gaussian parameter is alpha2 = <r^4> / (2 <r^2>^2) - 1. In theory the velocity
 autocorrelation decays as exp(-w t) at short times, and as 1/t at long times (mode coupling).  The
 table also contains the overlap, which is the fraction of the disks within 0.3 diameters of their
 first position.
 
-The diffusion coefficient D(t) is defined in two ways: as a quarter of the slope of the mean square
-displacement between neighbouring lags, and as half the integral of <v(0) v(s)> from 0 to t.  The
-integral is computed as <v(0) (x(t) - x(0))>, which is exact for any spacing of frames.  For driven
-disks, whose velocities change between collisions, only the first definition applies.  Enskog's
-coefficient D_E is shown for equal smooth disks of fixed energy.  In two dimensions D(t) grows as
-the logarithm of t without limit, because of the long-time tail.  Therefore a value of D applies
-only to one time and to one size of the box: when sound has crossed the box, D depends on its size.
-The table contains D from both definitions, averaged over the lags from `D_time` / 2 to `D_time`;
-the two values must agree.  `D_time` is the time in which sound crosses the box, but at most an
-eighth of the duration of the run.  D is calculated only for a periodic box and equally spaced
-frames.
+There are two definitions of the diffusion coefficient D(t).  First, it is a quarter of the slope of
+the mean square displacement between neighbouring lags.  Second, it is half of the integral of <v(0)
+v(s)> from s = 0 to t.  The integral is computed as <v(0) (x(t) - x(0))>, which is exact for any
+spacing of frames.  For driven disks, whose velocities change between collisions, only the first
+definition applies.  Enskog's coefficient D_E is shown for equal smooth disks of fixed energy.  In
+two dimensions D(t) grows as the logarithm of t without limit, because of the long-time tail.
+Therefore a value of D applies only to one time and to one size of the box: when sound has crossed
+the box, D depends on its size.  The table contains D from both definitions, averaged over the lags
+from `D_time` / 2 to `D_time`; the two values must agree.  `D_time` is the time in which sound
+crosses the box, but at most an eighth of the duration of the run.  D is calculated only for a
+periodic box and equally spaced frames.
 
 The second Sonine coefficient is a2 = <v^4> / (2 <v^2>^2) - 1, where each species has its own
 temperature.  It is 0 in equilibrium, and -1/2 if all speeds are equal. The structure factor is S(k)

@@ -11,9 +11,10 @@ is the fraction of the normal energy that a collision dissipates.  The exponents
 chi^2 per degree of freedom.  If a fit does not describe its points, a warning is printed.  If a
 point of a curve is the mean of fewer than four runs, all points of the curve have equal weights.
 In this case, the error of the exponent is determined from the deviations of the points from the
-fit.  Points with open symbols are not used in fits, for one of two reasons.  Either the walls
-affect the crater, which is assumed if the number of collisions with walls exceeds 1 % of the number
-of disks, or some runs reached `stop.time` with more energy left than `stop.energy_fraction`.
+fit.  Points with open symbols are not used in fits, for one of two reasons.  One reason is that the
+walls affect the crater; this is assumed if the number of collisions with walls exceeds 1 % of the
+number of disks.  The second reason is that some runs reached `stop.time` with more energy left than
+`stop.energy_fraction`.
 """
 
 from itertools import chain

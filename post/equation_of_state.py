@@ -2,14 +2,14 @@
 
     python post/equation_of_state.py runs/state/eta_*.h5 -o state.png --csv state.csv
 
-The pressure P is determined by three methods: from the virial of the pair collisions, from the
-collision rate (for equal disks), and from the force on the sides of the box (if they are walls).
-Means are taken in equilibrium, which begins after --equilibration or, without that option, when no
-observable drifts any longer.  Errors account for the autocorrelation of the pressure; in the table,
-`samples` is the effective number of independent samples of the virial. Runs with equal packing
-fraction are combined.  The disks must be elastic, and there must be no gravity.  Thermal walls and
-driving are allowed if all of them impose the same temperature; in this case kT is a measured mean,
-and its error is included.  Near walls there is a layer that the centres of disks cannot reach, and
+The pressure P is determined from the virial of the pair collisions.  For equal disks it is also
+determined from the collision rate, and in boxes with walls from the force on the walls.  Means are
+taken in equilibrium, which begins after --equilibration or, without that option, when no observable
+drifts any longer.  Errors account for the autocorrelation of the pressure; in the table, `samples`
+is the effective number of independent samples of the virial. Runs with equal packing fraction are
+combined.  The disks must be elastic, and there must be no gravity.  Thermal walls and driving are
+allowed if all of them impose the same temperature; in this case kT is a measured mean, and its
+error is included.  Near walls there is a layer that the centres of disks cannot reach, and
 therefore the density in the interior is higher.  For this reason Z from the wall pressure refers to
 the area that centres can reach, and differs from Z of the bulk by a fraction of about 1/sqrt(N).
 For disks of many radii r, the curves show the equation of state of fluids derived by Santos, Yuste

@@ -5,14 +5,15 @@
 The temperature kT is the mean kinetic energy of a disk in equilibrium.  Equilibrium begins after
 --equilibration or, without that option, when no observable drifts any longer.  The figure and the
 second table state why earlier frames are not used.  The solid lines show P(v^2) = m / (2 kT) exp(-m
-v^2 / 2 kT) and P(h) ~ exp(-m g h / kT), where h is the height of the centre of a disk above its
-lowest possible position.  These laws are exact for a large number of point particles.  The dashed
-lines include two corrections.  First, if the total energy of the N disks is fixed, the factor
-exp(-e / kT) for the energy e of a disk is replaced by (1 - e / (2 N kT))^(2 N - 2).  Second, the
-centres of disks of species i are excluded from the area pi s_ij^2 around each disk of species j,
-where s_ij is the sum of the two radii.  To first order, the excluded area multiplies the density of
-species i by exp(-sum_j pi s_ij^2 n_j(h)).  This correction is a few per cent near the floor.  If
-the sum, calculated for point particles, exceeds 0.5, no dashed line is drawn for the heights.
+v^2 / 2 kT) and P(h) ~ exp(-m g h / kT).  The height h is the height of the centre of a disk above
+its lowest possible position.  These laws are exact for a large number of point particles.  The
+dashed lines include two corrections.  The first correction is for a fixed total energy of N disks:
+it replaces the factor exp(-e / kT) for the energy e of a disk by (1 - e / (2 N kT))^(2 N - 2).  The
+second correction is for the area that disks exclude.  The centres of disks of species i cannot be
+in the area pi s_ij^2 around each disk of species j, where s_ij is the sum of the two radii.  To
+first order, the excluded area multiplies the density of species i by exp(-sum_j pi s_ij^2 n_j(h)).
+This correction is a few per cent near the floor.  If the sum, calculated for point particles,
+exceeds 0.5, no dashed line is drawn for the heights.
 
 The slopes are determined by weighted linear fits to the logarithm of the histograms, for kinetic
 energies from 0 to 5 kT and potential energies m g h from 1 to 5 kT.  Smaller heights are not used

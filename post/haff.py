@@ -3,8 +3,8 @@
     python post/haff.py runs/haff/*.h5 -o haff.png --csv haff.csv
 
 Runs with the same coefficient of restitution xi are combined.  The left panel shows the kinetic
-energy K against time in units of the initial mean free time 1/w0, and Haff's law K0 / (1 + (1 -
-xi^2) w0 t / 4)^2 (Haff 1983).  The right panel shows K against collisions per disk, and an
+energy K against time in units of the initial mean free time 1/w0. It also shows Haff's law K0 / (1
++ (1 - xi^2) w0 t / 4)^2 (Haff 1983).  The right panel shows K against collisions per disk, and an
 exponential law (van Noije and Ernst 1998).  The lower panels show the ratios of K to both laws.
 Both laws apply while the gas is homogeneous.  At later times a part of K is the energy of flows in
 the gas, and K decreases more slowly.  The boxes must be periodic, and the total momentum must be 0.

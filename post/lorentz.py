@@ -10,8 +10,8 @@ free time.  Between these lags the slope is nearly constant, because the velocit
 small: it is negative and decays as 1/t^2. Runs with the same density are combined, and the error is
 the standard error of the mean.
 
-The figure shows D / D_0, where D_0 = 3 v / (16 n R) is the diffusion coefficient of the Boltzmann
-equation, which is exact in the limit of low density.  The curves show the density expansion for
+The figure shows D / D_0. The Boltzmann equation, which is exact in the limit of low density, yields
+the diffusion coefficient D_0 = 3 v / (16 n R).  The curves show the density expansion for
 scatterers that may overlap,
 
     D_0/D = 1 - (4/3) nR^2 ln(nR^2) - 0.8775 nR^2 + 4.519 (nR^2 ln(nR^2))^2,

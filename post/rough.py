@@ -2,14 +2,15 @@
 
     python post/rough.py runs/rough.h5 -o rough.png --csv rough.csv
 
-The left panel shows T = m <v^2> / 2 and T_rot = I <omega^2> against collisions per disk; the dashed
-curves show a theory that assumes Maxwell distributions of the velocities (Luding et al. 1998).  The
-right panel shows T_rot / T and two values of its steady state: the prediction of that theory and,
-where available, the result of direct simulations of the Boltzmann equation, which is up to 6 %
-lower.  Both values apply to a homogeneous dilute gas of equal disks without Coulomb friction.  In a
-cooling gas a flow develops, which contributes to T and therefore decreases the ratio.  The decrease
-is 3.8 to 4.6 % at a packing fraction of 0.02 and 0.3 to 0.5 % at a packing fraction of 0.0025; it
-is larger if the gas cools faster.  All runs must have the same input, and the box must be periodic.
+The left panel shows T = m <v^2> / 2 and T_rot = I <omega^2> against collisions per disk.  The
+dashed curves show a theory that assumes Maxwell distributions of the velocities (Luding et al.
+1998).  The right panel shows the ratio T_rot / T and two values for its steady state.  One value is
+the prediction of that theory.  The other value, if available, is the result of direct simulations
+of the Boltzmann equation, which is up to 6 % lower.  Both values apply to a homogeneous dilute gas
+of equal disks without Coulomb friction.  In a cooling gas a flow develops, which contributes to T
+and therefore decreases the ratio.  The decrease is 3.8 to 4.6 % at a packing fraction of 0.02, and
+0.3 to 0.5 % at a packing fraction of 0.0025. If the gas cools faster, the decrease is larger.  All
+runs must have the same input, and the box must be periodic.
 """
 
 from ricochet import Run, RunError, theory

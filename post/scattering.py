@@ -3,11 +3,11 @@
     python post/scattering.py runs/scattering/*.h5 -o scattering.png --csv scattering.csv
 
 Each run contains two disks, one of which is at rest at the start.  The impact parameter b is the
-distance between the path of the moving disk and the centre of the disk at rest; it is positive if
-the moving disk passes on the left.  R12 = r1 + r2 is the sum of the radii.  The scattering angle is
-the angle between the initial and the final velocity of the moving disk.  The exact result for a
-finite mass ratio M = m1 / m2 and restitution xi, with kappa = (1 + xi) / 2 * M / (1 + M), s = b /
-R12 and c^2 = 1 - s^2, is
+distance between the path of the moving disk and the centre of the disk at rest.  The sign of b is
+positive if the moving disk passes on the left.  R12 = r1 + r2 is the sum of the radii.  The
+scattering angle is the angle between the initial and the final velocity of the moving disk.  Let M
+= m1 / m2 be the mass ratio, xi the coefficient of restitution, s = b / R12, c^2 = 1 - s^2, and
+kappa = (1 + xi) / 2 * M / (1 + M).  For finite M the exact result is
 
     tan theta = 2 kappa s c / (1 - 2 kappa c^2).
 

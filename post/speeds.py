@@ -13,17 +13,17 @@ sheared box, speeds are measured relative to the mean flow.  A gas that only los
 reach a steady state.  The histogram of such a gas contains the frames after --equilibration (by
 default after 15 collisions per disk), and the speeds in each frame are scaled with kT of that
 frame.  Speeds are also scaled frame by frame if sides of the box move or if kT drifts; then
-`kT_first` and `kT_last` show the change of kT.  For each species of a mixture there are a separate
-row of the table and a separate curve, with the temperature kT and the temperatures kT_x and kT_y of
-both velocity components.  Kolmogorov-Smirnov (KS) and chi-square tests compare the speeds with the
-expected distribution.  Before the tests, the speeds in each frame are divided by the thermal speed
-in that frame.  If the kinetic energy is conserved, the expected distribution is that of N disks
-with a fixed total kinetic energy; otherwise the Maxwell distribution is expected.  The p-values are
-determined from random samples that are scaled in the same way (docs/theory.md).  Frames that are
-close in time contain correlated speeds; therefore the number of `independent` speeds is reduced by
-the statistical inefficiency.  The tests do not apply if disks conserve their angular momentum in a
-round container.  The last panel shows the second Sonine coefficient a2 = <v^4> / (2 <v^2>^2) - 1
-against the number of collisions per disk.
+`kT_first` and `kT_last` show the change of kT.  Each species of a mixture has a separate row in the
+table and a separate curve.  The row contains the temperature kT, and the temperatures kT_x and kT_y
+of both velocity components.  Kolmogorov-Smirnov (KS) and chi-square tests compare the speeds with
+the expected distribution.  Before the tests, the speeds in each frame are divided by the thermal
+speed in that frame.  If the kinetic energy is conserved, the expected distribution is that of N
+disks with a fixed total kinetic energy; otherwise the Maxwell distribution is expected.  The
+p-values are determined from random samples that are scaled in the same way (docs/theory.md).
+Frames that are close in time contain correlated speeds; therefore the number of `independent`
+speeds is reduced by the statistical inefficiency.  The tests do not apply if disks conserve their
+angular momentum in a round container.  The last panel shows the second Sonine coefficient a2 =
+<v^4> / (2 <v^2>^2) - 1 against the number of collisions per disk.
 """
 
 from typing import NamedTuple

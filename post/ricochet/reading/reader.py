@@ -342,9 +342,9 @@ class Run:
     def unwrapped(self, frame: Index) -> np.ndarray:
         """Return positions that are continuous in time, also when disks cross periodic sides.
 
-        In a sheared box (Lees-Edwards boundary conditions) the periodic image of the box above the
-        box is displaced by gamma L_y t along x, where gamma is the shear rate and L_y the height of
-        the box.
+        In a sheared box (Lees-Edwards boundary conditions), the periodic image above the box is
+        displaced along x by gamma L_y t.  Here gamma is the shear rate and L_y is the height of the
+        box.
 
         Parameters
         ----------
@@ -675,10 +675,10 @@ class Run:
     def pressure(self, t1: float, t2: float) -> float:
         """Return the mean pressure between the two samples closest in time to `t1` and `t2`.
 
-        The pressure is (<K> + dW / (2 dt)) / <A>, where K is the kinetic energy, W the accumulated
-        virial, dt the time between the two samples, and A the accessible area.  In a sheared box, K
-        is the kinetic energy relative to the mean flow.  Averages over time are calculated with the
-        trapezoidal rule.
+        The pressure is (<K> + dW / (2 dt)) / <A>.  Here K is the kinetic energy, A the accessible
+        area, and dW the increase of the virial during the time dt between the two samples.  In a
+        sheared box, K is the kinetic energy relative to the mean flow.  Averages over time are
+        calculated with the trapezoidal rule.
 
         Parameters
         ----------
@@ -712,10 +712,10 @@ class Run:
     def pressure_tensor(self, t1: float, t2: float) -> np.ndarray:
         """Return the mean pressure tensor between the samples closest in time to `t1` and `t2`.
 
-        The component ab of the tensor is (<sum of m v_a v_b> + dW_ab / dt) / <A>, where W is the
-        accumulated virial tensor, dt the time between the samples, and A the accessible area.  The
-        trace of the pressure tensor is twice the pressure.  The output file contains the virial
-        tensor if the input has `output.virial_tensor = .true.`, and in some other cases.
+        The component ab of the tensor is (<sum of m v_a v_b> + dW_ab / dt) / <A>.  Here A is the
+        accessible area, and dW the increase of the virial tensor during the time dt between the
+        samples.  The trace of the pressure tensor is twice the pressure.  The output file contains
+        the virial tensor if the input has `output.virial_tensor = .true.`, and in some other cases.
 
         Parameters
         ----------
