@@ -64,13 +64,8 @@ from ricochet.analysis.structure import (
     pair_correlation,
     structure_factor,
 )
-from ricochet.analysis.thermodynamics import (
-    FLUID,
-    all_settle,
-    later,
-    mean_free_time,
-    motion_notes,
-)
+from ricochet.analysis.equilibrium import all_settle, later, motion_notes
+from ricochet.analysis.thermodynamics import FLUID, mean_free_time
 from ricochet.figures.drawing import band, caption, colours, dilute_limit, noise_band, plt
 from ricochet.predictions.theory import RELAXATION
 from ricochet.reading.nature import Refused, allow

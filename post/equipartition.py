@@ -24,7 +24,8 @@ from ricochet.analysis.statistics import (
     propagate_error,
     windows,
 )
-from ricochet.analysis.thermodynamics import lightest_and_heaviest, start_of_equilibrium
+from ricochet.analysis.equilibrium import start_of_equilibrium
+from ricochet.analysis.thermodynamics import lightest_and_heaviest
 from ricochet.figures.drawing import caption, colours, plt
 from ricochet.reading.nature import SETTLED, allow
 from ricochet.script import command_line, grouped, launch, measured, report

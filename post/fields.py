@@ -40,7 +40,7 @@ from ricochet import Run
 from ricochet.analysis.fields import ACROSS, fields, has_theory, places, prediction
 from ricochet.analysis.statistics import Estimate
 from ricochet.analysis.streams import stream_function
-from ricochet.analysis.thermodynamics import motion_notes
+from ricochet.analysis.equilibrium import motion_notes
 from ricochet.figures.drawing import band, draw_box, plt, titled
 from ricochet.reading.reader import SIDES
 from ricochet.reading.units import Units

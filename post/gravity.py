@@ -23,7 +23,7 @@ errors of the slopes are determined from ten blocks of time.
 
 from typing import NamedTuple
 
-from ricochet import Run, RunError, statistics, thermodynamics
+from ricochet import Run, RunError, equilibrium, statistics, thermodynamics
 from ricochet.analysis.statistics import (
     Estimate,
     SeriesMean,
@@ -244,7 +244,7 @@ def main() -> None:
     (run,) = args.runs
     known = "walls", "gravity", "mixture", "thermal_walls", "thermostatted", "time_stepped"
     allow(run, "the exponential laws do not apply to it", *known)
-    start, reason = thermodynamics.explained_start(run, args.equilibration)
+    start, reason = equilibrium.explained_start(run, args.equilibration)
     frames = thermodynamics.frames_from(run, start)
     if not run.gravity[1]:
         raise Refused(f"{run.path}: has no gravity along y; the laws of heights do not apply")

@@ -33,7 +33,8 @@ from math import comb
 
 from ricochet import Run, RunError
 from ricochet.analysis.statistics import Estimate, SeriesMean, correlated_mean, estimate
-from ricochet.analysis.thermodynamics import kinds_of_disks, start_of_equilibrium, temperature
+from ricochet.analysis.equilibrium import start_of_equilibrium
+from ricochet.analysis.thermodynamics import kinds_of_disks, temperature
 from ricochet.figures.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, grouped, launch, measured, report
 

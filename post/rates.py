@@ -27,7 +27,7 @@ free paths.  It uses the frames after --equilibration.  Without that option, it 
 which no observable drifts or, if the gas cools, the frames later than 15 collisions per disk.
 """
 
-from ricochet import Run, RunError, statistics, thermodynamics as td
+from ricochet import Run, RunError, equilibrium, statistics, thermodynamics as td
 from ricochet.analysis.statistics import FINE, Curve, Estimate, SeriesMean, estimate
 from ricochet.figures.drawing import COLOURS, band, bars, caption, plt
 from ricochet.predictions.theory import path_density
@@ -97,7 +97,7 @@ def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
         return time, np.sum(value.reshape(len(time), -1) * scale, axis=1)
 
     def ideal(run: Run) -> tuple[np.ndarray, np.ndarray]:
-        _, time, kt = td.kt_in_time(run)
+        _, time, kt = equilibrium.kt_in_time(run)
         carried = run.n_disks / area * td.between(time, kt)[1]
         return time, np.append(0, np.cumsum(carried))
 
@@ -190,8 +190,8 @@ def table(runs: list[Run], start: float, means: dict, path: Estimate | None) -> 
     """Return a table row for each quantity; quantities with an error are at the end."""
     begin = "equilibrium_from" if means else "from_time"
     exact = {"packing": td.packing(runs[0]), begin: start}
-    momentum = np.mean([td.drift(run) * run.mass.sum() for run in runs], axis=0)
-    axes = zip(("momentum_x", "momentum_y"), momentum, td.comoving(runs[0]), strict=True)
+    momentum = np.mean([equilibrium.drift(run) * run.mass.sum() for run in runs], axis=0)
+    axes = zip(("momentum_x", "momentum_y"), momentum, equilibrium.comoving(runs[0]), strict=True)
     exact |= {name: float(value) for name, value, kept in axes if kept}
     rows = [(name, value, "exact", "") for name, value in exact.items()]
     rows += [("mean_free_path", path.mean, float(path.error), "")] if path else []
@@ -205,7 +205,7 @@ def main() -> None:
     args = command_line(__doc__, "rates.png", equilibration=None).parse_args()
     runs, notes = args.runs, []
     check(runs)
-    settled = td.all_settle(runs)
+    settled = equilibrium.all_settle(runs)
     start = max(td.start_of_steady_state(run, args.equilibration) for run in runs)
     kicked = any("thermostatted" in run.nature for run in runs)
     paths = None if kicked else mean_and_density(runs, args.equilibration)

@@ -48,7 +48,7 @@ from ricochet.analysis.statistics import (
     correlated_mean,
     rounded_to_error,
 )
-from ricochet.analysis.thermodynamics import motion_notes, refuse_others
+from ricochet.analysis.equilibrium import motion_notes, refuse_others
 from ricochet.figures.drawing import bars, caption, colours, dilute_limit, noise_band, plt
 from ricochet.predictions.theory import RELAXATION, maxwell_cdf, maxwell_pdf
 from ricochet.reading.nature import TRAITS, Refused, allow

@@ -19,7 +19,8 @@ import matplotlib
 import numpy as np
 
 from .analysis.statistics import Curve, Estimate, SeriesMean, combine_runs, diagnostics
-from .analysis.thermodynamics import SPEEDS_FORGET, frames_from, packing, start_of_steady_state
+from .analysis.equilibrium import SPEEDS_FORGET, frames_from, start_of_steady_state
+from .analysis.thermodynamics import packing
 from .figures.drawing import COLOURINGS, STYLE, plt, save, warn
 from .reading.files import destination, did_you_mean
 from .reading.nature import Refused

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ricochet import correlations, fields, speeds, thermodynamics
+from ricochet import correlations, equilibrium, fields, speeds
 from ricochet.reading.nature import Refused
 
 LOOSE = "drive.keep_momentum=.false."
@@ -34,7 +34,7 @@ def test_motion_is_relative_to_a_centre_of_mass_that_noise_moves(simulated, case
     assert "random_walk" in loose.nature and "random_walk" not in held.nature
     assert abs(carried[1][1]) > 1e3 * abs(carried[0][1])
     every = slice(None)
-    for of in (speeds.kt_of_frames, speeds.reduced_speeds, thermodynamics.thermal_energy):
+    for of in (speeds.kt_of_frames, speeds.reduced_speeds, equilibrium.thermal_energy):
         assert of(loose, every) == pytest.approx(of(held, every), rel=1e-6, abs=1e-6)
     kt = [fields.fields([run], None, (1, 1)).found["temperature"].mean for run in (held, loose)]
     assert kt[1] == pytest.approx(kt[0], rel=1e-5 if case < 6 else 0.1)
@@ -60,4 +60,4 @@ def test_smooth_walls_leave_the_centre_of_mass_free_along_them(simulated, rng):
     run = simulated(drawn(rng, y="wall", xi=1.0), LOOSE)
     v = run.velocity[-1] - [np.average(run.velocity[-1][:, 0], weights=run.mass), 0]
     energy = 0.5 * run.mass * np.sum(v**2, axis=1)
-    assert thermodynamics.thermal_energy(run, [-1])[0] == pytest.approx(energy)
+    assert equilibrium.thermal_energy(run, [-1])[0] == pytest.approx(energy)

@@ -11,7 +11,16 @@ from matplotlib.quiver import Quiver, QuiverKey
 import cooling as cooling_figure
 import fields as fields_figure
 import missed as missed_figure
-from ricochet import crater, drawing, read_run, script, statistics, streams, thermodynamics
+from ricochet import (
+    crater,
+    drawing,
+    equilibrium,
+    read_run,
+    script,
+    statistics,
+    streams,
+    thermodynamics,
+)
 from ricochet.figures.drawing import plt
 from synthetic_run import ROOT, run_script, write_run
 
@@ -162,11 +171,11 @@ def test_the_reason_of_the_start_names_what_drifts(tmp_path, rng):
         more = {"observables": slow, "observable_time": time, "species": [1, 1, 2, 2]}
         more |= {"names": names, "parameters": {"box": {"gravity": [0.0, -1.0]}}}
         run = read_run(write_run(tmp_path / "run.h5", 0 * v + 0.5, v, time=time[[0, -1]], **more))
-        start, why = thermodynamics.explained_start(run)
+        start, why = equilibrium.explained_start(run)
         name, kind = late.removesuffix("_energy").split("/")
         assert start > 200 and f"the {kind} energy of {name} drifts" in why
         assert start == thermodynamics.start_of_steady_state(run)
-    assert thermodynamics.explained_start(run, 20.0) == (20.0, "--equilibration 20")
+    assert equilibrium.explained_start(run, 20.0) == (20.0, "--equilibration 20")
 
 
 # --- speeds ---

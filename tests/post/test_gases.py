@@ -25,6 +25,7 @@ from ricochet import (
     EventLog,
     RunError,
     cooling as cool,
+    equilibrium,
     fields,
     hard_disks as hd,
     read_run,
@@ -100,7 +101,7 @@ def test_kt_is_of_the_momenta_that_are_free(tmp_path, rng, periodic):
         slower = np.stack([v[0] + np.array([1.0, 0.0]), v[1]])
         parts |= {"periodic": periodic, "parameters": {"contact": {"restitution": 0.9}}}
         run = written(tmp_path / "slower.h5", 0 * slower, slower, **parts)
-        assert not td.comoving(run).any()
+        assert not equilibrium.comoving(run).any()
 
 
 def test_disks_that_may_slip_may_lose_energy():
@@ -351,7 +352,7 @@ def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp
     assert "no steady state without flow: time correlations" in capsys.readouterr().err
     assert {row["what"] for row in rows} == {"psi6_local", "psi6_global", "a2", "g", "g6", "S"}
     run = read_run(bulk[2])
-    assert run.collisions_per_disk_at(run.time[td.later(run).start]) > 14
+    assert run.collisions_per_disk_at(run.time[equilibrium.later(run).start]) > 14
     rows = {row["quantity"]: row["mean"] for row in drawn(tmp_path, "rates", bulk[2])}
     assert not any(name.startswith("pressure") for name in rows)
     eta, diameter = td.packing(run), 2 * run.radius[0]

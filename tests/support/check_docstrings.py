@@ -19,6 +19,7 @@ MODULES = (
     "theory",
     "crater",
     "speeds",
+    "equilibrium",
     "thermodynamics",
     "cooling",
     "transport",

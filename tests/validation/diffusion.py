@@ -7,7 +7,7 @@ import numpy as np
 
 from ricochet import Run, hard_disks as hd
 from ricochet.analysis.correlations import Correlator, curves
-from ricochet.analysis.thermodynamics import later
+from ricochet.analysis.equilibrium import later
 
 from .case import Case, Member, within
 from .estimators import over

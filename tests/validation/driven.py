@@ -6,7 +6,7 @@ import numpy as np
 
 from ricochet import Run, hard_disks as hd
 from ricochet.analysis.statistics import Estimate, combine_runs, goodness_of_fit
-from ricochet.analysis.thermodynamics import start_of_equilibrium
+from ricochet.analysis.equilibrium import start_of_equilibrium
 from ricochet.analysis.transport import MOMENTS, of_moments
 from ricochet.predictions.theory import ROUGH_RATIOS, maxwell_cdf
 

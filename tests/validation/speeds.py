@@ -8,7 +8,7 @@ from scipy import stats
 
 from ricochet import Run
 from ricochet.analysis.statistics import Estimate, estimate, excess_kurtosis, goodness_of_fit
-from ricochet.analysis.thermodynamics import kt_at_start
+from ricochet.analysis.equilibrium import kt_at_start
 from ricochet.predictions.theory import finite_n_cdf, maxwell_cdf
 
 from .case import AT_MOST, Case, Member, relative, sigmas, within

@@ -14,7 +14,8 @@ from ..predictions import hard_disks, theory
 from ..reading.nature import SOURCES, TRAITS, Refused, allow
 from ..reading.reader import Run
 from .statistics import Estimate, estimate, propagate_error
-from .thermodynamics import free_disks, kt_at_start, lightest_and_heaviest, packing
+from .equilibrium import free_disks, kt_at_start
+from .thermodynamics import lightest_and_heaviest, packing
 
 __all__ = [
     "energies",

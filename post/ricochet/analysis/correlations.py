@@ -43,7 +43,7 @@ from ..reading.nature import KICKED, TRAITS, allow
 from ..reading.reader import Run
 from ..running.simulation import Simulation
 from .statistics import FEWEST, Curve, Estimate, estimate, correlated_mean
-from .thermodynamics import ALONG_WALLS, later, refuse_others, unforced
+from .equilibrium import ALONG_WALLS, later, refuse_others, unforced
 
 __all__ = [
     "Correlator",

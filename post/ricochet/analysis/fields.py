@@ -22,7 +22,7 @@ from ..reading.nature import Refused
 from ..reading.reader import SIDES, Run
 from .statistics import Estimate, statistical_inefficiency, student
 from .structure import periods
-from .thermodynamics import after_start, comoving, free_disks, refuse_others, unforced
+from .equilibrium import after_start, comoving, free_disks, refuse_others, unforced
 
 __all__ = [
     "Fields",

@@ -19,7 +19,7 @@ from ..predictions.theory import Law, finite_n_cdf
 from ..reading.arrays import Index
 from ..reading.reader import Run
 from .statistics import statistical_inefficiency
-from .thermodynamics import comoving, thermal_energy
+from .equilibrium import comoving, thermal_energy
 
 __all__ = ["SpeedTest", "speed_test"]
 

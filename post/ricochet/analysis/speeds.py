@@ -8,7 +8,7 @@ from ..reading.arrays import Index, chosen
 from ..reading.nature import Refused
 from ..reading.reader import Run
 from .statistics import Estimate, estimate, excess_kurtosis, correlated_mean
-from .thermodynamics import comoving, thermal_energy
+from .equilibrium import comoving, thermal_energy
 
 __all__ = [
     "kt_of_frames",

@@ -35,6 +35,7 @@ from ..reading.nature import allow
 from ..reading.reader import Run
 from . import thermodynamics as td
 from .correlations import Correlator
+from .equilibrium import comoving, drift
 from .statistics import Curve, SeriesMean, estimate, correlated_mean
 
 __all__ = [
@@ -80,7 +81,7 @@ def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
     Along axes where the velocity of the centre of mass is conserved, positions and velocities are
     relative to the centre of mass.
     """
-    kept = td.comoving(run)
+    kept = comoving(run)
     place, velocity = (
         values - kept * np.average(values, axis=1, weights=run.mass, keepdims=True)
         for values in (run.unwrapped(frames), run.velocity[frames])
@@ -148,7 +149,7 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     momentum = (flown + handed).reshape(-1, 2, 2)
     # The energy moments are converted to the frame of the centre of mass. All other terms of this
     # conversion grow linearly in time and are subtracted with the mean growth.
-    heat = heat + heat_handed - np.einsum("a,tab->tb", td.drift(run), momentum)
+    heat = heat + heat_handed - np.einsum("a,tab->tb", drift(run), momentum)
     xx, xy, yy = momentum[:, 0, 0], momentum[:, 0, 1], momentum[:, 1, 1]
     groups = (xy, (xx - yy) / 2), ((xx + yy) / 2,), heat.T
     known = MOMENTS[: 2 if "mixture" in run.nature else 3]
