@@ -19,7 +19,7 @@ from itertools import chain, cycle
 
 from ricochet import Run
 from ricochet.analysis.cooling import SMOOTH, Curves, energies
-from ricochet.analysis.statistics import FEWEST_RUNS, Estimate, student
+from ricochet.analysis.estimates import FEWEST_RUNS, Estimate, student
 from ricochet.analysis.thermodynamics import lightest_and_heaviest
 from ricochet.figures.drawing import COLOURS, band, caption, colours, dilute_limit, plt
 from ricochet.predictions.theory import EQUIPARTITION

@@ -30,7 +30,7 @@ from ricochet.analysis.crater import (
     enough_disks,
     projectile,
 )
-from ricochet.analysis.statistics import (
+from ricochet.analysis.estimates import (
     FEWEST_RUNS,
     Estimate,
     PowerLaw,

@@ -53,6 +53,7 @@ if TYPE_CHECKING:  # imports for type checkers of the modules that `__getattr__`
     from .analysis import correlations as correlations
     from .analysis import crater as crater
     from .analysis import equilibrium as equilibrium
+    from .analysis import estimates as estimates
     from .analysis import fields as fields
     from .analysis import paths as paths
     from .analysis import speed_laws as speed_laws

@@ -18,7 +18,8 @@ from typing import NoReturn
 import matplotlib
 import numpy as np
 
-from .analysis.statistics import Curve, Estimate, SeriesMean, combine_runs, diagnostics
+from .analysis.estimates import Curve, Estimate
+from .analysis.statistics import SeriesMean, combine_runs, diagnostics
 from .analysis.equilibrium import SPEEDS_FORGET, frames_from, start_of_steady_state
 from .analysis.thermodynamics import packing
 from .figures.drawing import COLOURINGS, STYLE, plt, save, warn

@@ -26,6 +26,7 @@ from ricochet import (
     RunError,
     cooling as cool,
     equilibrium,
+    estimates,
     fields,
     hard_disks as hd,
     read_run,
@@ -241,7 +242,7 @@ def test_kt_and_z_of_any_gas_are_right_or_refused(simulated, systems):
             off = abs(one.mean - other[0])
             assert off < 6 * error or off < 1e-9 * one.mean, (k, one, other, known.text)
             found += [off < error] if error else []
-    share = 2 * statistics.ONE_SIGMA - 1
+    share = 2 * estimates.ONE_SIGMA - 1
     assert abs(np.mean(found) - share) < 3 * np.sqrt(share * (1 - share) / (len(found) / 2))
 
 
@@ -642,7 +643,7 @@ def test_fluxes_that_forget_have_the_coefficient_and_the_errors_they_should():
     mean, error = np.array([(one.mean, one.error) for one in found]).T
     assert mean.mean() == pytest.approx(truth, abs=4 * mean.std() / np.sqrt(300))
     held = np.mean(np.abs(mean - truth) < error)
-    assert held == pytest.approx(2 * statistics.ONE_SIGMA - 1, abs=0.1)
+    assert held == pytest.approx(2 * estimates.ONE_SIGMA - 1, abs=0.1)
     slopes = tp.running(fluctuating(np.random.default_rng(5), 400000, 6.0), 0.5, [1, 40, 80])
     assert slopes[0] == pytest.approx(1, rel=0.02)  # <flux^2> step / 2
     assert slopes[-1] == pytest.approx(2 * truth, rel=0.05)
@@ -884,7 +885,7 @@ def test_fields_of_gases_have_the_temperature_that_is_known(simulated, gas, seed
         kt = [np.average(k[ok], weights=n[ok]) for (k, n), ok in zip(pairs, known, strict=True)]
         off = statistics.estimate(np.array(kt) / [truth(run) for run in runs])
         assert off.mean == pytest.approx(1, abs=4 * off.error)
-    low, high = binom.interval(0.999, seeds, 2 * statistics.ONE_SIGMA - 1)
+    low, high = binom.interval(0.999, seeds, 2 * estimates.ONE_SIGMA - 1)
     for name in own[0].found if seeds > 4 else ():
         mean, error = np.moveaxis([one.found[name] for one in own], 1, 0)
         held = np.where(np.isfinite(error), np.abs(mean - np.nanmean(mean, 0)) < error, np.nan)

@@ -13,8 +13,8 @@ from ricochet import (
     RunError,
     Simulation,
     correlations as pairs,
+    estimates,
     hard_disks as hd,
-    statistics,
     structure,
     transport,
 )
@@ -362,7 +362,7 @@ def test_errors_of_one_run_hold_the_truth_as_often_as_they_say(tmp_path, rng):
         assert np.isnan(msd.error[-1])
         held.append(np.abs(msd.y - truth)[:-1] < msd.error[:-1])
     share = np.mean(held, axis=0)
-    np.testing.assert_allclose(share, 2 * statistics.ONE_SIGMA - 1, atol=0.2)
+    np.testing.assert_allclose(share, 2 * estimates.ONE_SIGMA - 1, atol=0.2)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import numpy as np
 from ..predictions import hard_disks, theory
 from ..reading.nature import SOURCES, TRAITS, Refused, allow
 from ..reading.reader import Run
-from .statistics import Estimate, estimate, propagate_error
+from .estimates import Estimate, estimate, propagate_error
 from .equilibrium import free_disks, kt_at_start
 from .thermodynamics import lightest_and_heaviest, packing
 

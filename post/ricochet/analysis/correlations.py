@@ -42,7 +42,8 @@ from ..reading.files import RunError
 from ..reading.nature import KICKED, TRAITS, allow
 from ..reading.reader import Run
 from ..running.simulation import Simulation
-from .statistics import FEWEST, Curve, Estimate, estimate, correlated_mean
+from .estimates import Curve, Estimate, estimate
+from .statistics import FEWEST, correlated_mean
 from .equilibrium import ALONG_WALLS, later, refuse_others, unforced
 
 __all__ = [

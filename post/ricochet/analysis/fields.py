@@ -20,7 +20,8 @@ from ..predictions import hard_disks
 from ..reading.files import RunError
 from ..reading.nature import Refused
 from ..reading.reader import SIDES, Run
-from .statistics import Estimate, statistical_inefficiency, student
+from .estimates import Estimate, student
+from .statistics import statistical_inefficiency
 from .structure import periods
 from .equilibrium import after_start, comoving, free_disks, refuse_others, unforced
 

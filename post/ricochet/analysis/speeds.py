@@ -7,7 +7,8 @@ import numpy as np
 from ..reading.arrays import Index, chosen
 from ..reading.nature import Refused
 from ..reading.reader import Run
-from .statistics import Estimate, estimate, excess_kurtosis, correlated_mean
+from .estimates import Estimate, estimate, excess_kurtosis
+from .statistics import correlated_mean
 from .equilibrium import comoving, thermal_energy
 
 __all__ = [

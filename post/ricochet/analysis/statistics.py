@@ -1,18 +1,33 @@
-"""Means with errors, fits, and goodness-of-fit tests.
+"""Means of correlated series in time, with errors and warnings; all functions of `estimates`.
 
 Two functions compute errors.  The function `estimate` is for independent values, such as the
 results of runs that differ by their seed.  The function `correlated_mean` is for a single series in
 time, whose samples are correlated.
 """
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
-from ..predictions.theory import Law
+from .estimates import (
+    MANY,
+    UNLIKELY,
+    Curve,
+    Estimate,
+    LawTest,
+    PowerLaw,
+    binned,
+    estimate,
+    excess_kurtosis,
+    fit_power_law,
+    goodness_of_fit,
+    kurtosis_noise,
+    propagate_error,
+    rounded_to_error,
+    student,
+)
 
 __all__ = [
     "Curve",
@@ -40,185 +55,7 @@ __all__ = [
 ]
 
 MOST_WINDOWS = 10**6
-FEWEST_RUNS = 4  # smallest number of runs whose scatter is used as a weight
-
-
-class Estimate(NamedTuple):
-    """A mean with its error; the error is half the width of the 68 % confidence interval."""
-
-    mean: Any  # a number, or an array of any shape
-    error: Any  # same shape as the mean
-
-
-class Curve(NamedTuple):
-    """P points of a curve, with the errors of y."""
-
-    x: np.ndarray
-    y: np.ndarray
-    error: np.ndarray  # NaN without an error
-
-
-class LawTest(NamedTuple):
-    """Result of comparing a sample with a distribution."""
-
-    n: int  # number of independent values
-    ks: float  # Kolmogorov-Smirnov distance, the largest between the two distribution functions
-    ks_p: float  # probability of a larger distance by chance
-    chi2: float  # per degree of freedom, bins of equal probability
-    chi2_p: float
-
-
-class PowerLaw(NamedTuple):
-    """Power law y = factor x^exponent, with the error of the exponent from a weighted fit."""
-
-    factor: float
-    exponent: float
-    exponent_error: float
-    chi2: float = float("nan")  # chi^2 per degree of freedom
-    free: int = 0  # degrees of freedom
-
-    def misses(self, runs: int) -> bool:
-        """Return whether the points deviate from the power law by more than their errors explain.
-
-        The test of Welch (1951) takes into account that the errors were estimated from only `runs`
-        runs.
-        """
-        if self.free < 1 or runs < FEWEST_RUNS:
-            return False
-        own, few = student(runs) ** 2 * self.chi2, (self.free + 2) * (runs - 1) / 3
-        ratio = own / (1 + 2 / (runs - 1))
-        return bool(scipy.special.fdtrc(self.free, few, ratio) < UNLIKELY)
-
-    def __call__(self, x: np.ndarray) -> np.ndarray:
-        return self.factor * np.asarray(x, dtype=float) ** self.exponent
-
-
-def goodness_of_fit(
-    sample: np.ndarray, cdf: Law, bins: int = 30, independent: int | None = None
-) -> LawTest:
-    """Compare a sample with a distribution by Kolmogorov-Smirnov and chi-square tests.
-
-    Parameters
-    ----------
-    sample : numpy.ndarray
-        (n,) the values
-    cdf : callable
-        distribution function, which takes an array of values
-    bins : int
-        number of bins of equal probability for the chi-square test
-    independent : int, optional
-        number of independent values in the sample [the number of values]; a sample of correlated
-        values contains fewer independent values
-
-    Returns
-    -------
-    LawTest
-        both statistics with their probabilities
-
-    Examples
-    --------
-    >>> sample = (np.arange(1000) + 0.5) / 1000
-    >>> goodness_of_fit(sample, lambda x: np.clip(x, 0, 1)).ks_p > 0.99
-    True
-    """
-    n = len(sample) if independent is None else independent
-    distance = float(scipy.stats.ks_1samp(sample, cdf).statistic)
-    counts, _ = np.histogram(cdf(np.asarray(sample)), bins=bins, range=(0, 1))
-    chi2 = scipy.stats.chisquare(counts).statistic * n / len(sample)
-    return LawTest(
-        n,
-        distance,
-        float(scipy.stats.kstwo.sf(distance, n)),
-        float(chi2) / (bins - 1),
-        float(scipy.special.chdtrc(bins - 1, chi2)),
-    )
-
-
-MANY = 1e12  # degrees of freedom of a known error
-ONE_SIGMA = float(scipy.special.ndtr(1))  # importing scipy.stats takes a second
-
-
-def student(samples: ArrayLike) -> Any:
-    """Return Student's factor t: half the 68 % interval of a mean, divided by its standard error.
-
-    Parameters
-    ----------
-    samples : array_like
-        (...) numbers of independent samples from which mean and standard error were estimated
-
-    Returns
-    -------
-    float or numpy.ndarray
-        (...) the factor, which tends to 1 for many samples
-
-    Examples
-    --------
-    >>> round(float(student(4)), 3)
-    1.197
-    """
-    return scipy.special.stdtrit(np.clip(np.subtract(samples, 1.0), 1.0, MANY), ONE_SIGMA)
-
-
-def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
-    """Estimate a mean and its error from independent values, such as those of several runs.
-
-    Parameters
-    ----------
-    values : array_like
-        (..., R, ...) the values of R runs
-    axis : int
-        axis of the runs
-
-    Returns
-    -------
-    Estimate
-        (...) mean, and half its 68 % interval from Student's t; the error of a single value is NaN
-
-    Examples
-    --------
-    >>> mean, error = estimate([1.0, 2.0, 3.0])
-    >>> float(mean), round(float(error), 2)
-    (2.0, 0.76)
-    """
-    values = np.asarray(values, dtype=float)
-    mean, count = values.mean(axis=axis), values.shape[axis]
-    if count < 2:
-        return Estimate(mean, np.full_like(mean, np.nan))
-    return Estimate(mean, student(count) * values.std(axis=axis, ddof=1) / np.sqrt(count))
-
-
-def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estimate:
-    """Propagate the error of a curve to a number that is derived from the curve.
-
-    Parameters
-    ----------
-    of : callable
-        function that returns a number for a curve (P,), such as the time at which the curve crosses
-        a level
-    curve : ricochet.statistics.Estimate
-        (P,) the curve with its error
-
-    Returns
-    -------
-    Estimate
-        mean and half the difference of two numbers, which are derived from the curve plus its error
-        and from the curve minus its error; both are NaN if one of these numbers is NaN, or if the
-        curve has no error
-
-    Examples
-    --------
-    >>> x = np.linspace(0, 4, 401)
-    >>> curve = Estimate(x, np.full(401, 0.5))
-    >>> mean, error = propagate_error(lambda y: x[np.searchsorted(y, 2.0)], curve)
-    >>> round(float(mean), 2), round(float(error), 2)
-    (2.0, 0.5)
-    """
-    first, last = (of(curve.mean + sign * curve.error) for sign in (-1, 1))
-    return Estimate((first + last) / 2, abs(last - first) / 2)
-
-
-# --- series in time ---
-
+FEW = 10  # independent samples
 FINE, COARSE = 64, 16  # number of parts of a series whose means resolve slow modes
 FEWEST = 8  # smallest number of independent samples for an error
 LEAST_WAVES, MOST_WAVES = 2, 8  # number of slow waves from which the error of a series is estimated
@@ -425,10 +262,6 @@ def squares(means: Sequence[SeriesMean]) -> np.ndarray:
     return np.array([(one.error / student(one.freedom + 1)) ** 2 for one in means])
 
 
-UNLIKELY = 0.005  # probability below which a deviation is regarded as significant
-FEW = 10  # independent samples
-
-
 def scatter_p(means: Sequence[SeriesMean]) -> float:
     """Return the probability that means with these errors scatter at least as much as `means`."""
     mean, error, _, _, freedom = np.array(means).T
@@ -560,149 +393,3 @@ def windows(time: np.ndarray, value: np.ndarray, width: float) -> tuple[np.ndarr
     numbers = np.bincount(index, minlength=count + 1)[:count]
     some = np.flatnonzero(numbers)
     return time[0] + (some + 0.5) * width, sums[some] / numbers[some]
-
-
-def binned(values: np.ndarray, bins: np.ndarray, independent: int | None = None) -> Estimate:
-    """Estimate a probability density by a histogram.
-
-    Parameters
-    ----------
-    values : numpy.ndarray
-        (n,) the sample
-    bins : numpy.ndarray
-        (B + 1,) edges of the bins
-    independent : int, optional
-        number of independent values in the sample [all values]
-
-    Returns
-    -------
-    Estimate
-        (B,) density with error; its integral is the fraction of the values inside the bins
-
-    Examples
-    --------
-    >>> binned(np.array([0.1, 0.2, 0.7, 0.8]), np.array([0.0, 0.5, 1.0])).mean
-    array([1., 1.])
-    """
-    share = np.histogram(values, bins)[0] / len(values)
-    error = np.sqrt(share * (1 - share) / (independent or len(values)))
-    return Estimate(share / np.diff(bins), error / np.diff(bins))
-
-
-def excess_kurtosis(speed: np.ndarray) -> float:
-    """Return the second Sonine coefficient a2 = <v^4> / (2 <v^2>^2) - 1 of speeds.
-
-    The formula is for speeds in two dimensions.
-
-    Parameters
-    ----------
-    speed : numpy.ndarray
-        (n,) speeds, in any unit
-
-    Returns
-    -------
-    float
-        0 for Maxwell's distribution, -1/2 for equal speeds
-
-    Examples
-    --------
-    >>> excess_kurtosis(np.ones(5))
-    -0.5
-    """
-    square = np.square(speed)
-    return float(np.mean(square**2) / (2 * np.mean(square) ** 2) - 1)
-
-
-def rounded_to_error(mean: float, error: float) -> tuple[str, ...]:
-    """Format a mean with the digits that its error justifies.
-
-    Parameters
-    ----------
-    mean, error : float
-        the mean and its error
-
-    Returns
-    -------
-    tuple of str
-        mean and error, rounded to two significant digits of the error; only the mean if the error
-        is NaN
-
-    Examples
-    --------
-    >>> rounded_to_error(3.14159, 0.0123)
-    ('3.142', '0.012')
-    """
-    if not np.isfinite(error):
-        return (f"{mean:.4g}",)
-    if error == 0:
-        return f"{mean:.6g}", "0"
-    places = max(0, 1 - int(np.floor(np.log10(float(f"{error:.1e}")))))
-    return f"{mean:z.{places}f}", f"{error:.{places}f}"
-
-
-def kurtosis_noise(count: int) -> float:
-    """Return the standard deviation of `excess_kurtosis` for Maxwellian speeds.
-
-    The square x = v^2 of a Maxwellian speed v has an exponential distribution, here with mean 1.
-    To first order, a2 is the deviation of the sample mean of x^2 / 2 - 2 x from the expected value.
-    The variance of x^2 / 2 - 2 x is 20 / 4 + 4 * 1 - 2 * 4 = 1.
-
-    Parameters
-    ----------
-    count : int
-        number of speeds
-
-    Returns
-    -------
-    float
-        the standard deviation
-
-    Examples
-    --------
-    >>> float(kurtosis_noise(10000))
-    0.01
-    """
-    return 1 / np.sqrt(count)
-
-
-def fit_power_law(
-    x: np.ndarray, y: np.ndarray, y_error: np.ndarray | None = None
-) -> PowerLaw | None:
-    """Fit a power law as a weighted straight line of ln y against ln x.
-
-    If the points scatter by more than their errors, the error of the fit is increased accordingly.
-
-    Parameters
-    ----------
-    x, y : numpy.ndarray
-        (P,) the points; points with a coordinate that is not positive are left out
-    y_error : numpy.ndarray, optional
-        (P,) errors of y; without them all points have equal weights, and the error of the fit
-        follows from the scatter of the points
-
-    Returns
-    -------
-    PowerLaw or None
-        factor and exponent, with the error of the exponent, or None if fewer than three points have
-        different x
-
-    Examples
-    --------
-    >>> x = np.array([1.0, 2.0, 4.0, 8.0])
-    >>> fit = fit_power_law(x, 3 * x**2)
-    >>> round(fit.factor, 6), round(fit.exponent, 6)
-    (3.0, 2.0)
-    """
-    alike = y_error is None
-    x, y, y_error = (np.asarray(a, dtype=float) for a in (x, y, y if alike else y_error))
-    good = (x > 0) & (y > 0) & (y_error > 0)
-    if len(np.unique(x[good])) < 3:
-        return None
-    log_x, log_y, weight = np.log(x[good]), np.log(y[good]), y[good] / y_error[good]
-    line, covariance = np.polyfit(log_x, log_y, 1, w=weight, cov="unscaled")
-    free = int(good.sum()) - 2
-    chi2 = float(np.sum((weight * (log_y - np.polyval(line, log_x))) ** 2) / free)
-    wider = student(free + 1) ** 2 * chi2 if alike else max(1.0, chi2)
-    error = float(np.sqrt(covariance[0, 0] * wider))
-    factor, exponent = np.exp(line[1]), line[0]
-    return PowerLaw(float(factor), float(exponent), error, np.nan if alike else chi2, free)

@@ -13,7 +13,8 @@ import scipy
 from ..reading.arrays import Index, chosen
 from ..reading.nature import TRAITS, allow
 from ..reading.reader import Run
-from .statistics import Curve, estimate, correlated_mean
+from .estimates import Curve, estimate
+from .statistics import correlated_mean
 
 __all__ = [
     "averaged",

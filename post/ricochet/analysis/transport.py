@@ -36,7 +36,8 @@ from ..reading.reader import Run
 from . import thermodynamics as td
 from .correlations import Correlator
 from .equilibrium import comoving, drift
-from .statistics import Curve, SeriesMean, estimate, correlated_mean
+from .estimates import Curve, estimate
+from .statistics import SeriesMean, correlated_mean
 
 __all__ = [
     "Found",

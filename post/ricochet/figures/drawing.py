@@ -19,7 +19,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from ..analysis.statistics import Estimate, kurtosis_noise
+from ..analysis.estimates import Estimate, kurtosis_noise
 from ..analysis.structure import bond_order, periods
 from ..reading.arrays import Index, as_index
 from ..reading.files import RunError, destination, did_you_mean
