@@ -81,8 +81,10 @@ if TYPE_CHECKING:  # imports for type checkers of the modules that `__getattr__`
     from .running import ensembles as ensembles
     from .running import inputs as inputs
     from .running import program as program
+    from .running import session as session
     from .running import simulation as simulation
     from .running import starting as starting
+    from .running import state as state
 else:
     ALIASES = Aliases()
     sys.meta_path.append(ALIASES)

@@ -12,7 +12,7 @@ import ricochet
 
 sys.path.insert(0, str(ricochet.commands.HERE.parents[1] / "tests" / "support"))
 
-from check_docstrings import MODULES
+from check_docstrings import MODULES, members_of
 
 FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 GAS = {
@@ -82,7 +82,11 @@ def test_the_examples_of_a_module_work(module, names):
     found = finder.find(loaded, globs=globs)
     if module == "ricochet":  # its functions and classes are defined in other modules
         for name in loaded.__all__:
-            found += finder.find(getattr(loaded, name), name, globs=globs)
+            own = getattr(loaded, name)
+            found += finder.find(own, name, globs=globs)
+            for member in members_of(own) if isinstance(own, type) else ():
+                if member not in vars(own):  # a member of a base class
+                    found += finder.find(getattr(own, member), f"{name}.{member}", globs=globs)
     for test in found:
         runner.run(test, out=told.append, clear_globs=False)
     assert not runner.failures, "".join(told)

@@ -28,7 +28,9 @@ import numpy as np
 import pytest
 
 from ricochet import EventLog, ProgramError, RunError, Simulation, read_run
-from ricochet.running.simulation import COLUMNS, NEVER, library
+from ricochet.running.engine import library
+from ricochet.running.simulation import NEVER
+from ricochet.running.state import COLUMNS
 from whole_runs import ran
 
 GAS = """&box boundary = 'periodic', 'wall' gravity = 0, -1 /

@@ -68,7 +68,7 @@ def of_methods(name: str) -> list[str]:
     from numpydoc.validate import validate
 
     found = []
-    for member, value in vars(getattr(import_module("ricochet"), name)).items():
+    for member, value in members_of(getattr(import_module("ricochet"), name)).items():
         is_property = isinstance(value, property | cached_property)
         if member.startswith("_") or not (is_property or isinstance(value, METHODS)):
             continue
@@ -77,6 +77,12 @@ def of_methods(name: str) -> list[str]:
             if code not in ignored:
                 found.append(f"ricochet.{name}.{member}: {code} {text}")
     return found
+
+
+def members_of(kind: type) -> dict[str, object]:
+    """Return the attributes of a class of the package, including those of its base classes."""
+    own = [base for base in reversed(kind.__mro__) if base.__module__.startswith("ricochet")]
+    return {name: value for base in own for name, value in vars(base).items()}
 
 
 if __name__ == "__main__":

@@ -1,0 +1,346 @@
+"""The present state of a simulation in memory: disks, observables, input values and events."""
+
+import ctypes
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..reading.arrays import snapshot
+from ..reading.files import RunError, did_you_mean
+from ..reading.nature import Nature, nature_of
+from ..reading.reader import EventLog
+from .engine import ROOM, called, library
+from .session import Session
+
+FASTEST = 1e100  # largest number that is allowed in an input
+#: Type of the elements of each array of a simulation.
+COLUMNS = {
+    "position": float,
+    "velocity": float,
+    "angular_velocity": float,
+    "orientation": float,
+    "image": np.int64,
+    "radius": float,
+    "mass": float,
+    "species": np.int32,
+}
+
+
+class State(Session):
+    """The present state of a simulation in memory."""
+
+    __slots__ = ("_start_energy",)
+    _start_energy: float
+
+    @property
+    def input(self) -> str:
+        """Text of an input file with the present values, including overrides and changes."""
+        return self._text("input")
+
+    @property
+    def changes(self) -> list[tuple[float, str, str]]:
+        """Time, name of the variable, and new value of each change during the simulation."""
+        found = []
+        for line in self._text("changes").splitlines():
+            time, _, rest = line.partition(" ")
+            found.append((float(time), *rest.partition("=")[::2]))
+        return found
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Values of all input variables by group, in the format of `Run.parameters`."""
+        found: dict[str, Any] = {}
+        for whole, value in self._values().items():
+            *groups, name = whole.split(".")
+            place = found
+            for group in groups:
+                place = place.setdefault(group, {})
+            place[name] = value
+        for group in {"obstacle", "wall"} & found.keys():  # the file contains them as columns
+            rows = list(found[group].values())
+            found |= geometry_of(group, rows)
+            found[group] = {name: [row.get(name, np.nan) for row in rows] for name in rows[0]}
+            if "side" in found[group]:
+                found[group]["inside"] = [side == "inside" for side in found[group]["side"]]
+        if changes := self._text("changes"):
+            found["changes"] = changes
+        return found
+
+    def _values(self) -> dict[str, Any]:
+        """Return the values of all variables that have a value; each key is GROUP.NAME.VARIABLE."""
+        lines = (line.split(" = ", 1) for line in self._text("parameters").splitlines())
+        return {name: json.loads(text) if ", ... " not in text else text for name, text in lines}
+
+    @property
+    def nature(self) -> Nature:
+        """Physical properties of the simulation until the present time; see `ricochet.nature`."""
+        energy = self.observable("all/kinetic_energy") * self.n_disks
+        lost = self.observable("dissipated_energy")
+        return nature_of(
+            self.parameters,
+            self.mass,
+            self.radius,
+            lost=lost / max(energy, self._start_energy) if lost else 0.0,
+            turning="all/rotational_energy" in self.observables,
+            collapsed="collapse" in self._text("note"),
+        )
+
+    @property
+    def time(self) -> float:
+        """Time since the start of the run."""
+        with self._open() as handle:
+            return library().ricochet_time(handle)
+
+    def _counts(self) -> list[int]:
+        counts = (ctypes.c_int64 * 3)()
+        with self._open() as handle:
+            library().ricochet_count(handle, counts)
+        return list(counts)
+
+    @property
+    def n_disks(self) -> int:
+        """Number N of disks."""
+        return self._counts()[0]
+
+    @property
+    def collisions(self) -> int:
+        """Number of collisions of two disks since the start."""
+        return self._counts()[1]
+
+    @property
+    def events(self) -> int:
+        """Number of events (collisions of any kind) since the start."""
+        return self._counts()[2]
+
+    def _column(self, name: str) -> np.ndarray:
+        """Return a read-only copy of an array in `COLUMNS`; disks are in the order of the input."""
+        values = np.empty((self.n_disks, 2))
+        with self._open() as handle:
+            width = library().ricochet_column(handle, name.encode(), values.ctypes.data)
+        if width == 0:
+            raise AttributeError(f"these disks have no {name}")
+        values = values.reshape(-1)[: width * len(values)].astype(COLUMNS[name])
+        return snapshot(values.reshape(-1, 2) if width == 2 else values)
+
+    @property
+    def position(self) -> np.ndarray:
+        """Positions of the disks, (N, 2) [length], as a read-only copy.
+
+        Along a periodic axis, all positions are inside the box.  All positions can be set at once,
+        if no disks overlap at the new positions; the change of energy counts as work.
+        """
+        return self._column("position")
+
+    @position.setter
+    def position(self, value: ArrayLike) -> None:
+        if not np.array_equal(value, self.position):
+            self._set("position", value, library().ricochet_set_positions)
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Velocities of the disks, (N, 2) [length/time], as a read-only copy.
+
+        All velocities can be set at once; the change of energy counts as work.
+        """
+        return self._column("velocity")
+
+    @velocity.setter
+    def velocity(self, value: ArrayLike) -> None:
+        self._set("velocity", value, library().ricochet_set_velocities)
+
+    def _set(self, name: str, value: ArrayLike, function: Callable[..., int]) -> None:
+        """Pass an array (N, 2) to a function of the library."""
+        array = np.ascontiguousarray(value, dtype=float)
+        if array.shape != (self.n_disks, 2):
+            raise ValueError(f"{name}: has the shape {array.shape}, not ({self.n_disks}, 2)")
+        if not np.abs(array).max() < FASTEST:
+            raise ValueError(f"{name}: has values that are not below {FASTEST:g}")
+        with self._open() as handle:
+            called(function, handle, array.ctypes.data)
+
+    @property
+    def angular_velocity(self) -> np.ndarray:
+        """Angular velocities, (N,) [1/time]; raises AttributeError if the disks cannot rotate."""
+        return self._column("angular_velocity")
+
+    @property
+    def orientation(self) -> np.ndarray:
+        """Orientations of the disks, (N,) [rad].
+
+        An orientation is an angle from the x axis, which is not reduced modulo 2 pi.  If the disks
+        have no orientations, AttributeError is raised.
+        """
+        return self._column("orientation")
+
+    @property
+    def image(self) -> np.ndarray:
+        """Number of box lengths that each disk has moved across periodic sides, (N, 2).
+
+        Adding these numbers, times the edges of the box, to the positions gives continuous paths.
+        If no side is periodic, AttributeError is raised.
+        """
+        return self._column("image")
+
+    @property
+    def radius(self) -> np.ndarray:
+        """Radii of the disks, (N,) [length]."""
+        return self._column("radius")
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Masses of the disks, (N,)."""
+        return self._column("mass")
+
+    @property
+    def species(self) -> np.ndarray:
+        """Number of the species of each disk, (N,), counted from 1 in the order of the input."""
+        return self._column("species")
+
+    def _observed(self) -> dict[str, np.ndarray]:
+        room = ROOM
+        with self._open() as handle:
+            while True:
+                names, values = ctypes.create_string_buffer(room), np.empty(4 * room // 8)
+                length = library().ricochet_observables(handle, names, room, values.ctypes.data)
+                if length < room:
+                    break
+                room = length + 1
+        found, first = {}, 0
+        for line in names.value.decode().splitlines():
+            name, width = line.rsplit(" ", 1)
+            part = values[first : first + abs(int(width))]
+            found[name] = part.astype(np.int64 if int(width) < 0 else float)
+            first += len(part)
+        return found
+
+    @property
+    def observables(self) -> list[str]:
+        """Names of the observables, which are the names in an output file."""
+        return list(self._observed())
+
+    def observable(self, name: str) -> Any:
+        """Return the present value of an observable.
+
+        Parameters
+        ----------
+        name : str
+            name of the observable in the output file, such as "all/kinetic_energy"; the attribute
+            `observables` lists all names
+
+        Returns
+        -------
+        float, int or numpy.ndarray
+            a number, or an array of the components
+
+        Raises
+        ------
+        RunError
+            if no observable has that name
+
+        Examples
+        --------
+        >>> with ricochet.Simulation(small) as box:
+        ...     box.advance(collisions=20).observable("collisions")
+        20
+        """
+        found = self._observed()
+        if name not in found:
+            raise RunError(f"there is no observable {name}{did_you_mean(name, found)}")
+        return found[name].item() if len(found[name]) == 1 else found[name]
+
+    def next_events(self, most: int) -> list[tuple[float, int, int]]:
+        """Return the next events in chronological order.
+
+        Parameters
+        ----------
+        most : int
+            largest number of events to return
+
+        Returns
+        -------
+        list of tuple
+            time, i and j of each event; the numbers i and j are defined as in `EventLog`
+
+        Raises
+        ------
+        RunError
+            if the simulation is time-stepped, so that events cannot be predicted
+
+        Examples
+        --------
+        >>> with ricochet.Simulation(small) as box:
+        ...     times = [time for time, _, _ in box.next_events(3)]
+        >>> times == sorted(times), len(times)
+        (True, 3)
+        """
+        records = np.empty((max(int(most), 0), 6))
+        with self._open() as handle:
+            n = library().ricochet_next_events(handle, len(records), records.ctypes.data)
+        if n < 0:
+            raise RunError("next_events: time steps do not predict events")
+        return [(float(t), int(i), int(j)) for t, i, j in records[:n, :3]]
+
+    def _last_events(self, most: int) -> np.ndarray:
+        """Return an array (E, 6): time, i, j, impulse and momentum change of the latest events."""
+        records = np.empty((most, 6))
+        with self._open() as handle:
+            n = library().ricochet_last_events(handle, most, records.ctypes.data)
+        return records[:n]
+
+    def event_log(self, most: int) -> EventLog:
+        """Return the latest events in chronological order.
+
+        The engine stores at least the latest million events.
+
+        Parameters
+        ----------
+        most : int
+            largest number of events to return
+
+        Returns
+        -------
+        EventLog
+            times, numbers of the disks, and impulses of E events
+
+        Raises
+        ------
+        RunError
+            if the input does not contain `output.event_log = .true.`
+
+        Examples
+        --------
+        >>> with ricochet.Simulation(small, {"output.event_log": True}) as box:
+        ...     log = box.advance(events=30).event_log(10)
+        >>> len(log.time), bool(np.all(np.diff(log.time) >= 0))
+        (10, True)
+        """
+        if not self.parameters.get("output", {}).get("event_log"):
+            raise RunError("the simulation has no event log, set output.event_log = .true.")
+        records = self._last_events(max(int(most), 0))
+        ids = records[:, 1:3].astype(np.int32)
+        return EventLog(records[:, 0], ids[:, 0], ids[:, 1], records[:, 3], records[:, 4:])
+
+
+def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return the table of all obstacles or walls if a row of the input names a file or points.
+
+    In such a row, the coordinates are replaced by NaN.
+    """
+    if not any({"file", "points"} & row.keys() for row in rows):
+        return {}
+    wide = {"from": 2, "to": 2} if group == "wall" else {"centre": 2, "radius": 1}
+    table = {
+        name: np.concatenate([np.reshape(row[name], (-1, 2)[:width]) for row in rows])
+        for name, width in wide.items()
+    }
+    counts = [np.size(row[name]) // width for row in rows for name, width in [*wide.items()][-1:]]
+    table["group"] = np.repeat(np.arange(1, len(rows) + 1), counts)
+    for row in rows:
+        several = {"file", "points"} & row.keys()
+        row |= {
+            name: [np.nan] * 2 if width == 2 else np.nan for name, width in wide.items() if several
+        }
+    return {f"{group}_rows": table}
