@@ -40,7 +40,8 @@ def digest(path: Path, at: float) -> str:
 def picture(path: Path, at: float) -> bytes:
     """Return a PNG picture of the disks at the given time."""
     from ricochet import Simulation
-    from ricochet.reading.reader import SIDES, obstacles_of, walls_of
+    from ricochet.reading.box import obstacles_of, walls_of
+    from ricochet.reading.reader import SIDES
 
     figure = Figure(figsize=(1.6, 1.6), dpi=2 * PIXELS / 1.6, layout="none")
     axes = figure.add_axes((0.02, 0.02, 0.96, 0.96))

@@ -39,7 +39,7 @@ from ricochet.analysis.estimates import (
     rounded_to_error,
 )
 from ricochet.figures.drawing import COLOURS, colours, panel_grid, plt
-from ricochet.reading.reader import span
+from ricochet.reading.records import span
 from ricochet.reading.nature import Refused
 from ricochet.script import command_line, grouped, launch, measured, report
 

@@ -35,7 +35,9 @@ from ricochet.analysis.paths import seen, turns_between, why_unknown
 from ricochet.figures.drawing import COLOURS, caption, chosen_colour, label_of, scale_top
 from ricochet.reading.files import destination
 from ricochet.reading.nature import known, rows_of
-from ricochet.reading.reader import SIDES, groups_of_rows, span
+from ricochet.reading.box import groups_of_rows
+from ricochet.reading.reader import SIDES
+from ricochet.reading.records import span
 from ricochet.script import chosen_disks, chosen_frames, command_line, launch, report
 
 import numpy as np

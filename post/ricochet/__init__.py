@@ -71,11 +71,15 @@ if TYPE_CHECKING:  # imports for type checkers of the modules that `__getattr__`
     from .predictions import hard_disks as hard_disks
     from .predictions import theory as theory
     from .reading import arrays as arrays
+    from .reading import box as box
     from .reading import bridges as bridges
     from .reading import files as files
     from .reading import frames as frames
+    from .reading import layout as layout
     from .reading import nature as nature
     from .reading import reader as reader
+    from .reading import records as records
+    from .reading import results as results
     from .reading import units as units
     from .running import engine as engine
     from .running import ensembles as ensembles

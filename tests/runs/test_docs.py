@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 import pytest
 
+from check_docstrings import members_of
 from ricochet import Run, packages
 from synthetic_run import ROOT, write_run
 from whole_runs import differences, environment, ran
@@ -521,7 +522,7 @@ def test_one_command_installs_what_the_notebook_needs():
 
 def test_the_page_says_all_that_a_run_can_do():
     page = (ROOT / "docs" / "output.md").read_text().partition("What a `Run` can do")[2]
-    names = {name for name in (*Run.__dataclass_fields__, *vars(Run)) if name[0] != "_"}
+    names = {name for name in (*Run.__dataclass_fields__, *members_of(Run)) if name[0] != "_"}
     assert [name for name in sorted(names) if not re.search(rf"`{name}\b", page)] == []
 
 

@@ -24,7 +24,8 @@ from ..analysis.structure import bond_order, periods
 from ..reading.arrays import Index, as_index
 from ..reading.files import RunError, destination, did_you_mean
 from ..reading.nature import known, rows_of
-from ..reading.reader import SIDES, Run, groups_of_rows
+from ..reading.box import groups_of_rows
+from ..reading.reader import SIDES, Run
 
 STYLE = Path(__file__).with_name("style.mplstyle")
 COLOURS = matplotlib.rc_params_from_file(STYLE)["axes.prop_cycle"].by_key()["color"]

@@ -39,7 +39,9 @@ import numpy as np
 from ..analysis.statistics import SeriesMean, equilibration, correlated_mean
 from ..predictions import hard_disks
 from ..reading.nature import Nature
-from ..reading.reader import Run, Series, obstacles_of, walls_of
+from ..reading.box import obstacles_of, walls_of
+from ..reading.frames import Series
+from ..reading.reader import Run
 from ..running.program import ProgramError
 from ..running.simulation import NEVER, Simulation
 

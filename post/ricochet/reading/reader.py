@@ -1,6 +1,6 @@
 """Read output files of Ricochet.
 
-Only this module depends on the layout of the HDF5 file.
+Only the modules `reader`, `results` and `layout` depend on the layout of the HDF5 file.
 
     from ricochet import read_run
     run = read_run("runs/gas.h5")
@@ -15,159 +15,47 @@ larger than the memory of the computer.  A `.part` file, which the program is st
 up to its last complete frame.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 
 from .arrays import Index, as_index
-from .files import RunError, Unsound, did_you_mean, open_file, tree
+from .box import BoxResults, obstacles_of, walls_of
+from .files import RunError, Unsound, open_file, tree
 from .frames import DISKS, Frames, NoSuchFrame, Series
-from .nature import TRAITS, Nature, allow, nature_of
-from .units import UNNAMED, Units
+from .layout import committed, rows
+from .nature import TRAITS, allow
+from .records import Event, EventLog, Obstacle, Restitution, Species, span
+from .results import SIDES
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
-SIDES = ("left", "right", "bottom", "top")
-TENSORS = ("virial_tensor", "kinetic_tensor", "helfand_stress")
-DRIFTING = (
-    "constant_velocity",
-    "piston",
-)  # motions of a side that change the area of the box permanently
+__all__ = [
+    "SIDES",
+    "Event",
+    "EventLog",
+    "Frame",
+    "Obstacle",
+    "Restitution",
+    "Run",
+    "Species",
+    "open_run",
+    "read_run",
+]
 
 
-class EventLog(NamedTuple):
-    """Arrays (E,) that describe the E events of a run in chronological order.
-
-    An event is a collision of disk `i` with another disk or with a boundary.  If `j` is positive,
-    `j` is the id of the second disk.  The values 0, -1, -2 and -3 of `j` denote the left, right,
-    bottom and top side of the box.  The values -4, -5, ... denote first the circular obstacles,
-    then the straight walls.  `momentum_change` is the momentum change of disk `i`.
-    """
-
-    time: np.ndarray
-    i: np.ndarray  # id of a disk
-    j: np.ndarray
-    impulse: np.ndarray  # magnitude of the change of momentum
-    momentum_change: np.ndarray | None = None  # (E, 2) of disk i; None in files of older versions
-
-
-class Event(NamedTuple):
-    """One event, described by the same quantities as in `EventLog`."""
-
-    time: float
-    i: int  # id of a disk
-    j: int
-    impulse: float  # magnitude of the change of momentum
-    momentum_change: np.ndarray  # (2,) of disk i
-
-
-class Obstacle(NamedTuple):
-    """A circular obstacle, which encloses the disks if `inside` is true."""
-
-    centre: np.ndarray
-    radius: float
-    inside: bool
-
-
-class Species(NamedTuple):
-    """The disks of one species.
-
-    Masses and radii can differ within a species if a starting file specifies them.
-    """
-
-    name: str
-    masses: np.ndarray  # (n,)
-    radii: np.ndarray  # (n,)
-    disks: np.ndarray  # (N,) mask
-
-    @property
-    def alike(self) -> bool:
-        """True if all disks of the species have the same mass and the same radius."""
-        return bool(np.ptp(self.masses) == 0 and np.ptp(self.radii) == 0)
-
-    @property
-    def mass(self) -> float:
-        """Mass of each disk, or the mean mass if the masses of the disks differ."""
-        return float(self.masses[0] if self.alike else self.masses.mean())
-
-    @property
-    def radius(self) -> float:
-        """Radius of each disk, or the mean radius if the radii of the disks differ."""
-        return float(self.radii[0] if self.alike else self.radii.mean())
-
-    @property
-    def label(self) -> str:
-        """Name of the species and mass of its disks, for the legend of a figure."""
-        return f"{self.name}, m = {span(self.masses)}"
-
-
-class Restitution(NamedTuple):
-    """Coefficient of normal restitution of a pair of disks.
-
-    If `law` is "constant", the coefficient is `xi` for all impact velocities.  Otherwise the
-    coefficient depends on the impact velocity below `speed`, and is `xi` above `speed`.
-    """
-
-    xi: float
-    law: str = "constant"
-    speed: float = 0.0  # g0
-
-    def __format__(self, spec: str) -> str:
-        soft = f" {self.law} below {self.speed:g}" if self.law != "constant" else ""
-        return f"{self.xi:{spec}}{soft}"
-
-    @property
-    def name(self) -> float | str:
-        """The coefficient if it is constant; otherwise a text that names the law."""
-        return self.xi if self.law == "constant" else f"{self:g}"
-
-    def at(self, g: np.ndarray) -> np.ndarray:
-        """Return the coefficients of restitution for an array `g` of normal impact velocities.
-
-        The coefficient is 1 - y + c y^2, where y is proportional to g^(1/5): see Ramirez et al.,
-        Phys. Rev. E 60, 4465 (1999).
-        """
-        c = {"power": 0.0, "viscoelastic": 0.6}[self.law]
-        y = 2 * (1 - self.xi) / (1 + np.sqrt(1 - 4 * c * (1 - self.xi)))
-        y = y * np.minimum(g / self.speed, 1.0) ** 0.2
-        return 1 - y + c * y**2
-
-
-@dataclass(frozen=True)
-class Run:
+class Run(BoxResults):
     """The results of one run: arrays of constants, frames, and time series of observables.
 
     `read_run` returns a `Run`.  T is the number of frames and N the number of disks.  All
     quantities are in the units of the input file.
     """
-
-    path: Path
-    time: np.ndarray  # (T,)
-    position: Frames  # (T, N, 2), wrapped into the box along a periodic axis
-    velocity: Frames  # (T, N, 2); not available if `output.frame_columns` omits it
-    image: Frames | None  # (T, N, 2) periods crossed; None without periodic sides
-    event_count: Frames | None  # (T, N) numbers per disk; None if not in the frames
-    disk_data: dict[str, Frames]  # (T, N) further quantities of the disks, by name
-    mass: np.ndarray  # (N,)
-    radius: np.ndarray  # (N,)
-    species: np.ndarray  # (N,) 1-based
-    names: tuple[str, ...]  # of the species
-    lower: np.ndarray  # (2,) corner of the box
-    edges: np.ndarray  # (2,) lengths of the box
-    periodic: np.ndarray  # (2,) bool
-    obstacles: tuple[Obstacle, ...]
-    walls: np.ndarray  # (W, 2, 2) straight walls, from one point to another
-    parameters: dict[str, Any]  # group -> variable -> value used in the run
-    provenance: dict[str, Any]
-    units: Units = field(default=UNNAMED, kw_only=True)  # names of the units for labels of axes
-    _folder: object = field(default=None, kw_only=True, repr=False)  # keeps a temporary file
 
     def __repr__(self) -> str:
         """Return a description of the run in one line."""
@@ -188,79 +76,6 @@ class Run:
     def __iter__(self) -> "Iterator[Frame]":
         """Yield the frames in chronological order."""
         return (Frame(self, k) for k in range(len(self)))
-
-    @property
-    def n_disks(self) -> int:
-        """Number of disks, N."""
-        return len(self.mass)
-
-    @property
-    def n_frames(self) -> int:
-        """Number of frames, T."""
-        return len(self.time)
-
-    @property
-    def upper(self) -> np.ndarray:
-        """Coordinates (2,) of the upper right corner of the box."""
-        return self.lower + self.edges
-
-    @property
-    def sides(self) -> list[dict[str, Any]]:
-        """Input variables of each side of the box, in the order of `SIDES`."""
-        return [self.parameters.get("side", {}).get(name, {}) for name in SIDES]
-
-    def corners_at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the corners of the box at the given times.
-
-        If sides of the box move, the corners depend on time.  The position of a piston is
-        interpolated between the samples of the observables.
-
-        Parameters
-        ----------
-        time : float or numpy.ndarray
-            (...) times
-
-        Returns
-        -------
-        lower, upper : numpy.ndarray
-            (..., 2) lower left and upper right corners [length]
-
-        Examples
-        --------
-        >>> lower, upper = run.corners_at(0.5)
-        >>> upper.tolist()
-        [1.0, 1.0]
-        """
-        inwards = np.stack([displaced(side, np.asarray(time)) for side in self.sides], axis=-1)
-        inwards = inwards + self._offsets
-        for k, place in self.piston_positions.items():
-            end = (self.lower, self.upper)[k % 2][k // 2]
-            at = np.interp(time, place.time, np.ravel(place.value))
-            inwards[..., k] = (-1) ** k * (at - end)
-        return self.lower + inwards[..., ::2], self.upper - inwards[..., 1::2]
-
-    @property
-    def _offsets(self) -> np.ndarray:
-        """Inward displacements (4,) of the sides from the edges of the box at the start."""
-        ends = [end[axis] for axis in (0, 1) for end in (self.lower, self.upper)]
-        starts = [side.get("position", end) for side, end in zip(self.sides, ends, strict=True)]
-        return (np.array(starts, dtype=float) - ends) * [1, -1, 1, -1]
-
-    @cached_property
-    def piston_positions(self) -> dict[int, Series]:
-        """Time series of the position of each piston; the keys are indices of `sides`."""
-        free = [k for k, side in enumerate(self.sides) if side.get("motion") == "piston"]
-        return {k: self.observable(f"sides/{SIDES[k]}/position") for k in free}
-
-    @cached_property
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower left and upper right corner of the area that the box covers during the run."""
-        swings = np.array([outmost(side) for side in self.sides])
-        swings = np.maximum(0.0, swings - self._offsets)
-        for k, place in self.piston_positions.items():
-            beyond = (self.lower[k // 2] - place.value, place.value - self.upper[k // 2])[k % 2]
-            swings[k] = max(0.0, np.max(beyond))
-        return self.lower - swings[::2], self.upper + swings[1::2]
 
     @cached_property
     def by_species(self) -> tuple[Species, ...]:
@@ -439,85 +254,6 @@ class Run:
         """Moments of inertia (N,) of the disks."""
         return float(self.parameter("contact", "inertia", 0.5)) * self.mass * self.radius**2
 
-    def observable(self, name: str) -> Series:
-        """Return the time series of an observable.
-
-        Parameters
-        ----------
-        name : str
-            name in the file, such as "total_energy" or "sides/left/impulse"; the attribute
-            `observables` contains all names
-
-        Returns
-        -------
-        Series
-            times (T',) and values (T', ...)
-
-        Raises
-        ------
-        RunError
-            if the file has no observable of that name
-
-        Examples
-        --------
-        >>> time, energy = run.observable("total_energy")
-        >>> bool(np.ptp(energy) < 1e-9 * energy[0])
-        True
-        """
-        with open_file(self.path) as file:
-            return series_of(file, name, self._samples)
-
-    @cached_property
-    def _samples(self) -> int:
-        """Number of samples of the observables, counted when the run was first read."""
-        with open_file(self.path) as file:
-            return committed(file, "observables")
-
-    @cached_property
-    def observables(self) -> tuple[str, ...]:
-        """Names of all observables in the file."""
-        with open_file(self.path) as file:
-            return tuple(series_in(file["observables"]))
-
-    def to_dataframe(self) -> "pandas.DataFrame":
-        """Return the observables as a pandas DataFrame, which has one row for each sample.
-
-        The index of the table is the time.  The columns have the names of the observables, such as
-        `all/kinetic_energy`.  Each component of a vector or tensor has its own column, such as
-        `momentum_x` or `virial_tensor_xy`.
-
-        Returns
-        -------
-        pandas.DataFrame
-            (T', columns) of numbers
-
-        Raises
-        ------
-        ImportError
-            if pandas is not installed
-
-        Examples
-        --------
-        >>> table = run.to_dataframe()
-        >>> table.index.name, "all/kinetic_energy" in table.columns
-        ('time', True)
-        """
-        try:
-            import pandas
-        except ImportError:
-            raise ImportError("to_dataframe needs a package: pip install pandas") from None
-
-        columns: dict[str, np.ndarray] = {}
-        with open_file(self.path) as file:
-            series = {name: series_of(file, name, self._samples) for name in self.observables}
-        for name, (time, value) in series.items():
-            parts = {(): ("",), (2,): ("_x", "_y"), (4,): [f"_{side}" for side in SIDES]}
-            values = value.reshape(len(time), -1).T
-            if name in TENSORS:
-                parts[4,] = ("_xx", "_xy", "_yx", "_yy")
-            columns |= zip([name + part for part in parts[value.shape[1:]]], values, strict=True)
-        return pandas.DataFrame(columns, index=pandas.Index(time, name="time"))
-
     def to_xarray(self) -> "xarray.Dataset":
         """Return the frames as an xarray Dataset; the package xarray must be installed.
 
@@ -557,120 +293,6 @@ class Run:
         data |= {name: ("disk", getattr(self, name)) for name in ("mass", "radius", "species")}
         axes = {"time": self.time, "disk": np.arange(self.n_disks) + 1, "component": ["x", "y"]}
         return xarray.Dataset(data, axes, {"path": str(self.path), "seed": self.seed})
-
-    def event_log(self) -> EventLog:
-        """Return all collisions of disks with each other and with boundaries, in order of time.
-
-        Returns
-        -------
-        EventLog
-            (E,) times, partners and impulses of all events
-
-        Raises
-        ------
-        RunError
-            unless the input has `output.event_log = .true.`
-
-        Examples
-        --------
-        >>> log = run.event_log()
-        >>> pairs = int(np.sum(log.j > 0))
-        >>> bool(pairs == run.observable("collisions").value[-1])
-        True
-        """
-        return self._event_log
-
-    @cached_property
-    def _event_log(self) -> EventLog:
-        with open_file(self.path) as file:
-            if "events" not in file:
-                raise Unsound("has no event log, set output.event_log = .true.")
-            count = committed(file, "events")
-            return EventLog(
-                **{
-                    name: rows(file["events"][name], count)
-                    for name in EventLog._fields
-                    if name in file["events"]
-                }
-            )
-
-    @cached_property
-    def collisions_per_disk(self) -> Series:
-        """Mean number of collisions of each disk with other disks, as a function of time."""
-        time, collisions = self.observable("collisions")
-        return Series(time, 2 * collisions / self.n_disks)
-
-    def collisions_per_disk_at(self, time: np.ndarray) -> np.ndarray:
-        """Return the mean number of collisions with other disks per disk at the given times.
-
-        The number is interpolated between the samples of the observables.  If the file has more
-        frames than such samples, the interpolation also uses the event counts of the frames.
-
-        Parameters
-        ----------
-        time : numpy.ndarray
-            (...) times, such as those of the frames
-
-        Returns
-        -------
-        numpy.ndarray
-            (...) mean number of collisions per disk since the start
-
-        Examples
-        --------
-        >>> tau = run.collisions_per_disk_at(run.time)
-        >>> float(tau[0]), bool(tau[-1] > 50)
-        (0.0, True)
-        """
-        known, tau = self.collisions_per_disk
-        if self.event_count is None or len(known) >= self.n_frames:
-            return np.interp(time, known, tau)
-        hits, rising = self.events_per_disk, 1e-12 / max(self.time[-1], 1e-300)  # also at rest
-
-        def clock(t: np.ndarray) -> np.ndarray:
-            return np.interp(t, self.time, hits) + rising * np.asarray(t)
-
-        return np.interp(clock(time), clock(known), tau)
-
-    @cached_property
-    def events_per_disk(self) -> np.ndarray:
-        """Mean number (T,) of events per disk between the start and each frame."""
-        if self.event_count is None:
-            raise RunError(f"{self.path}: has no event_count in its frames")
-        return np.array([self.event_count[k].mean() for k in range(self.n_frames)])
-
-    def accessible_area(self, time: float | np.ndarray) -> np.ndarray:
-        """Return the area of the box minus the area of its obstacles at the given times.
-
-        If the disks are in a round container, the accessible area is the area of the container.
-        For pistons and for sides that move at constant velocity, the area depends on their
-        positions at the given times.  For oscillating sides, the area is calculated from their mean
-        positions, as in the pressure that the program writes.
-
-        Parameters
-        ----------
-        time : float or numpy.ndarray
-            (...) times
-
-        Returns
-        -------
-        numpy.ndarray
-            (...) areas [length^2]
-
-        Examples
-        --------
-        >>> float(run.accessible_area(0.0))
-        1.0
-        """
-        drifts = np.array([side.get("motion") in DRIFTING for side in self.sides])
-        lower, upper = self.corners_at(time)
-        lower = np.where(drifts[::2], lower, self.lower)
-        upper = np.where(drifts[1::2], upper, self.upper)
-        area = np.prod(upper - lower, axis=-1)
-        for circle in sorted(self.obstacles, key=lambda circle: not circle.inside):
-            own = np.pi * circle.radius**2
-            area = np.minimum(area, own) if circle.inside else area - own
-        return area
 
     def pressure(self, t1: float, t2: float) -> float:
         """Return the mean pressure between the two samples closest in time to `t1` and `t2`.
@@ -755,28 +377,6 @@ class Run:
             )
         return Series(time[first : last + 1], value[first : last + 1])
 
-    def parameter(self, group: str, variable: str, default: Any = None) -> Any:
-        """Return the value of an input variable in this run, which may be its default.
-
-        Parameters
-        ----------
-        group, variable : str
-            names in the input, such as "contact" and "restitution"
-        default : object
-            value to return if the variable has no value
-
-        Returns
-        -------
-        object
-            a number, a text or an array
-
-        Examples
-        --------
-        >>> run.parameter("stop", "collisions_per_disk"), run.parameter("stop", "events", "none")
-        (60.0, 'none')
-        """
-        return self.parameters.get(group, {}).get(variable, default)
-
     @property
     def restitution(self) -> float:
         """Coefficient of restitution of two disks.
@@ -803,20 +403,6 @@ class Run:
         """Time step of a time-stepped run; 0 for an event-driven run."""
         steps = self.parameter("run", "dynamics", "events") == "steps"
         return float(self.parameter("run", "dt")) if steps else 0.0
-
-    @cached_property
-    def nature(self) -> Nature:
-        """Traits of the run, which determine the theories that apply to the run."""
-        lost = self.observable("dissipated_energy").value[-1]
-        most = self.n_disks * self.observable("all/kinetic_energy").value[[0, -1]].max()
-        return nature_of(
-            self.parameters,
-            self.mass,
-            self.radius,
-            lost=lost / most if most > 1e-300 else 0.0,  # rounding error of a disk at rest
-            turning="all/rotational_energy" in self.observables,
-            collapsed="collapse" in str(self.provenance.get("note", "")),
-        )
 
     @property
     def termination_note(self) -> str:
@@ -974,105 +560,6 @@ def run_of(path: Path, file: h5py.File, folder: object = None) -> Run:
     )
 
 
-def outmost(side: Mapping[str, Any]) -> float:
-    """Return the largest outward displacement of a side during the run [length].
-
-    The reference is the mean position of an oscillating side, or the initial position of a side
-    that moves at constant velocity.
-    """
-    if side.get("motion") == "constant_velocity":
-        return max(0.0, -float(side["velocity"]) * float(side["end_time"] - side["start_time"]))
-    return float(side["amplitude"]) if side.get("motion") in ("sine", "parabolic") else 0.0
-
-
-def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
-    """Return the inward displacement of a moving side at the given times.
-
-    The reference is the mean position of an oscillating side, or the initial position of a side
-    that moves at constant velocity.  The formulae are in docs/theory.md.
-    """
-    if side.get("motion") == "constant_velocity":
-        start, end = side["start_time"], side["end_time"]
-        return side["velocity"] * (np.clip(time, start, end) - start)
-    if outmost(side) == 0:
-        return np.zeros(np.shape(time))
-    s = (time / side["period"] + side["phase"]) % 1
-    if side["motion"] == "sine":
-        return side["amplitude"] * np.sin(2 * np.pi * s)
-    return side["amplitude"] * 16 * np.where(s < 0.5, s * (0.5 - s), (s - 0.5) * (s - 1))
-
-
 def time_mean(time: np.ndarray, value: np.ndarray) -> np.ndarray:
     """Return the time average of samples (T, ...), calculated with the trapezoidal rule."""
     return np.trapezoid(value, time, axis=0) / (time[-1] - time[0])
-
-
-def span(values: np.ndarray) -> str:
-    """Return the smallest and largest value as text, or one value if all values are equal."""
-    ends = (f"{values.min():g}", f"{values.max():g}")
-    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
-
-
-def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
-    """Yield the names of all time series in an HDF5 group and in its subgroups."""
-    for name, item in group.items():
-        if isinstance(item, h5py.Group):
-            if "value" in item:
-                yield path + name
-            else:
-                yield from series_in(item, f"{path}{name}/")
-
-
-def series_of(file: h5py.File, name: str, count: int) -> Series:
-    """Return the first `count` samples of an observable in an open HDF5 file."""
-    if f"observables/{name}/value" not in file:
-        near = did_you_mean(name, series_in(file["observables"]))
-        raise Unsound(f"has no observable '{name}'{near}")
-    if count == 0:
-        raise Unsound("holds no observables yet")
-    group = file[f"observables/{name}"]
-    return Series(*(rows(group[part], count) for part in ("time", "value")))
-
-
-def committed(file: h5py.File, group: str) -> int:
-    """Return the number of samples in a group that have been written completely.
-
-    An unfinished file has space for further samples, which are not valid.
-    """
-    return int(file[group]["committed"][()])
-
-
-def rows(data: h5py.Dataset, count: int | None = None) -> np.ndarray:
-    """Return the first `count` rows of a dataset, or all rows if `count` is None.
-
-    Floating-point numbers are converted to double precision.
-    """
-    values = data[:count]
-    if count is not None and len(values) < count:
-        raise Unsound(f"{data.name} holds {len(values)} of {count} samples")
-    return values.astype(float, copy=False) if values.dtype.kind == "f" else values
-
-
-def obstacles_of(parameters: Mapping[str, Any]) -> tuple[Obstacle, ...]:
-    """Return all circular obstacles, in the order of their numbers in the event log."""
-    groups = parameters.get("obstacle", {})
-    if "inside" not in groups:
-        return ()
-    rows = parameters.get("obstacle_rows", groups)
-    inside = np.asarray(groups["inside"])[groups_of_rows(parameters, "obstacle")]
-    parts = (rows["centre"], rows["radius"], inside)
-    return tuple(Obstacle(c, float(r), bool(i)) for c, r, i in zip(*parts, strict=True))
-
-
-def walls_of(parameters: Mapping[str, Any], group: str = "wall") -> np.ndarray:
-    """Return the end points (W, 2, 2) of the W straight walls, in the order of the event log."""
-    rows = parameters.get(f"{group}_rows", parameters.get(group))
-    return np.stack([rows["from"], rows["to"]], axis=1) if rows else np.empty((0, 2, 2))
-
-
-def groups_of_rows(parameters: Mapping[str, Any], name: str) -> np.ndarray:
-    """Return for each obstacle the index (W,) of its `&obstacle` group in the input file."""
-    rows = parameters.get(f"{name}_rows")
-    if rows:
-        return np.asarray(rows["group"]) - 1
-    return np.arange(len(parameters.get(name, {}).get("name", ())))

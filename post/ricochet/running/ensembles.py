@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 
 from ..reading.files import RunError, open_file, plain
-from ..reading.reader import committed, series_in
+from ..reading.layout import committed, series_in
 from .inputs import read_input
 from .program import STOPPED, ProgramError, find_program, flat, tied, value_text
 from .simulation import Simulation

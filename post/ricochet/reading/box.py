@@ -1,0 +1,169 @@
+"""The box of a run: its sides, which may move, its accessible area, obstacles and walls."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .frames import Series
+from .records import Obstacle
+from .results import SIDES, Results
+
+DRIFTING = (
+    "constant_velocity",
+    "piston",
+)  # motions of a side that change the area of the box permanently
+
+
+class BoxResults(Results):
+    """The results of one run, including the positions of the sides of its box."""
+
+    @property
+    def upper(self) -> np.ndarray:
+        """Coordinates (2,) of the upper right corner of the box."""
+        return self.lower + self.edges
+
+    @property
+    def sides(self) -> list[dict[str, Any]]:
+        """Input variables of each side of the box, in the order of `SIDES`."""
+        return [self.parameters.get("side", {}).get(name, {}) for name in SIDES]
+
+    def corners_at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corners of the box at the given times.
+
+        If sides of the box move, the corners depend on time.  The position of a piston is
+        interpolated between the samples of the observables.
+
+        Parameters
+        ----------
+        time : float or numpy.ndarray
+            (...) times
+
+        Returns
+        -------
+        lower, upper : numpy.ndarray
+            (..., 2) lower left and upper right corners [length]
+
+        Examples
+        --------
+        >>> lower, upper = run.corners_at(0.5)
+        >>> upper.tolist()
+        [1.0, 1.0]
+        """
+        inwards = np.stack([displaced(side, np.asarray(time)) for side in self.sides], axis=-1)
+        inwards = inwards + self._offsets
+        for k, place in self.piston_positions.items():
+            end = (self.lower, self.upper)[k % 2][k // 2]
+            at = np.interp(time, place.time, np.ravel(place.value))
+            inwards[..., k] = (-1) ** k * (at - end)
+        return self.lower + inwards[..., ::2], self.upper - inwards[..., 1::2]
+
+    @property
+    def _offsets(self) -> np.ndarray:
+        """Inward displacements (4,) of the sides from the edges of the box at the start."""
+        ends = [end[axis] for axis in (0, 1) for end in (self.lower, self.upper)]
+        starts = [side.get("position", end) for side, end in zip(self.sides, ends, strict=True)]
+        return (np.array(starts, dtype=float) - ends) * [1, -1, 1, -1]
+
+    @cached_property
+    def piston_positions(self) -> dict[int, Series]:
+        """Time series of the position of each piston; the keys are indices of `sides`."""
+        free = [k for k, side in enumerate(self.sides) if side.get("motion") == "piston"]
+        return {k: self.observable(f"sides/{SIDES[k]}/position") for k in free}
+
+    @cached_property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower left and upper right corner of the area that the box covers during the run."""
+        swings = np.array([outmost(side) for side in self.sides])
+        swings = np.maximum(0.0, swings - self._offsets)
+        for k, place in self.piston_positions.items():
+            beyond = (self.lower[k // 2] - place.value, place.value - self.upper[k // 2])[k % 2]
+            swings[k] = max(0.0, np.max(beyond))
+        return self.lower - swings[::2], self.upper + swings[1::2]
+
+    def accessible_area(self, time: float | np.ndarray) -> np.ndarray:
+        """Return the area of the box minus the area of its obstacles at the given times.
+
+        If the disks are in a round container, the accessible area is the area of the container.
+        For pistons and for sides that move at constant velocity, the area depends on their
+        positions at the given times.  For oscillating sides, the area is calculated from their mean
+        positions, as in the pressure that the program writes.
+
+        Parameters
+        ----------
+        time : float or numpy.ndarray
+            (...) times
+
+        Returns
+        -------
+        numpy.ndarray
+            (...) areas [length^2]
+
+        Examples
+        --------
+        >>> float(run.accessible_area(0.0))
+        1.0
+        """
+        drifts = np.array([side.get("motion") in DRIFTING for side in self.sides])
+        lower, upper = self.corners_at(time)
+        lower = np.where(drifts[::2], lower, self.lower)
+        upper = np.where(drifts[1::2], upper, self.upper)
+        area = np.prod(upper - lower, axis=-1)
+        for circle in sorted(self.obstacles, key=lambda circle: not circle.inside):
+            own = np.pi * circle.radius**2
+            area = np.minimum(area, own) if circle.inside else area - own
+        return area
+
+
+def outmost(side: Mapping[str, Any]) -> float:
+    """Return the largest outward displacement of a side during the run [length].
+
+    The reference is the mean position of an oscillating side, or the initial position of a side
+    that moves at constant velocity.
+    """
+    if side.get("motion") == "constant_velocity":
+        return max(0.0, -float(side["velocity"]) * float(side["end_time"] - side["start_time"]))
+    return float(side["amplitude"]) if side.get("motion") in ("sine", "parabolic") else 0.0
+
+
+def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
+    """Return the inward displacement of a moving side at the given times.
+
+    The reference is the mean position of an oscillating side, or the initial position of a side
+    that moves at constant velocity.  The formulae are in docs/theory.md.
+    """
+    if side.get("motion") == "constant_velocity":
+        start, end = side["start_time"], side["end_time"]
+        return side["velocity"] * (np.clip(time, start, end) - start)
+    if outmost(side) == 0:
+        return np.zeros(np.shape(time))
+    s = (time / side["period"] + side["phase"]) % 1
+    if side["motion"] == "sine":
+        return side["amplitude"] * np.sin(2 * np.pi * s)
+    return side["amplitude"] * 16 * np.where(s < 0.5, s * (0.5 - s), (s - 0.5) * (s - 1))
+
+
+def obstacles_of(parameters: Mapping[str, Any]) -> tuple[Obstacle, ...]:
+    """Return all circular obstacles, in the order of their numbers in the event log."""
+    groups = parameters.get("obstacle", {})
+    if "inside" not in groups:
+        return ()
+    rows = parameters.get("obstacle_rows", groups)
+    inside = np.asarray(groups["inside"])[groups_of_rows(parameters, "obstacle")]
+    parts = (rows["centre"], rows["radius"], inside)
+    return tuple(Obstacle(c, float(r), bool(i)) for c, r, i in zip(*parts, strict=True))
+
+
+def walls_of(parameters: Mapping[str, Any], group: str = "wall") -> np.ndarray:
+    """Return the end points (W, 2, 2) of the W straight walls, in the order of the event log."""
+    rows = parameters.get(f"{group}_rows", parameters.get(group))
+    return np.stack([rows["from"], rows["to"]], axis=1) if rows else np.empty((0, 2, 2))
+
+
+def groups_of_rows(parameters: Mapping[str, Any], name: str) -> np.ndarray:
+    """Return for each obstacle the index (W,) of its `&obstacle` group in the input file."""
+    rows = parameters.get(f"{name}_rows")
+    if rows:
+        return np.asarray(rows["group"]) - 1
+    return np.arange(len(parameters.get(name, {}).get("name", ())))

@@ -1,0 +1,109 @@
+"""Types of the results of a run: events, obstacles, species, and the law of restitution."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class EventLog(NamedTuple):
+    """Arrays (E,) that describe the E events of a run in chronological order.
+
+    An event is a collision of disk `i` with another disk or with a boundary.  If `j` is positive,
+    `j` is the id of the second disk.  The values 0, -1, -2 and -3 of `j` denote the left, right,
+    bottom and top side of the box.  The values -4, -5, ... denote first the circular obstacles,
+    then the straight walls.  `momentum_change` is the momentum change of disk `i`.
+    """
+
+    time: np.ndarray
+    i: np.ndarray  # id of a disk
+    j: np.ndarray
+    impulse: np.ndarray  # magnitude of the change of momentum
+    momentum_change: np.ndarray | None = None  # (E, 2) of disk i; None in files of older versions
+
+
+class Event(NamedTuple):
+    """One event, described by the same quantities as in `EventLog`."""
+
+    time: float
+    i: int  # id of a disk
+    j: int
+    impulse: float  # magnitude of the change of momentum
+    momentum_change: np.ndarray  # (2,) of disk i
+
+
+class Obstacle(NamedTuple):
+    """A circular obstacle, which encloses the disks if `inside` is true."""
+
+    centre: np.ndarray
+    radius: float
+    inside: bool
+
+
+class Species(NamedTuple):
+    """The disks of one species.
+
+    Masses and radii can differ within a species if a starting file specifies them.
+    """
+
+    name: str
+    masses: np.ndarray  # (n,)
+    radii: np.ndarray  # (n,)
+    disks: np.ndarray  # (N,) mask
+
+    @property
+    def alike(self) -> bool:
+        """True if all disks of the species have the same mass and the same radius."""
+        return bool(np.ptp(self.masses) == 0 and np.ptp(self.radii) == 0)
+
+    @property
+    def mass(self) -> float:
+        """Mass of each disk, or the mean mass if the masses of the disks differ."""
+        return float(self.masses[0] if self.alike else self.masses.mean())
+
+    @property
+    def radius(self) -> float:
+        """Radius of each disk, or the mean radius if the radii of the disks differ."""
+        return float(self.radii[0] if self.alike else self.radii.mean())
+
+    @property
+    def label(self) -> str:
+        """Name of the species and mass of its disks, for the legend of a figure."""
+        return f"{self.name}, m = {span(self.masses)}"
+
+
+class Restitution(NamedTuple):
+    """Coefficient of normal restitution of a pair of disks.
+
+    If `law` is "constant", the coefficient is `xi` for all impact velocities.  Otherwise the
+    coefficient depends on the impact velocity below `speed`, and is `xi` above `speed`.
+    """
+
+    xi: float
+    law: str = "constant"
+    speed: float = 0.0  # g0
+
+    def __format__(self, spec: str) -> str:
+        soft = f" {self.law} below {self.speed:g}" if self.law != "constant" else ""
+        return f"{self.xi:{spec}}{soft}"
+
+    @property
+    def name(self) -> float | str:
+        """The coefficient if it is constant; otherwise a text that names the law."""
+        return self.xi if self.law == "constant" else f"{self:g}"
+
+    def at(self, g: np.ndarray) -> np.ndarray:
+        """Return the coefficients of restitution for an array `g` of normal impact velocities.
+
+        The coefficient is 1 - y + c y^2, where y is proportional to g^(1/5): see Ramirez et al.,
+        Phys. Rev. E 60, 4465 (1999).
+        """
+        c = {"power": 0.0, "viscoelastic": 0.6}[self.law]
+        y = 2 * (1 - self.xi) / (1 + np.sqrt(1 - 4 * c * (1 - self.xi)))
+        y = y * np.minimum(g / self.speed, 1.0) ** 0.2
+        return 1 - y + c * y**2
+
+
+def span(values: np.ndarray) -> str:
+    """Return the smallest and largest value as text, or one value if all values are equal."""
+    ends = (f"{values.min():g}", f"{values.max():g}")
+    return ends[0] if ends[0] == ends[1] else " to ".join(ends)

@@ -1,0 +1,253 @@
+"""The results in an output file: constants, frames, observables, and the event log."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .files import RunError, Unsound, open_file
+from .frames import Frames, Series
+from .layout import committed, rows, series_in, series_of
+from .nature import Nature, nature_of
+from .records import EventLog, Obstacle
+from .units import UNNAMED, Units
+
+if TYPE_CHECKING:
+    import pandas
+
+SIDES = ("left", "right", "bottom", "top")
+TENSORS = ("virial_tensor", "kinetic_tensor", "helfand_stress")
+
+
+@dataclass(frozen=True)
+class Results:
+    """The results of one run, as an output file contains them."""
+
+    path: Path
+    time: np.ndarray  # (T,)
+    position: Frames  # (T, N, 2), wrapped into the box along a periodic axis
+    velocity: Frames  # (T, N, 2); not available if `output.frame_columns` omits it
+    image: Frames | None  # (T, N, 2) periods crossed; None without periodic sides
+    event_count: Frames | None  # (T, N) numbers per disk; None if not in the frames
+    disk_data: dict[str, Frames]  # (T, N) further quantities of the disks, by name
+    mass: np.ndarray  # (N,)
+    radius: np.ndarray  # (N,)
+    species: np.ndarray  # (N,) 1-based
+    names: tuple[str, ...]  # of the species
+    lower: np.ndarray  # (2,) corner of the box
+    edges: np.ndarray  # (2,) lengths of the box
+    periodic: np.ndarray  # (2,) bool
+    obstacles: tuple[Obstacle, ...]
+    walls: np.ndarray  # (W, 2, 2) straight walls, from one point to another
+    parameters: dict[str, Any]  # group -> variable -> value used in the run
+    provenance: dict[str, Any]
+    units: Units = field(default=UNNAMED, kw_only=True)  # names of the units for labels of axes
+    _folder: object = field(default=None, kw_only=True, repr=False)  # keeps a temporary file
+
+    @property
+    def n_disks(self) -> int:
+        """Number of disks, N."""
+        return len(self.mass)
+
+    @property
+    def n_frames(self) -> int:
+        """Number of frames, T."""
+        return len(self.time)
+
+    def parameter(self, group: str, variable: str, default: Any = None) -> Any:
+        """Return the value of an input variable in this run, which may be its default.
+
+        Parameters
+        ----------
+        group, variable : str
+            names in the input, such as "contact" and "restitution"
+        default : object
+            value to return if the variable has no value
+
+        Returns
+        -------
+        object
+            a number, a text or an array
+
+        Examples
+        --------
+        >>> run.parameter("stop", "collisions_per_disk"), run.parameter("stop", "events", "none")
+        (60.0, 'none')
+        """
+        return self.parameters.get(group, {}).get(variable, default)
+
+    def observable(self, name: str) -> Series:
+        """Return the time series of an observable.
+
+        Parameters
+        ----------
+        name : str
+            name in the file, such as "total_energy" or "sides/left/impulse"; the attribute
+            `observables` contains all names
+
+        Returns
+        -------
+        Series
+            times (T',) and values (T', ...)
+
+        Raises
+        ------
+        RunError
+            if the file has no observable of that name
+
+        Examples
+        --------
+        >>> time, energy = run.observable("total_energy")
+        >>> bool(np.ptp(energy) < 1e-9 * energy[0])
+        True
+        """
+        with open_file(self.path) as file:
+            return series_of(file, name, self._samples)
+
+    @cached_property
+    def _samples(self) -> int:
+        """Number of samples of the observables, counted when the run was first read."""
+        with open_file(self.path) as file:
+            return committed(file, "observables")
+
+    @cached_property
+    def observables(self) -> tuple[str, ...]:
+        """Names of all observables in the file."""
+        with open_file(self.path) as file:
+            return tuple(series_in(file["observables"]))
+
+    def to_dataframe(self) -> "pandas.DataFrame":
+        """Return the observables as a pandas DataFrame, which has one row for each sample.
+
+        The index of the table is the time.  The columns have the names of the observables, such as
+        `all/kinetic_energy`.  Each component of a vector or tensor has its own column, such as
+        `momentum_x` or `virial_tensor_xy`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            (T', columns) of numbers
+
+        Raises
+        ------
+        ImportError
+            if pandas is not installed
+
+        Examples
+        --------
+        >>> table = run.to_dataframe()
+        >>> table.index.name, "all/kinetic_energy" in table.columns
+        ('time', True)
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("to_dataframe needs a package: pip install pandas") from None
+
+        columns: dict[str, np.ndarray] = {}
+        with open_file(self.path) as file:
+            series = {name: series_of(file, name, self._samples) for name in self.observables}
+        for name, (time, value) in series.items():
+            parts = {(): ("",), (2,): ("_x", "_y"), (4,): [f"_{side}" for side in SIDES]}
+            values = value.reshape(len(time), -1).T
+            if name in TENSORS:
+                parts[4,] = ("_xx", "_xy", "_yx", "_yy")
+            columns |= zip([name + part for part in parts[value.shape[1:]]], values, strict=True)
+        return pandas.DataFrame(columns, index=pandas.Index(time, name="time"))
+
+    def event_log(self) -> EventLog:
+        """Return all collisions of disks with each other and with boundaries, in order of time.
+
+        Returns
+        -------
+        EventLog
+            (E,) times, partners and impulses of all events
+
+        Raises
+        ------
+        RunError
+            unless the input has `output.event_log = .true.`
+
+        Examples
+        --------
+        >>> log = run.event_log()
+        >>> pairs = int(np.sum(log.j > 0))
+        >>> bool(pairs == run.observable("collisions").value[-1])
+        True
+        """
+        return self._event_log
+
+    @cached_property
+    def _event_log(self) -> EventLog:
+        with open_file(self.path) as file:
+            if "events" not in file:
+                raise Unsound("has no event log, set output.event_log = .true.")
+            count = committed(file, "events")
+            return EventLog(
+                **{
+                    name: rows(file["events"][name], count)
+                    for name in EventLog._fields
+                    if name in file["events"]
+                }
+            )
+
+    @cached_property
+    def collisions_per_disk(self) -> Series:
+        """Mean number of collisions of each disk with other disks, as a function of time."""
+        time, collisions = self.observable("collisions")
+        return Series(time, 2 * collisions / self.n_disks)
+
+    def collisions_per_disk_at(self, time: np.ndarray) -> np.ndarray:
+        """Return the mean number of collisions with other disks per disk at the given times.
+
+        The number is interpolated between the samples of the observables.  If the file has more
+        frames than such samples, the interpolation also uses the event counts of the frames.
+
+        Parameters
+        ----------
+        time : numpy.ndarray
+            (...) times, such as those of the frames
+
+        Returns
+        -------
+        numpy.ndarray
+            (...) mean number of collisions per disk since the start
+
+        Examples
+        --------
+        >>> tau = run.collisions_per_disk_at(run.time)
+        >>> float(tau[0]), bool(tau[-1] > 50)
+        (0.0, True)
+        """
+        known, tau = self.collisions_per_disk
+        if self.event_count is None or len(known) >= self.n_frames:
+            return np.interp(time, known, tau)
+        hits, rising = self.events_per_disk, 1e-12 / max(self.time[-1], 1e-300)  # also at rest
+
+        def clock(t: np.ndarray) -> np.ndarray:
+            return np.interp(t, self.time, hits) + rising * np.asarray(t)
+
+        return np.interp(clock(time), clock(known), tau)
+
+    @cached_property
+    def events_per_disk(self) -> np.ndarray:
+        """Mean number (T,) of events per disk between the start and each frame."""
+        if self.event_count is None:
+            raise RunError(f"{self.path}: has no event_count in its frames")
+        return np.array([self.event_count[k].mean() for k in range(self.n_frames)])
+
+    @cached_property
+    def nature(self) -> Nature:
+        """Traits of the run, which determine the theories that apply to the run."""
+        lost = self.observable("dissipated_energy").value[-1]
+        most = self.n_disks * self.observable("all/kinetic_energy").value[[0, -1]].max()
+        return nature_of(
+            self.parameters,
+            self.mass,
+            self.radius,
+            lost=lost / most if most > 1e-300 else 0.0,  # rounding error of a disk at rest
+            turning="all/rotational_energy" in self.observables,
+            collapsed="collapse" in str(self.provenance.get("note", "")),
+        )
