@@ -136,6 +136,14 @@ def imports_of(path: Path, package: Path) -> Iterator[tuple[int, str]]:
                     yield node.lineno, called.split(".")[1] if "." in called else called
 
 
+def length_problems(root: Path) -> Iterator[Problem]:
+    """Return the Python files in `post/` that are too long."""
+    for path in sorted((root / "post").rglob("*.py")):
+        if (count := len(path.read_text().splitlines())) > MOST_LINES_OF_FILE:
+            what = f"more than {MOST_LINES_OF_FILE} lines"
+            yield Problem(path.relative_to(root), count, what)
+
+
 def unit_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
     """Return a problem if a file is too long or is not one private module with the file's name."""
     if len(lines) > MOST_LINES_OF_FILE:
@@ -339,6 +347,7 @@ def problems_of(root: Path) -> Iterator[Problem]:
     yield from name_problems(root, paths)
     if (package := root / "post" / "ricochet").is_dir():
         yield from import_problems(root, package)
+    yield from length_problems(root)
     yield from language_problems(root)
     yield from path_problems(root)
 

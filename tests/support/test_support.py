@@ -312,6 +312,16 @@ def test_words_of_python_pages_and_helps_are_looked_at(tmp_path):
     assert places == ["docs/page.md:3", "post/script.py:1", "src/variables/bad.f90:4"], found
 
 
+@pytest.mark.parametrize(("lines", "expected"), [(600, []), (601, ["more than 600 lines"])])
+def test_a_python_file_of_the_scripts_has_at_most_600_lines(tmp_path, lines, expected):
+    path = tmp_path / "post" / "ricochet" / "analysis" / "means.py"
+    path.parent.mkdir(parents=True)
+    path.write_text("pass\n" * lines)
+    (tmp_path / "post" / "ricochet" / "README.md").write_text("  analysis --> analysis\n")
+    place = f"post/ricochet/analysis/means.py:{lines}: "
+    assert style_problems(tmp_path, MODULE) == [place + words for words in expected]
+
+
 def test_folders_and_what_they_use_are_those_of_the_picture(tmp_path):
     drawn = PICTURE.replace("low & ", "") + "high --> lost\n"
     place = "src/high/upper.f90:3: high/ uses lower of low/"
