@@ -8,7 +8,7 @@ module cell_contents
   use neighbour_search, only: list_capacity
   implicit none
   private
-  public :: append, cell_contents_t, gather
+  public :: append, cell_capacity, cell_contents_t, gather
 
   integer(int32), parameter :: cell_capacity = 3
   integer(int32), parameter :: count_slot = cell_capacity + 1

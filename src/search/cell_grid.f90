@@ -570,7 +570,7 @@ contains
           return
         end if
       end if
-      call scan_cells_around(self, sim, known, near)
+      if (sim%n_disks() > 1) call scan_cells_around(self, sim, known, near)
     end associate
   end subroutine find_event_of_small
 

@@ -3,7 +3,7 @@
 module cell_scans
   use kinds, only: int16, int32, int64, real64
   use box_geometry, only: find_image_contact
-  use cell_contents, only: append, cell_contents_t
+  use cell_contents, only: append, cell_capacity, cell_contents_t
   use cell_faces, only: patch_t
   use images, only: image_t, images_t
   use neighbour_lists, only: neighbour_lists_t
@@ -49,6 +49,8 @@ contains
       call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, latest_clock + no_gravity, image)
     case (no_gravity)
       call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, no_gravity, image)
+    case (latest_clock)
+      call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, latest_clock, image)
     case default
       call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image)
     end select
@@ -148,29 +150,39 @@ contains
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prospect_t), intent(inout) :: near
     integer(int64) :: n
-    integer(int32) :: k, j, crowded
+    integer(int32) :: k
 
     n = 0
-    crowded = 0
     do k = 1, size(c, kind=int32)
       call append(cells%cell(c(k)), near%list, n)
-      crowded = max(crowded, cells%chain(c(k)))
     end do
     near%n = int(n, int32)
-    if (crowded > 0) then
-      do k = 1, size(c, kind=int32)
-        j = cells%chain(c(k))                      ! the first disk of the linked list is also in a slot
-        if (j > 0) j = cells%next(j)
-        do while (j > 0)
-          if (near%n == list_capacity) call test_through_image(sim, known, images%image(number), near)
-          near%n = near%n + 1
-          near%list(near%n) = j - 1
-          j = cells%next(j)
-        end do
-      end do
-    end if
+    do k = 1, size(c, kind=int32)
+      call add_chain(cells, sim, c(k), images, number, known, near)
+    end do
     if (near%n > 0) call test_through_image(sim, known, images%image(number), near)
   end subroutine scan_cells
+
+  !> Adds the disks in the linked list of a crowded cell to the candidates. The first disk of the linked list is also in a slot.
+  subroutine add_chain(cells, sim, c, images, number, known, near)
+    type(cell_contents_t), intent(in) :: cells
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: c                !! number of the cell
+    type(images_t), intent(in) :: images
+    real(real64), intent(in) :: number(2)          !! index of the image to which the cell belongs
+    integer(int32), intent(in) :: known            !! as in `earliest_contact`
+    type(prospect_t), intent(inout) :: near
+    integer(int32) :: j
+
+    j = cells%chain(c)
+    if (j > 0) j = cells%next(j)
+    do while (j > 0)
+      if (near%n == list_capacity) call test_through_image(sim, known, images%image(number), near)
+      near%n = near%n + 1
+      near%list(near%n) = j - 1
+      j = cells%next(j)
+    end do
+  end subroutine add_chain
 
   !> Finds contacts of a big disk with small disks in the cells along its boundary. All cells that belong to the same periodic image
   !> are searched in one call.
@@ -220,10 +232,85 @@ contains
   end subroutine add_chains_around
 
   !> Finds contacts of a disk if some of the nine cells around the disk are across a periodic side. All cells that belong to the
-  !> same periodic image are searched in one call. In a sheared box the images above and below the box move along x. The search then
-  !> includes all columns that the disk can reach before these images have moved by the width of a column. Disks in columns that are
-  !> not adjacent cannot touch.
+  !> same periodic image are searched in one call.
   subroutine scan_around_seam(cells, patch, sim, images, known, near)
+    type(cell_contents_t), intent(in) :: cells
+    type(patch_t), intent(in) :: patch
+    type(simulation_t), intent(in) :: sim
+    type(images_t), intent(in) :: images
+    integer(int32), intent(in) :: known            !! as in `earliest_contact`
+    type(prospect_t), intent(inout) :: near
+    integer(int32) :: own(2), row(-1:1), above(-1:1), column(-1:1), beside(-1:1), low, high, left, right, k
+
+    if (abs(images%velocity) > 0) then
+      call scan_around_moving_seam(cells, patch, sim, images, known, near)
+      return
+    end if
+    own = sim%tag(near%disk)%cell
+    do k = -1, 1
+      call patch%step(1, own(1), k, column(k), beside(k))
+      call patch%step(2, own(2), k, row(k), above(k))
+    end do
+    low = -1
+    do while (low <= 1)                            ! rows of the same image are adjacent
+      high = last_alike(above, low)
+      left = -1
+      do while (left <= 1)
+        right = last_alike(beside, left)
+        call scan_block()
+        left = right + 1
+      end do
+      low = high + 1
+    end do
+  contains
+
+    !> The last of the adjacent rows or columns that belong to the same image as the given row or column.
+    pure function last_alike(image, first) result(last)
+      integer(int32), intent(in) :: image(-1:1), first
+      integer(int32) :: last
+
+      last = first
+      if (first < 1) last = first + merge(1, 0, image(first + 1) == image(first))
+      if (first < 0 .and. image(1) == image(first)) last = 1
+    end function last_alike
+
+    !> Tests the disks in a block of cells that belong to the same image.
+    subroutine scan_block()
+      integer(int64) :: n
+      integer(int32) :: c, k, m, fullest
+
+      n = 0
+      fullest = 0
+      do k = low, high
+        do m = left, right
+          c = column(m) + cells%stride*row(k)
+          call append(cells%cell(c), near%list, n)
+          fullest = max(fullest, cells%cell(c)%in_slots())
+        end do
+      end do
+      near%n = int(n, int32)
+      if (near%n == 0) return
+      associate (number => real([beside(left), above(low)], real64))
+        if (fullest == cell_capacity) then
+          do k = low, high
+            do m = left, right
+              call add_chain(cells, sim, column(m) + cells%stride*row(k), images, number, known, near)
+            end do
+          end do
+        end if
+        if (beside(left) == 0 .and. above(low) == 0) then
+          call test_list(sim, known, near)
+        else
+          call test_through_image(sim, known, images%image(number), near)
+        end if
+      end associate
+    end subroutine scan_block
+  end subroutine scan_around_seam
+
+  !> Like `scan_around_seam`, for a sheared box, in which the images above and below the box move along x. The search includes all
+  !> columns that the disk can reach before these images have moved by the width of a column. Disks in columns that are not adjacent
+  !> cannot touch.
+  subroutine scan_around_moving_seam(cells, patch, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
     type(simulation_t), intent(in) :: sim
@@ -241,7 +328,7 @@ contains
       first = -1
       columns = 3
       periods = 0
-      if (y /= 0 .and. abs(images%velocity) > 0) then
+      if (y /= 0) then
         displacement = images%displacement(real(y, real64), sim%now)
         periods = anint(displacement/images%period(1))
         first = -nint((displacement - periods*images%period(1))/patch%width(1)) - merge(3, 2, y*images%velocity > 0)
@@ -263,6 +350,6 @@ contains
         call scan_cells(cells, sim, c(:n), images, [x - periods, real(y, real64)], known, near)
       end do
     end do
-  end subroutine scan_around_seam
+  end subroutine scan_around_moving_seam
 
 end module cell_scans
