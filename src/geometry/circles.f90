@@ -31,7 +31,9 @@ contains
     circle%middle = centre
     circle%radius = radius
     circle%encloses = encloses
+    circle%is_round = .not. encloses
     circle%extent = radius
+    circle%circumradius = radius
     circle%area = pi*radius**2
   end function new_circle
 

@@ -40,6 +40,7 @@ contains
     segment%half = 0.5_real64*(to - from)
     segment%extent = abs(segment%half)
     segment%length = sqrt(dot_product(segment%half, segment%half))
+    segment%circumradius = segment%length
     if (segment%length > 0) segment%along = segment%half/segment%length
   end function new_segment
 

@@ -15,7 +15,9 @@ module shapes
   type, abstract :: shape_t
     real(real64) :: middle(2) = 0.0_real64      !! [length]
     logical :: encloses = .false.               !! .true. if the disks are inside the obstacle, .false. if they are outside
+    logical :: is_round = .false.               !! .true. if the outline is a circle and the disks are outside
     real(real64) :: extent(2) = 0.0_real64      !! half width and half height of the bounding rectangle [length]
+    real(real64) :: circumradius = 0.0_real64   !! largest distance of a point of the outline from the middle [length]
     real(real64) :: area = 0.0_real64  !! area that the outline encloses [length**2]
   contains
     procedure :: from_nearest

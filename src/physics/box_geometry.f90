@@ -12,8 +12,8 @@ module box_geometry
   implicit none
   private
   public :: box_t, surface_t
-  public :: find_image_contact, free_area, next_obstacle, normal_surface_velocity, obstacle_gap, tangential_surface_velocity
-  public :: wall_normal
+  public :: find_image_contact, free_area, next_obstacle, normal_surface_velocity, obstacle_gap, stays_clear
+  public :: tangential_surface_velocity, wall_normal
 
   !> A side of the box, or a group of obstacles. All obstacles of a group share one contact law and one set of sums over collisions.
   type :: surface_t
@@ -305,12 +305,15 @@ contains
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     type(images_t) :: images
+    real(real64) :: shift(2)
     integer :: k, image
 
     do k = 1, size(list)
       images = merge(images_t(), box%images(), box%obstacle(obstacle_number(list(k)))%shape%encloses)
       do image = 1, images%count()
-        call find_image_contact(box, disk, last, list(k), images%shift(images%around(image)), t, code)
+        shift = images%shift(images%around(image))
+        if (stays_clear(box, disk, list(k), shift, t, box%has_gravity())) cycle
+        call find_image_contact(box, disk, last, list(k), shift, t, code)
       end do
     end do
   end subroutine next_obstacle
@@ -332,9 +335,7 @@ contains
 
     associate (shape => box%obstacle(obstacle_number(obstacle))%shape)
       d = disk%x - (shape%middle + shift)
-      if (box%has_gravity()) then
-        if (stays_outside(d, disk%v, box%gravity, t - disk%clock, shape%extent + disk%radius)) return
-      else if (last == obstacle .and. .not. shape%encloses) then
+      if (last == obstacle .and. .not. (shape%encloses .or. box%has_gravity())) then
         if (all(abs(d - shape%from_nearest(disk%x, box%images(), heading=disk%v)) < 0.5_real64*box%edges())) return
       end if
       t_image = disk%clock + shape%contact_time(d, disk%v, box%gravity, disk%radius, t - disk%clock)
@@ -343,6 +344,49 @@ contains
     t = t_image
     code = obstacle
   end subroutine find_image_contact
+
+  !> Whether a disk certainly does not touch one image of an obstacle before the time t. The result .false. means that the disk may
+  !> touch the image. The test costs much less than the calculation of the contact time.
+  pure function stays_clear(box, disk, obstacle, shift, t, falling) result(yes)
+    type(box_t), intent(in) :: box
+    type(disk_t), intent(in) :: disk
+    integer(int32), intent(in) :: obstacle      !! code of the obstacle
+    real(real64), intent(in) :: shift(2)        !! shift from the obstacle to its image [length]
+    real(real64), intent(in) :: t               !! time since the epoch [time]
+    logical, intent(in) :: falling              !! .false. if there is no gravity
+    logical :: yes
+    real(real64) :: d(2)
+
+    associate (shape => box%obstacle(obstacle_number(obstacle))%shape)
+      d = disk%x - (shape%middle + shift)
+      if (falling) then
+        yes = stays_outside(d, disk%v, box%gravity, t - disk%clock, shape%extent + disk%radius)
+      else
+        yes = passes_by(d, disk%v, t - disk%clock, shape%circumradius + disk%radius, shape%is_round)
+      end if
+    end associate
+  end function stays_clear
+
+  !> Whether a point on a straight path certainly stays outside of a circle around the origin during a given time. The result .false.
+  !> means that the point may enter the circle. A point that moves away from the centre does not touch a round outline. The radius of
+  !> the circle is enlarged by more than all rounding errors. A contact before the time s requires c < -2 b s, as in
+  !> `neighbour_search: earliest_contact`.
+  pure function passes_by(d, v, s, rho, is_round) result(yes)
+    real(real64), intent(in) :: d(2)            !! initial position [length]
+    real(real64), intent(in) :: v(2)            !! [length/time]
+    real(real64), intent(in) :: s               !! duration [time]
+    real(real64), intent(in) :: rho             !! radius of the circle [length]
+    logical, intent(in) :: is_round             !! the outline is this circle
+    logical :: yes
+    real(real64) :: b, c, sigma2, disc
+
+    c = d(1)*d(1) + d(2)*d(2)
+    sigma2 = (1 + spare)*rho*rho + spare**2*c
+    c = c - sigma2
+    b = d(1)*v(1) + d(2)*v(2)
+    disc = sigma2*(v(1)*v(1) + v(2)*v(2)) - (d(1)*v(2) - d(2)*v(1))**2
+    yes = (min(disc, -2*b*s - c) < 0 .and. c > 0) .or. (is_round .and. b >= 0)
+  end function passes_by
 
   !> Whether a falling point certainly stays outside of a rectangle around the origin during a given time. The result .false. means
   !> that the point may enter the rectangle. The test uses the bounding rectangle of the path, which costs much less than the

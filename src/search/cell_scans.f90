@@ -2,7 +2,7 @@
 !> disks across a periodic side, with obstacles and big disks, and with given disks.
 module cell_scans
   use kinds, only: int16, int32, int64, real64
-  use box_geometry, only: find_image_contact
+  use box_geometry, only: find_image_contact, stays_clear
   use cell_contents, only: append, cell_capacity, cell_contents_t
   use cell_faces, only: patch_t
   use images, only: image_t, images_t
@@ -83,16 +83,19 @@ contains
     type(prospect_t), intent(inout) :: near
     integer(int32) :: e, last(2)                   ! index of an entry; image that contains the big disks in `near`
     real(real64) :: number(2), shift(2)            ! index of the image of an obstacle; shift to this image [length]
+    logical :: falling                             ! .false. if there is no gravity
 
     near%n = 0
     last = 0
+    falling = iand(known, no_gravity) == 0
     e = reach%first(cell(1), cell(2))
     do while (e > 0)
       associate (entry => reach%entry(e), disk => sim%disk(near%disk), tag => sim%tag(near%disk))
         if (entry%code <= 0) then
           number = entry%image
           shift = images%shift(number)
-          call find_image_contact(sim%box, disk, tag%last_partner, entry%code, shift, near%time, near%partner)
+          if (.not. stays_clear(sim%box, disk, entry%code, shift, near%time, falling)) &
+            call find_image_contact(sim%box, disk, tag%last_partner, entry%code, shift, near%time, near%partner)
         else
           if (near%n > 0 .and. (near%n == list_capacity .or. any(entry%image /= last))) call test_disks()
           last = entry%image
