@@ -359,7 +359,9 @@ contains
 
     associate (shape => box%obstacle(obstacle_number(obstacle))%shape)
       d = disk%x - (shape%middle + shift)
-      if (falling) then
+      if (falling .and. shape%is_round) then
+        yes = falls_past(d, disk%v, box%gravity, t - disk%clock, shape%circumradius + disk%radius)
+      else if (falling) then
         yes = stays_outside(d, disk%v, box%gravity, t - disk%clock, shape%extent + disk%radius)
       else
         yes = passes_by(d, disk%v, t - disk%clock, shape%circumradius + disk%radius, shape%is_round)
@@ -387,6 +389,30 @@ contains
     disc = sigma2*(v(1)*v(1) + v(2)*v(2)) - (d(1)*v(2) - d(2)*v(1))**2
     yes = (min(disc, -2*b*s - c) < 0 .and. c > 0) .or. (is_round .and. b >= 0)
   end function passes_by
+
+  !> Like `passes_by`, for a falling point. The path of the point lies in a triangle. The corners of the triangle are the two ends of
+  !> the path, and the position that the point would reach without gravity in half the time. The circle does not overlap the triangle
+  !> if all three corners are beyond the circle in the same direction, either along the chord of the path or across the chord.
+  pure function falls_past(d, v, g, s, rho) result(yes)
+    real(real64), intent(in) :: d(2), v(2), g(2), s, rho
+    logical :: yes
+    real(real64) :: middle(2), chord(2), chord2, along(2), across(2), clear, slack
+
+    yes = .false.
+    if (s > sqrt(never)) return                 ! the length of the path may overflow
+    middle = 0.5_real64*s*v
+    chord = s*(v + 0.5_real64*s*g)
+    chord2 = chord(1)*chord(1) + chord(2)*chord(2)
+    across(1) = d(1)*chord(2) - d(2)*chord(1)
+    across(2) = across(1) + (middle(1)*chord(2) - middle(2)*chord(1))
+    along(1) = d(1)*chord(1) + d(2)*chord(2)
+    along(2) = along(1) + (middle(1)*chord(1) + middle(2)*chord(2))
+    clear = max(min(across(1), across(2)), -max(across(1), across(2)), &
+      min(along(1), along(2), along(1) + chord2), -max(along(1), along(2), along(1) + chord2))
+    slack = spare*(abs(d(1)) + abs(d(2)) + abs(middle(1)) + abs(middle(2)) + rho)*(abs(chord(1)) + abs(chord(2)))
+    clear = clear - slack
+    yes = clear > 0 .and. clear*clear > rho*rho*chord2
+  end function falls_past
 
   !> Whether a falling point certainly stays outside of a rectangle around the origin during a given time. The result .false. means
   !> that the point may enter the rectangle. The test uses the bounding rectangle of the path, which costs much less than the
