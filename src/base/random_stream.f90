@@ -8,7 +8,7 @@ module random_stream
   use kinds, only: int32, int64, int128, real64
   implicit none
   private
-  public :: random_stream_t
+  public :: key_of_draws, random_stream_t
 
   !> Codes of the purposes for which random numbers are drawn during a run. Random numbers for the initial state are drawn from
   !> separate streams.
@@ -22,6 +22,7 @@ module random_stream
   contains
     procedure :: seed
     procedure :: seed_draw
+    procedure :: seed_disk
     procedure :: draw_word
     procedure :: draw_uniform
     procedure :: draw_index
@@ -56,15 +57,33 @@ contains
     integer(int32), intent(in) :: id            !! id of the disk
     integer(int64), intent(in) :: count         !! number of the draw, or of the event that requires the draw
 
-    integer(int64) :: state
+    call self%seed_disk(key_of_draws(number, purpose), id, count)
+  end subroutine seed_draw
+
+  !> The part of the key of a draw that is the same for all disks.
+  pure function key_of_draws(number, purpose) result(key)
+    integer(int64), intent(in) :: number        !! seed from the input
+    integer, intent(in) :: purpose              !! as in `seed_draw`
+    integer(int64) :: key, state
 
     state = number
     call add_key(state, purpose)
-    call add_key(state, int(id))
+    call draw_seed(state, key)
+  end function key_of_draws
+
+  !> Like `seed_draw`, if the part of the key that is the same for all disks is known.
+  pure subroutine seed_disk(self, key, id, count)
+    class(random_stream_t), intent(inout) :: self
+    integer(int64), intent(in) :: key           !! from `key_of_draws`
+    integer(int32), intent(in) :: id            !! id of the disk
+    integer(int64), intent(in) :: count         !! as in `seed_draw`
+    integer(int64) :: state
+
+    state = ieor(key, int(id, int64))
     call add_key(state, int(ibits(count, 0, 31)))
     call add_key(state, int(ibits(count, 31, 31)))
     call fill(self, state)
-  end subroutine seed_draw
+  end subroutine seed_disk
 
   !> Mixes one element of a key into the state of the generator SplitMix64, which seeds a random stream.
   pure subroutine add_key(state, part)
@@ -91,29 +110,35 @@ contains
   pure subroutine draw_word(self, word)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(out) :: word
-    integer(int64) :: shifted
 
-    associate (s => self%word)
-      word = ishftc(wrapped(5*int(s(2), int128)), 7)
-      word = wrapped(9*int(word, int128))
-      shifted = ishft(s(2), 17)
-      s(3) = ieor(s(3), s(1))
-      s(4) = ieor(s(4), s(2))
-      s(2) = ieor(s(2), s(3))
-      s(1) = ieor(s(1), s(4))
-      s(3) = ieor(s(3), shifted)
-      s(4) = ishftc(s(4), 45)
-    end associate
+    call step(self%word, word)
   end subroutine draw_word
 
-  !> Draws a number that is uniformly distributed in [0, 1): the upper 53 random bits as a multiple of 2**-53.
+  !> Advances the state of the generator by one step and returns the next 64 random bits.
+  pure subroutine step(s, word)
+    integer(int64), intent(inout) :: s(4)
+    integer(int64), intent(out) :: word
+    integer(int64) :: shifted
+
+    word = ishftc(wrapped(5*int(s(2), int128)), 7)
+    word = wrapped(9*int(word, int128))
+    shifted = ishft(s(2), 17)
+    s(3) = ieor(s(3), s(1))
+    s(4) = ieor(s(4), s(2))
+    s(2) = ieor(s(2), s(3))
+    s(1) = ieor(s(1), s(4))
+    s(3) = ieor(s(3), shifted)
+    s(4) = ishftc(s(4), 45)
+  end subroutine step
+
+  !> Draws a number that is uniformly distributed in [0, 1).
   pure subroutine draw_uniform(self, u)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: u
     integer(int64) :: word
 
     call self%draw_word(word)
-    u = real(ishft(word, -11), real64)*unit_53
+    u = uniform(word)
   end subroutine draw_uniform
 
   !> Draws an integer that is uniformly distributed from 1 to n.
@@ -154,15 +179,26 @@ contains
   pure subroutine draw_in_disk(stream, point, s)
     class(random_stream_t), intent(inout) :: stream
     real(real64), intent(out) :: point(2), s
+    integer(int64) :: state(4), word(2)
 
+    state = stream%word                         ! a local copy, which the compiler can keep in registers
     do
-      call stream%draw_uniform(point(1))
-      call stream%draw_uniform(point(2))
-      point = 2*point - 1
+      call step(state, word(1))
+      call step(state, word(2))
+      point = 2*uniform(word) - 1
       s = point(1)**2 + point(2)**2
       if (s > 0 .and. s < 1) exit
     end do
+    stream%word = state
   end subroutine draw_in_disk
+
+  !> The number in [0, 1) that 64 random bits represent: the upper 53 bits as a multiple of 2**-53.
+  elemental function uniform(word) result(u)
+    integer(int64), intent(in) :: word
+    real(real64) :: u
+
+    u = real(ishft(word, -11), real64)*unit_53
+  end function uniform
 
   !> Advances the generator SplitMix64 by one step and returns its next number.
   pure subroutine draw_seed(state, word)

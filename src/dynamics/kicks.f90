@@ -2,11 +2,11 @@
 !> disk and the number of the kick alone. The random numbers therefore depend neither on the order of the disks nor on the history
 !> of the run.
 module kicks
-  use kinds, only: int32, pi, real64
+  use kinds, only: int32, int64, pi, real64
   use disks, only: advance_disk
   use drive, only: active, andersen, noise
   use exact_sums, only: exact_sum_t
-  use random_stream, only: draws_of_kicks => kicks, orientations, random_stream_t
+  use random_stream, only: draws_of_kicks => kicks, key_of_draws, orientations, random_stream_t
   use simulation_state, only: simulation_t
   use tally, only: drive_energy
   implicit none
@@ -21,16 +21,18 @@ contains
     integer(int32), allocatable, intent(out) :: kicked(:)
     real(real64), allocatable :: draws(:, :)     ! (2,n) random numbers of the affected disks, stored to restore the momentum
     real(real64) :: z(2)
+    integer(int64) :: key
     integer(int32) :: i, n
     logical :: is_hit
 
     sim%kicks = sim%kicks + 1
+    key = key_of_draws(sim%seed, draws_of_kicks)
     n = sim%n_disks()
     allocate (kicked(n), draws(2, merge(n, 0_int32, sim%drive%keep_momentum)))
     n = 0
     do i = 1, sim%n_disks()
       if (.not. sim%drive%acts_on(sim%tag(i)%species)) cycle
-      call kick_disk(sim, i, is_hit, z)
+      call kick_disk(sim, i, key, is_hit, z)
       if (.not. is_hit) cycle
       n = n + 1
       kicked(n) = i
@@ -65,9 +67,10 @@ contains
 
   !> Applies a kick to disk i. In a sheared box the random velocity is relative to the velocity profile. The procedure erases the
   !> last partner of disk i, because the two disks may now collide again immediately. A kick does not count as a collision.
-  subroutine kick_disk(sim, i, is_hit, z)
+  subroutine kick_disk(sim, i, key, is_hit, z)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
+    integer(int64), intent(in) :: key            !! key of the random numbers of all disks, from `key_of_draws`
     logical, intent(out) :: is_hit               !! .false. if the driving is 'andersen' and the disk is not selected
     real(real64), intent(out) :: z(2)            !! Gaussian random numbers of variance 1 drawn for the velocity
     type(random_stream_t) :: stream
@@ -75,7 +78,7 @@ contains
 
     z = 0
     associate (drive => sim%drive, id => sim%tag(i)%id)
-      call stream%seed_draw(sim%seed, draws_of_kicks, id, sim%kicks)
+      call stream%seed_disk(key, id, sim%kicks)
       is_hit = .true.
       if (drive%kind == andersen) then
         call stream%draw_uniform(u)
