@@ -84,13 +84,14 @@ contains
   elemental subroutine add(self, term)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: term
-    real(real64) :: units
+    real(real64) :: units, upper
 
     units = term*self%per_one
     if (abs(units) < most_units) then
       self%units = self%units + int(units, int64)
-    else if (abs(units) < rare_unit) then
-      self%units = self%units + int(units, int128)
+    else if (abs(units) < rare_unit) then              ! two conversions to 64 bits are faster than one to 128 bits
+      upper = aint(units/most_units)
+      self%units = self%units + int(upper, int64)*2_int128**digits_of_bound + int(units - upper*most_units, int64)
     else
       call self%add_rare(units)
     end if
