@@ -106,7 +106,8 @@ contains
     end do
     if (mod(n, 2_int32) == 1) call self%search%predict(sim, n)
     last = never
-    if (sim%drive%acts_on_all()) last = sim%drive%time_of(sim%kicks + 1) - sim%box%epoch
+    ! The time of the kick may be rounded up: see `timeline: advance_once`.
+    if (sim%drive%acts_on_all()) last = nearest(sim%drive%time_of(sim%kicks + 1) - sim%box%epoch, 1.0_real64)
     last = max(last, minval(sim%disk%event_time))
     do i = 1, n
       if (sim%disk(i)%event_time <= last) then
