@@ -188,8 +188,11 @@ contains
     integer(int16), intent(in) :: cell(2)          !! cell of disk i
     integer(int32) :: candidate(list_capacity), around(9), image(9), c, k, row
     integer(int64) :: n                            ! number of candidates
+    real(real32) :: own(4)                         ! extent of disk i [length]
 
     self%entry(self%first(i)) = 0
+    own = self%extent(:, i)
+    self%extent(4, i) = -(2*own(4) + 4*own(3))     ! disk i, which is among the candidates, then fails the test of candidates
     n = 0
     if (patch%at_seam(cell)) then
       call find_cells(cells, patch, cell, around, image)
@@ -212,6 +215,7 @@ contains
       end do
       call test_candidates(0)
     end if
+    self%extent(4, i) = own(4)
   contains
 
     !> Adds the disks in the linked list of a crowded cell to the neighbour list of disk i. The first disk of the linked list is
@@ -237,7 +241,7 @@ contains
       integer(int32) :: j, k, found(list_capacity + 1), n_found
       real(real32) :: x, y, reach, margin, dx, dy
 
-      associate (own => self%extent(:, i), shift => real(periods(image)*self%period, real32))
+      associate (shift => real(periods(image)*self%period, real32))
         x = own(1) - shift(1)
         y = own(2) - shift(2)
         reach = own(3)
@@ -250,7 +254,7 @@ contains
           dx = max(abs(other(1) - x) - (margin + other(4)), 0.0_real32)
           dy = max(abs(other(2) - y) - (margin + other(4)), 0.0_real32)
           found(n_found + 1) = j
-          n_found = n_found + iand(merge(1, 0, dx*dx + dy*dy <= (reach + other(3))**2), merge(1, 0, j /= i))
+          n_found = n_found + merge(1, 0, dx*dx + dy*dy <= (reach + other(3))**2)
         end associate
       end do
       do k = 1, n_found
