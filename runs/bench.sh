@@ -281,7 +281,7 @@ kicked() {
 }
 
 check() {
-  local radii packing name disks limit options count driving=1494 verdict=0
+  local radii packing name disks limit options count driving=1342 verdict=0
   while read -r radii packing limit options; do
     # shellcheck disable=SC2086 # the variable contains any number of options
     count=$((($(instructions "$radii" "$packing" 100000 $options) - $(instructions "$radii" "$packing" 1 $options))/100000))
@@ -291,16 +291,16 @@ check() {
 equal 0.5 2087
 equal 0.7 2114
 equal 0.1 3173
-equal 0.5 2385 --set box.boundary=periodic,periodic
-equal 0.1 3575 --set box.boundary=periodic,periodic
+equal 0.5 2319 --set box.boundary=periodic,periodic
+equal 0.1 3479 --set box.boundary=periodic,periodic
 equal 0.5 2500 --set box.gravity=0,-1
 equal 0.1 3705 --set box.gravity=0,-1
-lognormal 0.7 2888
-lognormal 0.5 4503
-lognormal 0.3 6720
-lognormal 0.1 5110
-uniform 0.7 2735
-uniform 0.5 3730
+lognormal 0.7 2798
+lognormal 0.5 4317
+lognormal 0.3 6446
+lognormal 0.1 5069
+uniform 0.7 2681
+uniform 0.5 3686
 LIMITS
   while read -r name limit; do
     obstacles "$name"
@@ -308,10 +308,11 @@ LIMITS
     printf 'one disk, %s: %s instructions per event, at most %s\n' "${name/_/ }" "$count" "$limit"
     [ "$count" -gt 0 ] && [ "$count" -le "$limit" ] || verdict=1
   done <<'LIMITS'
-scatterers_35 4000
-lorentz 6200
-board_1 2950
-board_36 7100
+scatterers_35 2430
+scatterers_5 2735
+lorentz 2660
+board_1 2595
+board_36 5935
 LIMITS
   while read -r disks limit; do
     piston "$disks"
