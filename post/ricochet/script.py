@@ -29,9 +29,6 @@ from .reading.reader import Restitution, Run, RunError, read_run
 from .reading.units import UNNAMED, Units, units_of
 from .running.ensembles import in_order, read_manifest
 
-matplotlib.use("Agg")
-plt.style.use(STYLE)
-
 Table = dict[str, Iterable] | list[dict]  # columns by name, or a list of rows
 
 
@@ -448,6 +445,8 @@ def launch(main: Callable[[], None]) -> None:
     The exit code is 1 for the exception `Refused` and 2 for all other exceptions.  The command
     `python -X dev` shows the traceback of an unexpected exception.
     """
+    matplotlib.use("Agg")  # not at import, because a notebook may import a script
+    plt.style.use(STYLE)
     name = Path(sys.argv[0]).name
     if not sys.flags.dev_mode:
         warnings.simplefilter("ignore")

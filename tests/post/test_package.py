@@ -14,6 +14,7 @@ from ricochet.aliases import modules
 from whole_runs import ran
 
 INIT = Path(ricochet.__file__)
+SCRIPTS = INIT.parents[1]
 
 
 @pytest.mark.parametrize("name", modules())
@@ -82,3 +83,18 @@ def test_the_package_loads_no_more_than_its_names_need():
     code = f"import ricochet, sys; print([name for name in {heavy} if name in sys.modules])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+def test_importing_a_script_leaves_the_figures_of_a_notebook_alone():
+    """A film in a notebook imports a script; the later figures keep their backend and style."""
+    code = f"""if True:
+        import pkgutil, sys
+        import matplotlib
+        matplotlib.use("svg")
+        before = dict(matplotlib.rcParams)
+        sys.path.insert(0, {str(SCRIPTS)!r})
+        for script in pkgutil.iter_modules([{str(SCRIPTS)!r}]):
+            __import__(script.name)
+        assert dict(matplotlib.rcParams) == before
+    """
+    subprocess.run([sys.executable, "-c", code], check=True)
