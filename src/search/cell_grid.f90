@@ -498,8 +498,7 @@ contains
     end if
   end subroutine read_ahead
 
-  !> Predicts the next event of a disk in the general case. A disk that has left the patch is removed from the search. No other disk
-  !> is then tested against the removed disk.
+  !> Predicts the next event of a disk in the general case. If the disk has left the patch, the disk is removed from the search.
   subroutine predict_with_care(self, sim, i, has_collided)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
