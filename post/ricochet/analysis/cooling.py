@@ -43,7 +43,7 @@ SETTLED = 0.005  # relative distance from its limit at which the ratio is regard
 
 
 def on_grid(x: Sequence[Any], y: Sequence[Any], points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Interpolate K curves (K, T) of each run on a common grid that ends with the shortest run."""
+    """Interpolate curves (K, T) of each run on a common grid, which ends at the shortest run."""
     grid = np.linspace(0, min(own[-1] for own in x), points)
     each = zip(x, y, strict=True)
     return grid, np.array([[np.interp(grid, own, k) for k in tracks] for own, tracks in each])
@@ -99,7 +99,7 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
 
 
 def moving_energy(run: Run, name: str = "all") -> np.ndarray:
-    """Return the kinetic energy per disk (T,) in the observables, which must not start at 0."""
+    """Return the samples (T,) of the kinetic energy per disk; the first sample must not be 0."""
     energy = run.observable(f"{name}/kinetic_energy").value
     if name == "all" and not energy[0] > 0:
         raise Refused(f"{run.path}: starts with disks at rest, which cannot cool")
@@ -308,7 +308,8 @@ def exponent(time: np.ndarray, energy: np.ndarray) -> float:
 def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray) -> float:
     """Return the number of collisions per disk after which a gas is no longer homogeneous, or NaN.
 
-    After this number of collisions, the cooling rate stays below `SLOW` times the prediction `law`.
+    A gas is regarded as no longer homogeneous if its cooling rate stays below `SLOW` times the
+    predicted rate `law` until the end of the run.
     """
     slow = rate < SLOW * law
     if not slow[-1]:

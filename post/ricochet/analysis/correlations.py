@@ -18,14 +18,16 @@ the functions are:
 Along axes where the velocity of the centre of mass is conserved, or changed only by noise
 (drive.keep_momentum = .false.), displacements and velocities are relative to the centre of mass.
 
-Lags are spaced logarithmically: in each twelfth of a power of ten, the lag of most pairs of samples
-is used.  These lags are suitable for samples at equal intervals, at logarithmic intervals, in
-bursts, and for combinations of such samples.  A sample is an origin t0 for a lag if another sample
-is later by this lag.  If the sums over all origins would take too long, only the first sample in
-each sixteenth of a lag is an origin.  With fewer origins, correlations of displacements are as
-accurate as with all origins, but correlations of velocities are less accurate at lags of many mean
-free times.  The method is the multiple-tau correlator of Ramirez et al., Journal of Chemical
-Physics 133, 154103 (2010), but without means over neighbouring samples, so that each lag is exact.
+Lags are spaced logarithmically: each power of ten is divided into twelve intervals, and from each
+interval the lag with the largest number of pairs of samples is used.  Lags that are selected by
+this rule are suitable for samples at equal intervals, at logarithmic intervals, in bursts, and for
+combinations of such samples.  A sample is an origin t0 for a lag if another sample is later by this
+lag.  If the sums over all origins would take too long, time is divided into intervals of one
+sixteenth of the lag, and only the first sample in each interval is an origin.  If fewer samples are
+origins, the correlations of displacements are equally accurate, but the correlations of velocities
+are less accurate at lags of many mean free times.  The method is the multiple-tau correlator of
+Ramirez et al., Journal of Chemical Physics 133, 154103 (2010), but without means over neighbouring
+samples, so that each lag is exact.
 
 Errors follow from the scatter of the runs.  For a single run, errors follow from the scatter of
 sixteen parts of the run.  Lags above an eighth of the duration of a single run have no error (NaN).
@@ -68,7 +70,7 @@ FIXED = ("msd", "fourth", "vacf", "diffusion", "overlap")
 
 
 def lags_of(times: np.ndarray) -> np.ndarray:
-    """Return the lags at which samples at given times have pairs.
+    """Return the lags for which correlations of samples at given times are computed.
 
     Parameters
     ----------
@@ -78,7 +80,8 @@ def lags_of(times: np.ndarray) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        (L,) lags [time]: 0, and in each twelfth of a power of ten the most frequent lag
+        (L,) lags [time]: 0, and the most frequent lag in each interval of a twelfth of a power of
+        ten
 
     Raises
     ------
@@ -159,7 +162,7 @@ class Correlator:
         reach: float | None = None,
         lags: np.ndarray | None = None,
     ):
-        """Prepare sums for sampling times, wavenumbers [1/length] and lags [`lags_of` times]."""
+        """Set all sums to zero; `waves` are [1/length], and the default lags are from `lags_of`."""
         cools = {"inelastic"} if source.nature.cooling else set()
         what = "time correlations require a steady state without flow"
         allow(source, what, *TRAITS.keys() - FLOWING - cools)
@@ -188,8 +191,9 @@ class Correlator:
     def follow(self, source: Run | Simulation) -> Self:
         """Add the samples after the last added sample, from a run or a simulation.
 
-        The run may be unfinished.  When the run contains more samples, `follow` can be called
-        again.  A simulation is advanced to the times of the samples.
+        If `source` is an unfinished run, `follow` can be called again after the run has written
+        more samples.  If `source` is a simulation, `follow` advances the simulation to the times of
+        the samples.
         """
         for place, velocity in samples(source, self.times[self.done :]):
             self.add(place, velocity)
@@ -222,7 +226,7 @@ class Correlator:
     def count(
         self, origins: np.ndarray, lags: np.ndarray, place: np.ndarray, v: np.ndarray
     ) -> None:
-        """Add P pairs of samples: this sample with the samples `origins` (P,) at `lags` (P,)."""
+        """Add P pairs of an earlier sample (`origins`) and the present sample, at lags `lags`."""
         before, v0 = (np.stack([self.held[k][part] for k in origins]) for part in (0, 1))
         way = place - before
         square, half = np.einsum("pna,pna->pn", way, way), np.einsum("pna,pna->pn", v0, way) / 2
@@ -255,7 +259,8 @@ class Correlator:
 def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield positions, which are not wrapped into the box, and velocities at the given times.
 
-    A simulation is advanced to these times.  For a run, the iteration ends after the last frame.
+    If `source` is a simulation, the iteration advances the simulation to the given times.  If
+    `source` is a run, the iteration ends after the last frame.
     """
     if isinstance(source, Simulation):
         box = source.parameters["box"]

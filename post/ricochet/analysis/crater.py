@@ -1,7 +1,7 @@
 """Craters: identify projectile and bed, and measure the size of the crater.
 
 The projectile is the disk of the species 'projectile'. If there is no such species, the projectile
-is the only disk that moves at the start.  All other disks form the bed.
+is the only disk that moves at the start.  All disks except the projectile form the bed.
 """
 
 from typing import Any, NamedTuple
@@ -43,7 +43,8 @@ class Crater(NamedTuple):
     side_collisions: int
 
 
-#: Traits that a run may have if only the projectile sets the bed in motion.
+#: Properties (traits of `nature`) with which a run is accepted, because in spite of these
+#: properties only the projectile sets the bed in motion.
 QUIET: tuple[str, ...]
 QUIET = (
     "inelastic",
@@ -131,11 +132,11 @@ def box_takes_part(run: Run, side_collisions: float) -> bool:
 def enough_disks(mass_ratio: float, restitution: float, fraction: float) -> float:
     """Estimate the number of disks for which the crater does not reach the sides of the box.
 
-    In a sufficiently large bed, about 3.4 M (1/f - 1) / (1 - xi^2) disks are hit.  A bed is
-    sufficiently large if it contains 2.2 times this number of disks.  The factors 3.4 and 2.2 were
-    measured for beds in the lower half of a square box, at a packing fraction of 0.5.  The mass
-    ratio M was from 10 to 50, the restitution xi from 0.3 to 0.8, the ratio of radii from 2 to 10,
-    and the energy fraction f was 0.1.
+    In a sufficiently large bed, about n = 3.4 M (1/f - 1) / (1 - xi^2) disks are hit.  A bed is
+    sufficiently large if it contains 2.2 n disks.  The factors 3.4 and 2.2 were measured for beds
+    in the lower half of a square box, at a packing fraction of 0.5.  In these measurements the mass
+    ratio M was between 10 and 50, the restitution xi between 0.3 and 0.8, the ratio of the radii
+    between 2 and 10, and the energy fraction f was 0.1.
 
     Parameters
     ----------
@@ -178,7 +179,7 @@ def projectile(run: Run) -> int:
     Raises
     ------
     RunError
-        if the run contains no such disk
+        if no species is called 'projectile' and the number of disks that move at the start is not 1
 
     Examples
     --------

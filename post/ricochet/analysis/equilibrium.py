@@ -54,8 +54,9 @@ def all_settle(runs: Sequence[Run]) -> bool:
 def after_start(run: Run, skip: float | None = None) -> float:
     """Return the time after which `skip` collisions per disk have occurred.
 
-    By default the number of collisions per disk is `SPEEDS_FORGET`, or half of the collisions of a
-    short run.  In a run without collisions, the result is half of the duration.
+    The default of `skip` is `SPEEDS_FORGET`, but at most half of the number of collisions per disk
+    in the whole run.  If the run contains no collisions and `skip` is not given, the returned time
+    is half of the duration of the run.
     """
     time = np.union1d(run.time, run.collisions_per_disk.time)
     tau = run.collisions_per_disk_at(time)
@@ -74,9 +75,10 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
 
     A run is regarded as steady after the time at which the collision rate and the energies of the
     species stop drifting.  Drifts are found in the samples of the observables or, if there are few
-    samples, in the frames.  The result is at least `SPEEDS_FORGET` collisions per disk after the
-    start, because the distribution of speeds relaxes during this time.  If a run has
-    fewer than 2 `SPEEDS_FORGET` collisions per disk, this minimum is half of their number.
+    samples, in the frames.  Unless `skip` is given, the first `SPEEDS_FORGET` collisions per disk
+    are not part of the steady state, because the distribution of speeds relaxes during these
+    collisions.  In a run with fewer than 2 `SPEEDS_FORGET` collisions per disk, the first half of
+    the collisions is excluded instead.
 
     Parameters
     ----------
@@ -121,7 +123,7 @@ def explained_start(run: Run, skip: float | None = None) -> tuple[float, str]:
 def examined(run: Run) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return times (T,) and a dictionary with the series (T - 1,) that are tested for drifts.
 
-    If there are too few samples for a test, the dictionary is empty.
+    If the run contains too few samples for a test of drifts, the returned dictionary is empty.
     """
     few = has_few_observables(run)
     time = run.time if few else run.collisions_per_disk.time
@@ -212,7 +214,7 @@ def frames_from(
 
 
 def later(run: Run, skip: float | None = None) -> slice:
-    """Return the frames in the steady state or, for a cooling gas, the frames after `after_start`.
+    """Return the frames after `start_of_steady_state`, without the last frame.
 
     The last frame is left out, because the last interval between frames may differ from the other
     intervals.
@@ -227,18 +229,19 @@ def later(run: Run, skip: float | None = None) -> slice:
 
 
 def motion_notes(runs: Sequence[Run]) -> list[str]:
-    """Return a note if motion is measured relative to a centre of mass that noise moves."""
+    """Return a note if noise moves the centre of mass, relative to which motion is measured."""
     walks = any("random_walk" in run.nature for run in runs)
     note = "noise moves the centre of mass (drive.keep_momentum): motion is measured relative to it"
     return [note] * walks
 
 
 def unforced(source: Run | Simulation) -> np.ndarray:
-    """Return a mask (2,) of the axes along which nothing except noise changes the total momentum.
+    """Return a mask (2,) of the axes along which no force except noise changes the total momentum.
 
-    Forces of walls parallel to an axis are not considered.  Such walls conserve the momentum along
-    the axis unless the run has a trait in `ALONG_WALLS`.  If noise moves the centre of mass, and
-    walls of a run with such a trait may stop this motion, an error is raised.
+    The function ignores that walls parallel to an axis can exert forces along the axis.  Walls
+    exert tangential forces only in runs with a property (trait of `nature`) in `ALONG_WALLS`.  If
+    noise moves the centre of mass, and friction at walls may stop the motion of the centre of mass,
+    an error is raised.
     """
     box, nature = source.parameters.get("box", {}), source.nature
     if nature & (KICKED - {"noise_driven"}) or nature & {"obstacles", "changed"}:
@@ -254,7 +257,8 @@ def unforced(source: Run | Simulation) -> np.ndarray:
 def comoving(run: Run) -> np.ndarray:
     """Return a mask (2,) of the axes along which motion is relative to the centre of mass.
 
-    Along these axes the total momentum is conserved, or only noise changes the total momentum.
+    The mask is true for an axis if the total momentum along the axis is conserved, or if only noise
+    changes the total momentum along the axis.
     """
     kept = unforced(run)
     if run.nature & ALONG_WALLS and "random_walk" not in run.nature:
@@ -266,9 +270,9 @@ def comoving(run: Run) -> np.ndarray:
 def thermal_energy(run: Run, frames: Index, component: int | None = None) -> np.ndarray:
     """Return the energies m v^2 / 2 (F, N) of the thermal motion of disks in the given frames.
 
-    The velocity v is relative to the shear flow and, along `comoving` axes, to the centre of mass.
-    If `component` is 0, only the x component of v is used.  If `component` is 1, only the y
-    component is used.
+    The velocity v is relative to the shear flow.  Along the axes that the function `comoving`
+    returns, v is also relative to the centre of mass.  If `component` is 0 or 1, v is replaced by
+    its x or y component, respectively.
     """
     frames = chosen(run.n_frames, frames)
     velocity = run.velocity[frames]
@@ -283,7 +287,8 @@ def thermal_energy(run: Run, frames: Index, component: int | None = None) -> np.
 def free_disks(run: Run) -> float:
     """Return the effective number of disks: the total kinetic energy divided by kT.
 
-    This number is N minus 1/2 for each axis along which motion is relative to the centre of mass.
+    For N disks, the effective number is N - k/2, where k is the number of axes along which motion
+    is measured relative to the centre of mass.
 
     Parameters
     ----------
@@ -346,7 +351,8 @@ def has_few_observables(run: Run) -> bool:
 def kt_in_time(run: Run) -> tuple[str, np.ndarray, np.ndarray]:
     """Return the source of the data, "observables" or "frames", and times and kT from this source.
 
-    The frames are used if there are few samples of the observables and more frames.
+    The source is "frames" if the run contains few samples of the observables and more frames than
+    such samples.
     """
     if not has_few_observables(run):
         time, energy = run.observable("all/kinetic_energy")

@@ -101,7 +101,7 @@ def goodness_of_fit(
     Returns
     -------
     LawTest
-        both statistics with their probabilities
+        statistics of the Kolmogorov-Smirnov test and of the chi-square test, each with its p-value
 
     Examples
     --------
@@ -185,9 +185,9 @@ def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estim
     Returns
     -------
     Estimate
-        mean and half the difference of two numbers, which are derived from the curve plus its error
-        and from the curve minus its error; both are NaN if one of these numbers is NaN, or if the
-        curve has no error
+        let a and b be the numbers that `of` returns for the curve plus its error and for the curve
+        minus its error; the mean is (a + b) / 2 and the error |a - b| / 2; mean and error are NaN
+        if a or b is NaN, or if the curve has no error
 
     Examples
     --------
@@ -283,8 +283,9 @@ def kurtosis_noise(count: int) -> float:
     """Return the standard deviation of `excess_kurtosis` for Maxwellian speeds.
 
     The square x = v^2 of a Maxwellian speed v has an exponential distribution, here with mean 1.
-    To first order, a2 is the deviation of the sample mean of x^2 / 2 - 2 x from the expected value.
-    The variance of x^2 / 2 - 2 x is 20 / 4 + 4 * 1 - 2 * 4 = 1.
+    To first order in deviations of sample means, a2 equals the mean of x^2 / 2 - 2 x over the
+    sample minus the expected value of x^2 / 2 - 2 x.  The variance of x^2 / 2 - 2 x is 20 / 4 + 4 *
+    1 - 2 * 4 = 1.
 
     Parameters
     ----------

@@ -2,11 +2,11 @@
 
 The docstring of post/fields.py defines the fields.  Errors are computed by the jackknife over
 blocks of time of all runs.  A block of time is so long that the states at its start and at its end
-are independent.  The jackknife also removes a bias: if the flow is estimated from the same n values
-as the temperature, the temperature relative to this flow is too small by the fraction 1 / n.
-Blocks of unequal weight are treated as in Busing, Meijer and van der Leeden, Statistics and
-Computing 9, 3 (1999).  In the shapes of arrays, C is the number of cells and G the number of
-blocks.
+are independent.  The jackknife also removes a bias of the temperature: if flow velocity and
+temperature are estimated from the velocities of the same n disks, the temperature is too small by
+the fraction 1 / n.  Blocks of unequal weight are treated as in Busing, Meijer and van der Leeden,
+Statistics and Computing 9, 3 (1999).  In the shapes of arrays, C is the number of cells and G the
+number of blocks.
 """
 
 from collections.abc import Callable
@@ -40,7 +40,7 @@ FEWEST_DISKS = 3  # fewest disks in a cell without any one block, for kT, stress
 LONG = 1.5  # length of a block in units of the statistical inefficiency
 POINTS = 1 << 16  # used with obstacles to find the accessible area
 ACROSS = SIDES[:2], SIDES[2:]  # the two sides perpendicular to each axis
-#: Traits that a gas between two walls may have if Enskog's theory applies to the gas.
+#: Properties (traits of `nature`) of runs between two walls to which Enskog's theory applies.
 LAWFUL = {"walls", "thermal_walls", "unequal_temperatures", "sliding_surfaces"}
 Cells = tuple[int, int]
 
@@ -73,23 +73,24 @@ class Members(NamedTuple):
     share: np.ndarray  # fraction of the sample that is in the block
 
     def mean(self) -> np.ndarray:
-        """Return the mean, or NaN if fewer than two blocks contain data."""
+        """Return the mean of the pseudo-values, or NaN if fewer than two blocks contain data."""
         seen = self.share > 0
         mean = np.sum(self.share * np.where(seen, self.values, 0), axis=0)
         return np.where(seen.sum(axis=0) > 1, mean, np.nan)
 
     def rests(self) -> np.ndarray:
-        """Return weighted deviations (G, ...); the sum of squares is the squared standard error."""
+        """Return weighted deviations (G, ...); the sum of their squares is the squared error."""
         seen = self.share > 0
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.sqrt(self.share / (1 - self.share) / seen.sum(axis=0))
             return np.where(seen, root * (self.values - self.mean()), 0)
 
     def estimate(self, kinship: np.ndarray | float = 0.0) -> Estimate:
-        """Return the mean with its error.
+        """Return the mean of the pseudo-values with its error.
 
-        The argument `kinship` is the correlation of neighbouring blocks: twice the sum of products
-        of neighbouring deviations, divided by the sum of squared deviations.
+        The argument `kinship` is the correlation of neighbouring blocks of time: twice the sum of
+        the products d_k d_(k+1), divided by the sum of the squares d_k^2, where d_k is the
+        deviation of block k from the mean.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             error = np.sqrt(np.sum(self.rests() ** 2, axis=0))
@@ -142,9 +143,9 @@ def own_motion(run: Run, frames: list[int]) -> np.ndarray:
 def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
     """Return the largest statistical inefficiency of slowly varying quantities, in frames.
 
-    These quantities are the totals of mass, momentum and energy, and the Fourier components of
-    their densities with the longest wavelengths in the directions in which the box is divided into
-    cells.
+    The slowly varying quantities are the totals of mass, momentum and energy, and Fourier
+    components of the densities of mass, momentum and energy.  The Fourier components have the
+    longest wavelength along each axis that is divided into cells.
     """
     place, v = (run.position[frames] - run.lower) / run.edges, own_motion(run, frames)
     waves, found = [np.ones(place.shape[:2])], 1.0
@@ -161,11 +162,11 @@ def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
 
 
 def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[Block], float]:
-    """Return the blocks of time of all runs, and the largest expected correlation of neighbours.
+    """Return the blocks of time of all runs, and an upper bound of the result of `kinship`.
 
-    The largest expected correlation is the correlation of the means over neighbouring blocks of a
-    series whose autocorrelation function is exp(-t).  If there are too few blocks for an error, the
-    correlation is NaN.
+    The upper bound is the correlation of neighbouring blocks, as `kinship` defines it, that is
+    expected for a series with an exponential autocorrelation function.  If there are too few blocks
+    for an error, the upper bound is NaN.
     """
     refuse_others(runs)
     steady = [steady_frames(run, skip) for run in runs]
@@ -185,11 +186,12 @@ def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[B
 
 
 def kinship(members: Members, blocks: list[Block], most: float) -> np.ndarray:
-    """Return the correlations (F,) of neighbouring blocks for F fields (G, F, C).
+    """Return, for each of F fields (G, F, C), the correlation (F,) of neighbouring blocks of time.
 
-    A correlation is twice the sum of products of neighbouring deviations, divided by the sum of
-    squared deviations.  Both sums include all cells, because a single cell has too few blocks for
-    an estimate.  The correlations are limited to the range from 0 to `most`.
+    If d_k is the deviation of block k from the mean, the correlation is twice the sum of the
+    products d_k d_(k+1), divided by the sum of the squares d_k^2.  The sums of products and of
+    squares include all cells, because a single cell has too few blocks for an estimate.  The
+    correlations are limited to the range from 0 to `most`.
     """
     size, same = len(blocks), [a.run is b.run for a, b in pairwise(blocks)]
     rest = np.nan_to_num(members.rests())
@@ -203,7 +205,7 @@ def kinship(members: Members, blocks: list[Block], most: float) -> np.ndarray:
 
 
 def reach(run: Run, cells: Cells, axis: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return start and end, in each cell, of the range that centres can reach along an axis."""
+    """Return start and end, in each cell along an axis, of the range accessible to disk centres."""
     gap = 0 if run.periodic[axis] else radius
     sides = np.linspace(0, run.edges[axis], cells[axis] + 1)
     sides = run.lower[axis] + sides.clip(gap, run.edges[axis] - gap)
@@ -211,7 +213,7 @@ def reach(run: Run, cells: Cells, axis: int, radius: float) -> tuple[np.ndarray,
 
 
 def places(run: Run, cells: Cells) -> np.ndarray:
-    """Return the centres of the parts of cells that the centres of disks can reach.
+    """Return the midpoint of the part of each cell that is accessible to the centres of disks.
 
     Parameters
     ----------
@@ -237,7 +239,8 @@ def places(run: Run, cells: Cells) -> np.ndarray:
 def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
     """Return the area (C,) of each cell that centres of disks with the given radius can reach.
 
-    In cells beside obstacles, the error is at most 0.5 % of the area of a cell.
+    In cells beside obstacles, the accessible area is approximate, with an error of at most 0.5 % of
+    the area of a cell.
     """
     spans, inner = [], []
     step = np.sqrt(run.edges.prod() / POINTS)
@@ -302,9 +305,10 @@ BY_FRAMES = np.array([name.startswith(("density", "stress", "heat")) for name in
 def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
     """Return the fields (12, C) that follow from `sums`; fields of cells without disks are NaN.
 
-    In cells with fewer than `FEWEST_DISKS` disks, kT, stress and heat flux are NaN.  A flow with
-    the gradient g changes by g h across a cell of width h.  This change of the flow contributes m
-    (g h)^2 / 12 per disk to the sum of m v v, and the contribution is subtracted.
+    In cells with fewer than `FEWEST_DISKS` disks, kT, stress and heat flux are NaN.  If the flow
+    velocity has the gradient g, the flow velocity changes by g h across a cell of width h.  The
+    variation of the flow velocity within the cell contributes m (g h)^2 / 12 per disk to the sum of
+    m v v; `of_sums` subtracts this contribution.
     """
     frames, n, dense, mass, mx, my, xx, xy, yy, qx, qy, turning = total
     u, v, density = mx / mass, my / mass, dense / frames
@@ -329,7 +333,7 @@ def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
 
 
 class Fields(NamedTuple):
-    """Fields of runs of one input."""
+    """Fields measured in cells, averaged over runs of one input."""
 
     found: dict[str, Estimate]  # (C,) by name
     values: dict[str, np.ndarray]  # (G, C) pseudo-values of the blocks
@@ -377,8 +381,8 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     parts = np.stack([sums(block, cells, areas, own) for block in blocks])
     weights = parts[:, np.where(BY_FRAMES, 0, 1)]
     values, share = jackknife(lambda total: of_sums(total, run, cells), parts, weights)
-    # If the total momentum is conserved, the thermal energy of all disks is smaller
-    # (docs/theory.md).
+    # If the total momentum is conserved, the total thermal energy of N disks is smaller than N kT
+    # (docs/theory.md). The temperature is corrected for this difference.
     values[:, NAMES.index("temperature")] *= run.n_disks / free_disks(run)
     for axis, name in enumerate(("kT_x", "kT_y")):
         values[:, NAMES.index(name)] *= run.n_disks / (run.n_disks - comoving(run)[axis])
@@ -430,12 +434,12 @@ def fluxes(blocks: list[Block], axis: int) -> Members:
 def expected(
     run: Run, axis: int, x: np.ndarray, flux: Fluxes, middle: tuple[float, float]
 ) -> np.ndarray:
-    """Predict the flow, kT and density (P, 3) at positions x from the values in the middle.
+    """Predict flow, kT and density (P, 3) at positions x from flow and kT midway between the walls.
 
     The flow u is parallel to the walls, and the pressure is uniform.  The equations dT/dx =
     -(energy - shear u) / conductivity and du/dx = -shear / viscosity are integrated, where `energy`
-    and `shear` are fluxes.  If a gas with these fluxes would require a negative temperature or a
-    density above close packing, ValueError is raised.
+    and `shear` are fluxes.  If no gas can have the given fluxes, because its temperature would be
+    negative or its density above close packing, ValueError is raised.
     """
     diameter, mass = 2 * run.radius[0], run.mass[0]
     per_disk = np.pi * diameter**2 / 4
@@ -481,7 +485,8 @@ def has_theory(runs: list[Run], axis: int) -> bool:
     Returns
     -------
     bool
-        whether two opposite walls exist, and the disks are smooth, elastic and of one species
+        whether the only walls are two opposite sides, and the disks are smooth, elastic and of one
+        species
 
     Examples
     --------

@@ -18,7 +18,7 @@ class Turns(NamedTuple):
 
 
 def why_unknown(run: Run, log: EventLog) -> str:
-    """Return the reason why the event log does not determine the paths, or an empty text."""
+    """Return the reason why the event log does not determine the paths; '' if there is none."""
     if log.momentum_change is None:
         return "the log has no momentum_change"
     if run.nature & KICKED:
@@ -30,14 +30,14 @@ def seen(run: Run, log: EventLog, frames: list[int]) -> np.ndarray:
     """Return the number of events in the event log before each frame, (T,)."""
     if run.event_count is None:
         return np.searchsorted(log.time, run.time[frames], "right")
-    # The counts of events of all disks determine this number even if several events have the same
-    # time.
+    # The number of events before a frame follows from the event counts of all disks even if several
+    # events occurred at the time of the frame.
     hits = run.event_count[frames].sum(axis=1, dtype=np.int64)
     return np.searchsorted(np.cumsum(1 + (log.j > 0)), hits, "right")
 
 
 def turns_between(run: Run, log: EventLog, frames: list[int], ends: np.ndarray) -> Turns:
-    """Return all collisions between `frames`; `ends` is the number of events before each frame."""
+    """Return the collisions from the first to the last of `frames`; `seen` computes `ends`."""
     if log.momentum_change is None:
         raise ValueError("the log has no momentum_change")
     some = slice(ends[0], ends[-1])
@@ -50,7 +50,8 @@ def turns_between(run: Run, log: EventLog, frames: list[int], ends: np.ndarray) 
     signs = np.where(order < len(i), 1, -1)[:, None]
     event, disk, frame = event[order] + ends[0], disk[order], frame[order]
     gain = signs * log.momentum_change[event] / run.mass[disk, None]
-    # The cumulative sums of velocity changes start at 0 for each disk and each frame.
+    # Velocity changes are summed separately for each disk and for each interval that starts at a
+    # frame.
     first = np.flatnonzero(np.diff(frame * run.n_disks + disk, prepend=-1))
     sums = np.cumsum(gain, axis=0)
     sums -= np.repeat(sums[first] - gain[first], np.diff(first, append=len(disk)), axis=0)

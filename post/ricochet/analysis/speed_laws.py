@@ -3,10 +3,11 @@
 The speeds of each frame are scaled by the energy of the frame, so that conserved and slowly
 fluctuating energies do not influence the test.  Scaled speeds deviate less from the expected
 distribution than independent values would (Lilliefors, Journal of the American Statistical
-Association 62, 399 (1967)).  The p-values therefore follow from random frames with the numbers of
-disks and the scaling of the measured frames.  The velocities in a random frame are uniformly
-distributed on the sphere of constant energy.  Along `comoving` axes, the velocities are relative to
-the centre of mass.  Correlated frames are weighted according to their statistical inefficiency.
+Association 62, 399 (1967)).  The p-values are therefore computed from random frames, which have as
+many disks as the measured frames, and whose speeds are scaled by the energy of the frame, too.  The
+velocities in a random frame are uniformly distributed on the sphere of constant energy.  Along the
+axes that the function `equilibrium.comoving` returns, the velocities are relative to the centre of
+mass.  Correlated frames are weighted according to their statistical inefficiency.
 """
 
 from collections.abc import Sequence
@@ -27,10 +28,12 @@ BINS = 30  # of equal probability
 DRAWN = 4000  # drawn samples
 MOST = 1000  # speeds of a drawn sample; more have the same distribution of the scaled statistics
 MANY = 2000  # number of disks above which the motion of the centre of mass is negligible
-#: The noise of a statistical inefficiency is inversely proportional to the square root of the
-#: number of frames F. An estimate is used only if it exceeds 1 by more than a threshold divided by
-#: sqrt(F). The threshold is one standard deviation of the noise for cumulative counts, about two of
-#: which are independent. The threshold is two standard deviations for the counts in all bins.
+#: The statistical error of an estimated statistical inefficiency is proportional to 1 / sqrt(F),
+#: where F is the number of frames. An estimate of the statistical inefficiency is used only if the
+#: estimate exceeds 1 by more than a threshold divided by sqrt(F). For the Kolmogorov-Smirnov test,
+#: the threshold is one standard deviation of an estimate from cumulative counts, about two of which
+#: are independent. For the chi-square test, the threshold is two standard deviations of an estimate
+#: from the counts in all bins.
 LEAST_DISTANCE, LEAST_CHI2 = 1.4, 4 / np.sqrt(BINS - 1)
 TAIL = 0.05  # fraction of the samples that an exponential tail replaces
 
@@ -49,8 +52,8 @@ class SpeedTest(NamedTuple):
 def shares(run: Run, frames: Index, name: str) -> np.ndarray:
     """Return the energies (F, n) of the disks of a species, divided by the mean energy per disk.
 
-    In equilibrium, the mean energy is that of all disks in the frame.  Otherwise the mean energy is
-    that of the species in the frame.
+    For a run in equilibrium, the mean is over all disks in the frame.  For any other run, the mean
+    is over the disks of the species in the frame.
     """
     energy, own = thermal_energy(run, frames), run.of_species(name)
     unit = energy if run.nature.in_equilibrium else energy[:, own]
@@ -58,7 +61,7 @@ def shares(run: Run, frames: Index, name: str) -> np.ndarray:
 
 
 class Sample(NamedTuple):
-    """Properties of frames in which disks of one species share a fixed energy with other disks."""
+    """Properties of frames in which the disks of a species share an energy with other disks."""
 
     sharing: int  # disks that share the energy
     own: int  # disks of the species
@@ -73,7 +76,7 @@ class Sample(NamedTuple):
         return finite_n_cdf(self.sharing, all(self.axes) and self.own == self.sharing)
 
     def smaller(self) -> "Sample":
-        """Return a sample of about `MOST` speeds, whose statistics have the same distribution."""
+        """Return a sample of about `MOST` speeds that yields the same p-values as this sample."""
         most = self
         if self.sharing > MANY or not any(self.axes):
             own = min(self.own, MANY)
@@ -81,7 +84,7 @@ class Sample(NamedTuple):
         return most._replace(frames=min(self.frames, -(-MOST // most.own)))
 
     def draw(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Return `count` random samples of the energies in `shares`, (count, frames * own)."""
+        """Return `count` random samples (count, frames * own) of energies, in units of the mean."""
         size = count * self.frames
         if self.mass:
             mass = np.array(self.mass)
@@ -98,7 +101,7 @@ class Sample(NamedTuple):
 
 
 def sample_of(run: Run, name: str, frames: int) -> Sample:
-    """Return the properties of a sample of `frames` frames, for the disks of a species in a run."""
+    """Return the `Sample` that describes the disks of a species in `frames` frames of a run."""
     own, axes = run.of_species(name), tuple(map(bool, comoving(run) | bool(run.shear_rate)))
     count = int(own.sum())
     mass = (*run.mass[own], *run.mass[~own]) if any(axes) and run.n_disks <= MANY else ()
@@ -106,9 +109,10 @@ def sample_of(run: Run, name: str, frames: int) -> Sample:
 
 
 def statistics_of(values: np.ndarray) -> np.ndarray:
-    """Return n D^2 and chi^2 (2, S) of S samples (S, n), compared with a uniform distribution.
+    """Compare S samples (S, n) with the uniform distribution; return n D^2 and chi^2, (2, S).
 
-    The distribution is uniform from 0 to 1.  D is the Kolmogorov-Smirnov distance.
+    The uniform distribution is over the interval from 0 to 1.  D is the Kolmogorov-Smirnov
+    distance.
     """
     samples, n = values.shape
     ranks, ordered = np.arange(n) / n, np.sort(values, axis=1)
@@ -121,7 +125,7 @@ def statistics_of(values: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def by_chance(sample: Sample) -> np.ndarray:
-    """Return n D^2 and chi^2 (2, DRAWN) of random samples, each sorted in increasing order."""
+    """Return sorted values of n D^2 and sorted values of chi^2, (2, DRAWN), of random samples."""
     rng, law, parts = np.random.default_rng(1), sample.law(), []
     for _ in range(10):
         parts.append(statistics_of(law(np.sqrt(sample.draw(rng, DRAWN // 10)))))
@@ -132,7 +136,9 @@ def chance(found: float, drawn: np.ndarray) -> float:
     """Return the probability that a random statistic exceeds the measured statistic `found`.
 
     The probability is the fraction of the sorted random statistics `drawn` (S,) that exceed
-    `found`.  Above their 95 % quantile, the distribution is replaced by an exponential tail.
+    `found`.  If `found` is above the 95 % quantile of the random statistics, the probability
+    follows instead from an exponential distribution that is fitted to the random statistics above
+    this quantile.
     """
     first = int(len(drawn) * (1 - TAIL))
     if found <= drawn[first]:
@@ -142,11 +148,11 @@ def chance(found: float, drawn: np.ndarray) -> float:
 
 
 def per_frame(counts: np.ndarray, least: float) -> float:
-    """Return the statistical inefficiency of counts in B bins and F frames, (F, B), of a run.
+    """Return the statistical inefficiency of `counts` (F, B), the counts in B bins in each frame.
 
-    The result is 1 unless the estimate exceeds 1 by more than `least` / sqrt(F), which is the size
-    of random deviations.  Without this threshold, the noise of the estimate would distort the
-    p-value of chi^2 if there are many bins.
+    If the estimate does not exceed 1 by more than `least` / sqrt(F), which is the size of random
+    deviations, the function returns 1.  Without the threshold `least` / sqrt(F), the noise of the
+    estimate would distort the p-value of chi^2 if there are many bins.
     """
     found = statistical_inefficiency(counts) if len(counts) > 2 else 1.0
     return found if found > 1 + least / np.sqrt(len(counts)) else 1.0
@@ -167,10 +173,10 @@ def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> Speed
     Returns
     -------
     SpeedTest
-        both statistics with their probabilities.  If the expected distribution is not known, `law`
-        is "none" and these numbers are NaN. The distribution is not known for disks that conserve
-        their angular momentum in a round container, and for fewer than three disks that share a
-        fixed energy
+        statistics and p-values of the Kolmogorov-Smirnov test and of the chi-square test.  If the
+        expected distribution is not known, `law` is "none" and all statistics and p-values are NaN.
+        The distribution is not known for disks that conserve their angular momentum in a round
+        container, and for fewer than three disks that share a fixed energy
 
     Examples
     --------

@@ -1,8 +1,8 @@
 """Means of correlated series in time, with errors and warnings; all functions of `estimates`.
 
-Two functions compute errors.  The function `estimate` is for independent values, such as the
-results of runs that differ by their seed.  The function `correlated_mean` is for a single series in
-time, whose samples are correlated.
+The functions `estimate` and `correlated_mean` compute a mean and its error.  The function
+`estimate` is for independent values, such as the results of runs that differ by their seed.  The
+function `correlated_mean` is for a single series in time, whose samples are correlated.
 """
 
 from collections.abc import Sequence
@@ -72,14 +72,15 @@ class SeriesMean(NamedTuple):
     freedom: float = np.inf  # degrees of freedom of the error
 
     def scaled(self, factor: float, offset: float = 0.0) -> "SeriesMean":
-        """Return the mean of the series offset + factor x, where x is the original series."""
+        """Return the mean of the series offset + factor x, if this is the mean of the series x."""
         return self._replace(mean=offset + factor * self.mean, error=abs(factor) * self.error)
 
 
 def cells(series: np.ndarray, count: int) -> np.ndarray:
     """Return the means of about `count` equal parts of a series (T,).
 
-    Samples at the start of the series that do not fill a part are left out.
+    If the length of the series is not a multiple of the length of a part, the remaining samples at
+    the start of the series are left out.
     """
     width = max(1, len(series) // count)
     return series[len(series) % width :].reshape(-1, width).mean(axis=1)
@@ -130,22 +131,22 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
 def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
     """Estimate the mean of a correlated series, or the ratio of the sums of two correlated series.
 
-    The error is that of the mean of the series amount - ratio * per, which is estimated from the
-    slowest Fourier components of this series.
+    Let R be the ratio of the sums.  The error of R is the error of the mean of the series (amount -
+    R per) / (mean of per), estimated from the slowest Fourier components of the series.
 
     Parameters
     ----------
     amount : array_like
         (T,) samples of a series in equilibrium, such as numbers of collisions
     per : array_like
-        (T,) series by whose sum the sum of the amounts is divided, such as durations; or a number
+        (T,) series whose sum divides the sum of `amount`, such as durations; a number stands for a
+        constant series
 
     Returns
     -------
     SeriesMean
-        the ratio of the sums with its error, and the effective number of independent samples and
-        the drift of the series; the error is NaN if a few parts of the series contain most of the
-        sum of `per`
+        the ratio of the sums with its error, the effective number of independent samples, and the
+        drift; if a few parts of the series `per` contain most of its sum, the error is NaN
 
     Examples
     --------
@@ -172,11 +173,13 @@ def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> Series
 def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
     """Return standard error of the mean, degrees of freedom and drift of a series (T,).
 
-    The square of the error is the mean square of the first coefficients of the cosine transform,
-    divided by the length of the series.  The method is that of Lazarus, Lewis, Stock and Watson,
-    Journal of Business and Economic Statistics 36, 541 (2018).  The number of coefficients is
-    limited to waves that are slower than the correlations of the series.  The drift is the ratio of
-    the first coefficient to the following coefficients, expressed as a standard Gaussian variable.
+    The means over parts of the series are transformed by a discrete cosine transform.  The squared
+    standard error is the mean square of the first coefficients after the constant, divided by the
+    number of parts.  The method is that of Lazarus, Lewis, Stock and Watson, Journal of Business
+    and Economic Statistics 36, 541 (2018).  Only cosine waves that are slower than the correlations
+    of the series are used.  If a is the first coefficient and b the root mean square of the
+    following coefficients, -a / b has Student's distribution for a series without a drift.  The
+    returned drift is -a / b, converted to a Gaussian variable with variance 1.
     """
     parts = cells(series, FINE)
     per_sample = max(1e-9, statistical_inefficiency(parts))
@@ -258,12 +261,12 @@ def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
 
 
 def squares(means: Sequence[SeriesMean]) -> np.ndarray:
-    """Return the squares (R,) of the standard errors of means, which exclude Student's factor t."""
+    """Return the squares (R,) of the standard errors of means, without Student's factor t."""
     return np.array([(one.error / student(one.freedom + 1)) ** 2 for one in means])
 
 
 def scatter_p(means: Sequence[SeriesMean]) -> float:
-    """Return the probability that means with these errors scatter at least as much as `means`."""
+    """Return the p-value of the hypothesis that the means differ only because of their errors."""
     mean, error, _, _, freedom = np.array(means).T
     if len(means) < 2 or not np.all(error > 0):
         return 1.0
@@ -282,7 +285,8 @@ def has_drift(mean: SeriesMean) -> bool:
     Returns
     -------
     bool
-        whether the probability that such a drift occurs by chance is below `UNLIKELY`
+        whether a drift of at least the measured size would occur by chance with a probability below
+        `UNLIKELY`
 
     Examples
     --------
@@ -295,8 +299,8 @@ def has_drift(mean: SeriesMean) -> bool:
 def has_trend(series: np.ndarray) -> bool:
     """Determine whether a straight line explains most of the variance of a series.
 
-    The function `correlated_mean` interprets such a trend as a long autocorrelation and therefore
-    finds no significant drift.
+    For a series that is nearly a straight line, the function `correlated_mean` finds no significant
+    drift, because the function interprets the trend as a long autocorrelation.
 
     Parameters
     ----------

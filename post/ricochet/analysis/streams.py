@@ -44,8 +44,8 @@ def stream_function(run: Run, flux: np.ndarray) -> np.ndarray:
     _, rows, columns = flux.shape
     edges = run.edges / (columns, rows)
     unknowns, corners = corner_unknowns(rows, columns, run.periodic)
-    # Each row of the matrix `corners` expresses psi at one corner as a sum of unknowns. Differences
-    # of psi between corners of a cell determine the flux in the cell.
+    # Each row of the matrix `corners` expresses psi at one corner as a sum of unknowns. The flux in
+    # a cell is determined by differences of psi between the corners of the cell.
     number = np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, columns + 1)
     lower, upper, left, right = number[:-1], number[1:], number[:, :-1], number[:, 1:]
     ends = slice(None, -1), slice(1, None)
@@ -66,7 +66,7 @@ def stream_function(run: Run, flux: np.ndarray) -> np.ndarray:
 
 
 def differences(terms: list[tuple[np.ndarray, float]], count: int) -> scipy.sparse.csr_array:
-    """Return a sparse matrix; each row adds values at the corners of one cell, times factors."""
+    """Return a sparse matrix; each row sums corner values of one cell, multiplied by factors."""
     cells = terms[0][0].size
     rows = np.tile(np.arange(cells), len(terms))
     columns = np.concatenate([corner.ravel() for corner, _ in terms])
@@ -77,12 +77,13 @@ def differences(terms: list[tuple[np.ndarray, float]], count: int) -> scipy.spar
 def corner_unknowns(
     rows: int, columns: int, periodic: np.ndarray
 ) -> tuple[int, scipy.sparse.csr_array]:
-    """Return the number of unknowns, and the matrix from unknowns to values at the corners.
+    """Return the number of unknowns, and the matrix that converts unknowns to psi at the corners.
 
-    The first unknowns are the values of psi at corners that are not on walls; all periodic images
-    of a corner have one common unknown.  Psi is constant on each wall, and is 0 on the lower wall
-    and on the left wall.  For each periodic axis, a further unknown is the flux along this axis
-    through the whole box, which is the difference of psi between the opposite sides.
+    The unknowns of the fit are the values of psi at corners that are not on walls, followed by one
+    flux for each periodic axis.  All periodic images of a corner share one unknown.  Psi is
+    constant on each wall, and is 0 on the lower wall and on the left wall.  The flux along a
+    periodic axis through the whole box is, except for its sign, the difference of psi between the
+    two sides parallel to this axis.
     """
     y, x = np.meshgrid(np.arange(rows + 1), np.arange(columns + 1), indexing="ij")
     fixed = np.zeros(x.shape, dtype=bool)

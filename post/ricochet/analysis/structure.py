@@ -37,7 +37,7 @@ def periods(run: Run) -> np.ndarray:
 
 
 def refuse(run: Run, *traits: str) -> None:
-    """Raise an error if the run has one of the given traits."""
+    """Raise an error if the run has one of the given properties (traits of `nature`)."""
     law = "structure is found in boxes at rest" + ", S(k) in periodic ones" * ("walls" in traits)
     allow(run, law, *TRAITS.keys() - set(traits))
 
@@ -120,8 +120,9 @@ def structure_factor(
     edges : numpy.ndarray
         (B + 1,) edges of the bins of k, in 1 / mean diameter
     pair : tuple of str, optional
-        names of two species; S(k) is then the product of the sums over the disks of each species,
-        divided by the geometric mean of the numbers of disks [all disks]
+        names of two species; if two species are given, S(k) is the product of the sums of exp(i k
+        x) over the disks of each species, divided by the geometric mean of their numbers of disks
+        [all disks]
 
     Returns
     -------

@@ -3,7 +3,7 @@
 The pressure P can be measured in three independent ways: from the virial of the pair collisions,
 from the collision rate of equal disks, and from the force on the sides.  The compressibility factor
 is Z = P / (n kT).  If the kinetic energy is conserved, kT is exact; otherwise kT is a mean over
-time.  `equilibrium` describes the parameter `skip`.
+time.  The docstring of the module `equilibrium` describes the parameter `skip`.
 """
 
 from typing import NamedTuple
@@ -48,8 +48,9 @@ __all__ = [
 
 TIMED = ("every_time", "at", "per_decade")  # samples are taken at times, not after collisions
 MANY = 1e8  # number of disks above which the effect of a fixed energy is negligible
-#: Traits (see `nature`) that a run may have if an equation of state applies to the run. A run
-#: without any trait has equal smooth disks with conserved energy in a periodic box.
+#: Properties (traits of `nature`) of runs to which an equation of state applies. A run that has
+#: none of the traits of `nature` consists of equal smooth disks with conserved energy in a periodic
+#: box.
 FLUID = ("walls", "thermal_walls", "thermostatted", "rough", "rotating", "mixture")
 
 
@@ -71,8 +72,8 @@ def temperature(run: Run, skip: float | None = None) -> SeriesMean:
     """Estimate kT in equilibrium.
 
     Samples that are taken after equal numbers of collisions are more frequent while a gas is hot,
-    because the collision rate is proportional to sqrt(kT).  Such samples therefore have the weight
-    1 / sqrt(kT).
+    because the collision rate is proportional to sqrt(kT).  In the mean over samples that are taken
+    after equal numbers of collisions, each sample is therefore weighted with 1 / sqrt(kT).
 
     Parameters
     ----------
@@ -107,7 +108,7 @@ def temperature(run: Run, skip: float | None = None) -> SeriesMean:
 
 
 def between(time: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the durations between samples, and the integral of the value over each duration."""
+    """Return the intervals between samples, and the integral of `value` over each interval."""
     return np.diff(time), np.diff(time) * (value[1:] + value[:-1]) / 2
 
 
@@ -242,10 +243,10 @@ def steps(run: Run, skip: float | None = None) -> Steps:
 
 
 def over_kt(amount: np.ndarray, s: Steps, power: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return two series; the ratio of their means is the amount per time, divided by kT^power.
+    """Return two series; the ratio of their means is `amount` per time, divided by kT^power.
 
-    The ratio is exact to first order in the deviations of kT from its mean.  The error of the ratio
-    therefore includes the correlation between the amount and kT.
+    The second series depends on kT to first order in the deviations of kT from its mean.  An error
+    that is estimated from both series therefore includes the correlation between `amount` and kT.
     """
     kt = float(np.average(s.kt, weights=s.time))
     return amount * kt**-power, s.time * (1 + power * (s.kt / kt - 1))

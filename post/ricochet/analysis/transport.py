@@ -1,19 +1,19 @@
 """Transport coefficients: viscosities, thermal conductivity and diffusion coefficients.
 
-The functions for diffusion require equally spaced frames; a lag is a number of frames.  The
-argument `frames` of these functions contains the frames in equilibrium.  The integral of <v(0)
-v(t)> requires no sum over frames, because the integral of v is the displacement x(t) - x(0), which
-is exact for any interval between frames (see `correlations`).
+The functions for diffusion require equally spaced frames; a lag is a number of frames.  In the
+functions for diffusion, the argument `frames` contains the frames in equilibrium.  The integral of
+<v(0) v(t)> requires no sum over frames, because the integral of v is the displacement x(t) - x(0),
+which is exact for any interval between frames (see `correlations`).
 
 Viscosities and conductivity follow from Einstein-Helfand relations.  A Helfand moment is the time
 integral of the total flux of momentum or energy.  In free flight, a disk contributes m v_a v_b to
 the flux of momentum and (m v^2 / 2) v to the flux of energy.  A collision transfers the momentum
 dP_a and the energy dE over the distance r = x_i - x_j.  Like a mean square displacement, the mean
-square of a Helfand moment grows linearly in time.  A viscosity is half the slope of the mean square
-divided by A kT, and the conductivity is half the slope divided by A kT^2, where A is the area of
-the box.  See Helfand, Physical Review 119, 1 (1960), and Alder, Gass and Wainwright, Journal of
-Chemical Physics 53, 3813 (1970).  If `output.helfand` is true, the program accumulates the moments
-exactly and writes the moments as observables.
+square of a Helfand moment grows linearly in time.  Let s be the slope of the mean square as a
+function of time, and A the area of the box.  The viscosities are s / (2 A kT), and the conductivity
+is s / (2 A kT^2).  See Helfand, Physical Review 119, 1 (1960), and Alder, Gass and Wainwright,
+Journal of Chemical Physics 53, 3813 (1970).  If `output.helfand` is true, the program accumulates
+the moments exactly and writes the moments as observables.
 
 The viscosities of a mixture follow from the stress of all disks together.  The conductivity of a
 mixture does not follow from the energy moment alone, because diffusing species transport their
@@ -47,9 +47,10 @@ __all__ = [
 
 PER_FREE_TIME = 4  # sufficient number of samples of the moments
 SUMS = ("helfand_stress", "virial_tensor", "helfand_heat", "heat_virial")
-#: HEAT is the decay time of the heat flux, in mean free times, in a dilute gas of equal disks,
-#: where this time is longest. MEMORY is the lag t of the result, in mean free times. The mean slope
-#: between the lags t / 2 and t is less than 0.2 % below the slope at infinite lag.
+#: HEAT is the decay time of the heat flux in a dilute gas of equal disks, in mean free times. The
+#: decay time is longest in a dilute gas. MEMORY is the lag t, in mean free times, at which
+#: transport coefficients are evaluated. The mean slope of a mean square between the lags t / 2 and
+#: t is less than 0.2 % below its slope at infinite lag.
 HEAT, MEMORY = 2.06, 20.0
 CLOSE = 1e-6  # relative difference of steps that are regarded as equal
 UNLIKE = 0.05  # largest relative difference of Enskog's viscosity between runs of one group
@@ -93,8 +94,8 @@ def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
 def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
     """Return the lag, in numbers of frames, in which sound crosses the box.
 
-    At longer lags, the size of the box influences diffusion.  The returned lag is at most an eighth
-    of the shortest run.
+    At lags longer than this time, the size of the box influences diffusion.  The returned lag is at
+    most an eighth of the shortest run.
     """
     run, shortest = runs[0], min(f.stop - f.start for f in frames)
     kt = td.temperature(run).mean
@@ -106,12 +107,13 @@ def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
 def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean]:
     """Estimate the diffusion coefficient D from displacements and from velocities.
 
-    The first estimate is the mean of d<r^2>/dt / 4 over the lags from `lag` / 2 to `lag`.  The
-    second estimate is the mean of half the integral of <v(0) v(t)> over these lags.  Each origin in
-    time contributes one value, so that the error includes all correlations.  Between frames, the
-    integral is interpolated by a cubic curve with the known slopes <v(0) v(t)>. If the correlation
-    decays exponentially, the error of the interpolation is at most 0.2 % of D, and the error is far
-    smaller at lags where D(t) is constant.
+    The first estimate is a quarter of the slope d<r^2>/dt of the mean square displacement, averaged
+    over the lags from `lag` / 2 to `lag`.  The second estimate is the mean of I(t) / 2 over the
+    same lags t, where I(t) is the integral of <v(0) v> from 0 to t.  Each time origin contributes
+    one value to a series, so that the error of the mean of the series includes all correlations.
+    Between frames, I(t) is interpolated by a cubic curve with the known slopes <v(0) v(t)>. If the
+    velocity autocorrelation decays exponentially, the interpolation changes D by at most 0.2 %, and
+    by far less at lags where D(t) is constant.
     """
     step, half = float(run.time[1] - run.time[0]), lag // 2
     x, v = motion(run, frames)
@@ -130,10 +132,11 @@ def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean
 def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     """Return the sampling interval and the Helfand moments after a given time.
 
-    The mean growth of each moment is subtracted.  The moments (T, C) for the viscosity are the
-    momentum moments xy and (xx - yy) / 2, the moment for the bulk viscosity is (xx + yy) / 2, and
-    the moments for the conductivity are the energy moments x and y.  All moments are relative to
-    the centre of mass.  If the run contains no moments at equal intervals, RunError is raised.
+    Each moment is reduced by its mean growth in time, so that its first and last values are 0.  The
+    moments (T, C) for the viscosity are the momentum moments xy and (xx - yy) / 2, the moment for
+    the bulk viscosity is (xx + yy) / 2, and the moments for the conductivity are the energy moments
+    x and y.  All Helfand moments are relative to the centre of mass.  If the run contains no
+    moments at equal intervals, RunError is raised.
     """
     allow(run, TAKES, "mixture")
     if "helfand_heat" not in run.observables:
@@ -148,8 +151,9 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
         )
     flown, handed, heat, heat_handed = (part.value[first:-1] for part in parts)
     momentum = (flown + handed).reshape(-1, 2, 2)
-    # The energy moments are converted to the frame of the centre of mass. All other terms of this
-    # conversion grow linearly in time and are subtracted with the mean growth.
+    # The energy moments are converted to the frame of the centre of mass by the subtraction of its
+    # velocity times the momentum moment. Further terms of the conversion grow linearly in time and
+    # are subtracted with the mean growth.
     heat = heat + heat_handed - np.einsum("a,tab->tb", drift(run), momentum)
     xx, xy, yy = momentum[:, 0, 0], momentum[:, 0, 1], momentum[:, 1, 1]
     groups = (xy, (xx - yy) / 2), ((xx + yy) / 2,), heat.T
@@ -164,16 +168,16 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
 def squares(moment: np.ndarray, lag: int) -> np.ndarray:
     """Return squares (T - lag,) of the increments of a moment (T, C) over `lag` samples.
 
-    The squares are averaged over the C components.  Subtracting the mean growth, which was
-    estimated from the same series, reduced the squares by the fraction lag / (T - 1); the result is
-    corrected for this reduction.
+    The squares are averaged over the C components of the moment.  Because the subtracted mean
+    growth was estimated from the same series, the squares are too small by the fraction lag / (T -
+    1).  The function corrects this bias.
     """
     gain = moment[lag:] - moment[: len(moment) - lag]
     return np.mean(gain**2, axis=1) / (1 - lag / (len(moment) - 1))
 
 
 def running(moment: np.ndarray, step: float, at: np.ndarray) -> np.ndarray:
-    """Return half the slope of the mean square of a moment between successive lags (in samples)."""
+    """Return half the slope of the mean square of a moment between successive lags in `at`."""
     mean = np.array([squares(moment, lag).mean() for lag in at])
     return np.diff(mean, prepend=0) / np.diff(at, prepend=0) / (2 * step)
 
@@ -181,7 +185,8 @@ def running(moment: np.ndarray, step: float, at: np.ndarray) -> np.ndarray:
 def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
     """Estimate half the slope of the mean square of a moment between `lag` / 2 and `lag`.
 
-    Each origin in time contributes one value, as in `diffusion`.
+    Each time origin contributes one value to a series, so that the error of the mean of the series
+    includes all correlations.
     """
     half = lag // 2
     near, far = squares(moment, half), squares(moment, lag)
