@@ -73,7 +73,7 @@ def listed(values: set[float]) -> str:
 
 
 def numbers_of(run: Run) -> dict[str, float]:
-    """Return the numerical input parameters that a caption contains if they differ between runs."""
+    """Return the numerical input parameters that a caption states if runs differ in them."""
     found = {**run.parameters.get("box", {}), **run.parameters.get("contact", {})}
     if found.get("wall_restitution") == run.restitution:
         del found["wall_restitution"]
@@ -127,8 +127,9 @@ def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
 def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
     """Return the upper end of the colour scale of a film: the 99.5 % quantile of the values.
 
-    The quantile is computed from a selection of frames.  For displacements, which grow with time,
-    the quantile is computed from the last frame.
+    If the colours show displacements, which grow with time, the quantile is that of the values in
+    the last frame.  For all other quantities, the quantile is that of the values in about 40
+    frames.
     """
     some = [] if colour == "displacement" else frames[:: max(1, len(frames) // 40)]
     values = values_of(run, sorted({*some, frames[-1]}), colour)
@@ -147,7 +148,7 @@ def colour_map(colour: str) -> str:
 
 
 def chosen_colour(run: Run, wish: str | None) -> str:
-    """Return the quantity for colours, `wish` or the default; raise an error if it has no data."""
+    """Return the quantity for the colours of disks: `wish`, or a default if `wish` is None."""
     known = ("species", *COLOURINGS)
     if wish is not None and wish not in known:
         hint = did_you_mean(wish, known)

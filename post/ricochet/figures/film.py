@@ -1,4 +1,4 @@
-"""Films of runs in notebooks; a film is the page that the script `player.py` makes."""
+"""Films of runs in notebooks; a film is an interactive HTML page, which `player.py` generates."""
 
 import html
 import sys
