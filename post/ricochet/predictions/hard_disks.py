@@ -42,9 +42,10 @@ FLUID = np.array([
     (0.30, 2.06326), (0.35, 2.40150), (0.40, 2.82933), (0.45, 3.38054), (0.50, 4.10636),
     (CLOSE_PACKING / 1.6, 5.4963), (CLOSE_PACKING / 1.5, 6.6074), (CLOSE_PACKING / 1.4, 8.306),
 ])  # fmt: skip
-# No published values are known between the packing fraction 0.648 and freezing at 0.698. These
-# values of Z were computed with Ricochet from two runs of 8000 disks and 1000 collisions per disk
-# at each packing fraction, with errors below 0.1 %. The last value is that of 1024^2 disks in
+# Packing fractions and Z of the fluid near freezing. No published values are known between the
+# packing fractions 0.648 and 0.698. The values below 0.698 were computed with Ricochet from two
+# runs of 8000 disks and 1000 collisions per disk at each packing fraction; their errors are below
+# 0.1 %. The value at 0.698, where the fluid freezes, is the published value for 1024^2 disks in
 # `MELTING`.
 FREEZING = np.array([
     (0.66, 8.875), (0.67, 9.350), (0.68, 9.839), (0.69, 10.234),
@@ -80,7 +81,8 @@ MELTING = {
 def splines() -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
     """Return splines of Z (1 - eta)^2 and of the coefficient c of Z_N = Z + c / N.
 
-    The product Z (1 - eta)^2 is interpolated instead of Z, because it is smooth and close to 1.
+    The product Z (1 - eta)^2 is interpolated instead of Z, because the product is smooth and close
+    to 1.
     """
     eta, z = np.concatenate([FLUID, FREEZING]).T
     smooth = scipy.interpolate.CubicSpline(np.append(0, eta), np.append(1, z * (1 - eta) ** 2))
@@ -115,8 +117,8 @@ def henderson(eta: Number) -> Number:
 def simulated(eta: ArrayLike) -> np.ndarray:
     """Return Z = P / (n kT) of the fluid, interpolated between simulations.
 
-    The simulations are published, except for the simulations at packing fractions between 0.648 and
-    0.698.
+    Between the packing fractions 0.648 and 0.698, Z is from unpublished simulations with Ricochet.
+    At all other packing fractions, Z is from published simulations.
 
     Parameters
     ----------
@@ -192,15 +194,15 @@ def adiabat(
 ) -> np.ndarray:
     """Return temperatures (W,) of a gas between two walls, one of which moves slowly.
 
-    `widths` (W,) are the distances of the two walls.  The temperatures are divided by the
-    temperature at the first width.  If `walled` is true, the two sides parallel to the motion are
-    walls, too.  If `walled` is false, the momentum along the moving wall is conserved, and the
-    kinetic energy is (N - 1/2) kT instead of N kT.  A change dw of the width changes the kinetic
-    energy by -F dw.  The force F on the moving wall is P h minus the tension of the two walls
-    parallel to the motion, where h is the height.  The pressure P follows from `simulated`.
-    According to scaled particle theory a wall has the tension kT n r / (1 - eta) and a deficit of n
-    r (1 - eta) / (1 + eta) disks per length (Helfand, Frisch and Lebowitz, Journal of Chemical
-    Physics 34, 1037 (1961)).
+    `widths` (W,) are distances between the two walls.  The returned temperatures are divided by the
+    temperature at the first of these distances.  If `walled` is true, the two sides parallel to the
+    motion are walls, too.  If `walled` is false, the momentum along the moving wall is conserved,
+    and the kinetic energy is (N - 1/2) kT instead of N kT.  If F is the force of the gas on the
+    moving wall, a change dw of the width changes the kinetic energy by -F dw.  The force F is P h
+    minus the tension of the two walls parallel to the motion, where h is the height.  The pressure
+    P follows from `simulated`.  According to scaled particle theory a wall has the tension kT n r /
+    (1 - eta) and a deficit of n r (1 - eta) / (1 + eta) disks per length (Helfand, Frisch and
+    Lebowitz, Journal of Chemical Physics 34, 1037 (1961)).
     """
     area = count * math.pi * radius**2
     eta = np.geomspace(1e-12, FREEZING[-1, 0], 50001)  # far from the walls
@@ -247,9 +249,9 @@ def of_sizes(z: np.ndarray, eta: np.ndarray, alike: float) -> np.ndarray:
     """Return Z of a fluid of disks with different radii r from Z of equal disks.
 
     The argument `alike` is <r>^2 / <r^2>.  The formula is from Santos, Yuste and Lopez de Haro,
-    Molecular Physics 96, 1 (1999).  The second virial coefficient of the result is exact.  If Z of
-    equal disks is from scaled particle theory, the result is Z of the mixture in scaled particle
-    theory.
+    Molecular Physics 96, 1 (1999).  The second virial coefficient of the result is exact.  If `z`
+    is Z of equal disks in scaled particle theory, the returned value is Z of the mixture in scaled
+    particle theory.
     """
     return (1 - alike) / (1 - eta) + alike * z
 
@@ -303,7 +305,8 @@ def collision_rate(
     >>> round(hard_disks.collision_rate(2.0, 1.0, 1e4), 3)
     2.257
     """
-    # c_n is the mean relative speed at fixed energy, divided by that of Maxwell's distribution.
+    # c_n is the mean relative speed of two disks in a system with fixed total energy, divided by
+    # the mean relative speed of two disks whose velocities have Maxwell's distribution.
     c_n = math.exp(math.lgamma(free) - math.lgamma(free + 0.5)) * math.sqrt(free)
     return 4 * (z - 1) * c_n / (math.sqrt(math.pi) * diameter) * math.sqrt(kt / mass)
 
@@ -385,9 +388,9 @@ def haff_soft(law: Restitution, thermal: float) -> tuple[np.ndarray, np.ndarray,
     """Return w0 t, collisions per disk and K / K0 of a cooling gas of viscoelastic disks.
 
     w0 is the initial collision rate, t the time, K the kinetic energy and K0 its initial value.
-    The velocities have Maxwell's distribution.  If g is the relative normal speed of colliding
-    disks, u = m g^2 / 4 kT therefore has an exponential distribution.  The argument `thermal` is
-    the initial sqrt(kT/m).
+    The velocities are assumed to have Maxwell's distribution.  Therefore u = m g^2 / 4 kT has an
+    exponential distribution, where g is the relative normal speed of two colliding disks.  The
+    argument `thermal` is the initial sqrt(kT/m).
     """
     k, u = np.geomspace(1, 1e-26, 1000), np.linspace(0, 40, 2001)
     g = 2 * thermal * np.sqrt(k[:, None] * u)
@@ -501,10 +504,11 @@ def enskog(
 def contact_values(z: float, density: np.ndarray, diameter: np.ndarray) -> np.ndarray:
     """Return the pair correlations at contact (S, S) of a mixture of S species.
 
-    The error of these values is about 1 %.  The argument `z` is Z of equal disks with the packing
-    fraction of the mixture.  The formula is from Jenkins and Mancini, Journal of Applied Mechanics
-    54, 27 (1987).  As in Santos, Yuste and Lopez de Haro, Journal of Chemical Physics 117, 5785
-    (2002), the formula is used with an improved chi of equal disks, which follows from `z`.
+    The returned pair correlations have errors of about 1 %. The argument `z` is the compressibility
+    factor Z of a system of equal disks that has the same packing fraction as the mixture.  The
+    formula is from Jenkins and Mancini, Journal of Applied Mechanics 54, 27 (1987).  As in Santos,
+    Yuste and Lopez de Haro, Journal of Chemical Physics 117, 5785 (2002), the formula is used with
+    an improved chi of equal disks, which follows from `z`.
     """
     eta = math.pi / 4 * np.sum(density * diameter**2)
     mean = np.sum(density * diameter) / np.sum(density * diameter**2)
@@ -519,9 +523,9 @@ def enskog_mixture(
 
     The formulas are those of Enskog's theory in the first Sonine approximation, as in Lopez de
     Haro, Cohen and Kincaid, Journal of Chemical Physics 78, 2746 (1983), but in two dimensions.
-    The kinetic parts are multiplied by 1.022, which is the correction from higher approximations
-    for equal disks.  The bulk viscosity includes the effect of different temperatures of the
-    species during an expansion.
+    The kinetic part of the shear viscosity is multiplied by 1.022, because higher approximations
+    increase the viscosity of a dilute gas of equal disks by 2.2 %.  The bulk viscosity includes the
+    effect of different temperatures of the species during an expansion.
     """
     total, pair = mass[:, None] + mass, (diameter[:, None] + diameter) / 2
     reduced = mass[:, None] * mass / total

@@ -24,14 +24,15 @@ __all__ = [
 Law = Callable[[np.ndarray], np.ndarray]
 
 # Relaxation of a dilute gas of disks that start with equal speeds, from Monte Carlo solutions of
-# the Boltzmann equation with 10^6 disks. Each point contains the number of collisions per disk and
-# the second Sonine coefficient a2.
+# the Boltzmann equation with 10^6 disks. The first list contains numbers of collisions per disk,
+# and the second list the second Sonine coefficient a2 after these collisions.
 RELAXATION = np.transpose(
     [(0, 1, 2, 3, 4, 5, 6, 8), (-0.5, -0.370, -0.264, -0.184, -0.125, -0.0855, -0.0565, -0.025)]
 )
 # Relaxation of a dilute mixture, from Monte Carlo solutions of the Boltzmann equation: half of the
-# disks have the mass m, and half the mass 4 m. Each point contains the number of collisions per
-# disk and the temperature of the heavy disks divided by that of the light disks.
+# disks have the mass m, and half the mass 4 m. The first list contains numbers of collisions per
+# disk, and the second list the temperature of the heavy disks divided by the temperature of the
+# light disks after these collisions.
 EQUIPARTITION = np.transpose(
     [(0, 1, 2, 3, 4, 5, 6, 8), (4, 2.02, 1.455, 1.228, 1.115, 1.062, 1.031, 1.005)]
 )
@@ -82,9 +83,9 @@ def maxwell_cdf(u: np.ndarray) -> np.ndarray:
 def finite_n_cdf(count: int, periodic: bool = False) -> Law:
     """Return the exact distribution function of the reduced speed of disks with fixed total energy.
 
-    Let K be the kinetic energy of a disk, E the total energy, and N the number of disks.  Between
-    walls, K / E has the distribution Beta(1, N - 1) for any masses.  In a periodic box of equal
-    disks with total momentum 0, K N / (E (N - 1)) has the distribution Beta(1, N - 2).
+    Let K be the kinetic energy of a disk, E the total energy, and N the number of disks.  In a box
+    with walls, K / E has the distribution Beta(1, N - 1) for any masses.  In a periodic box of
+    equal disks with total momentum 0, K N / (E (N - 1)) has the distribution Beta(1, N - 2).
 
     Parameters
     ----------
@@ -180,10 +181,11 @@ ROUGH_RATIOS = {(0.9, 0.0): 0.4439, (0.9, 0.8): 1.0055, (0.85, 0.3): 0.708}
 def rough_rates(xi: float, beta: float, inertia: float) -> tuple[float, float, float]:
     """Return the coefficients A, B and C of the equations for the temperatures of rough disks.
 
-    The temperatures T = m <v^2> / 2 and R = I <omega^2> satisfy dT/ds = -2 (A T - B R) and dR/ds =
-    4 (B T - C R), where s is the number of collisions per disk.  The velocities have Maxwell's
-    distribution.  The equations are from Luding, Huthmann, McNamara and Zippelius, Physical Review
-    E 57, 3416 (1998).  The argument `inertia` is the moment of inertia I divided by m r^2.
+    The translational temperature T = m <v^2> / 2 and the rotational temperature R = I <omega^2>
+    satisfy dT/ds = -2 (A T - B R) and dR/ds = 4 (B T - C R), where s is the number of collisions
+    per disk.  The velocities are assumed to have Maxwell's distribution.  The equations are from
+    Luding, Huthmann, McNamara and Zippelius, Physical Review E 57, 3416 (1998).  The argument
+    `inertia` is the moment of inertia I divided by m r^2.
     """
     eta = inertia * (1 + beta) / (2 * inertia + 2)
     a = (1 - xi**2) / 4 + eta * (1 - eta) / 2
@@ -257,10 +259,12 @@ def pushed_width(
 ) -> tuple[float, float]:
     """Return mean and variance of the width of a box with a piston under a constant force.
 
-    The probability density of the width w is proportional to Q(w) (H - F w)^(f/2 - 1), which
-    docs/theory.md derives.  The density is evaluated at equally spaced `widths` (W,).  The argument
-    `places` is ln Q, or NaN where Q is unknown.  The argument `squares` is the number f of degrees
-    of freedom, including that of the piston, and `energy` is H - F w.
+    If the piston exerts the force F, the probability density of the width w is proportional to Q(w)
+    (H - F w)^(f/2 - 1), as derived in docs/theory.md.  Q is the configuration integral of the
+    disks, H the enthalpy, and f the number of degrees of freedom including that of the piston.  The
+    density is evaluated at equally spaced `widths` (W,), for which `places` contains ln Q and
+    `energy` contains H - F w.  Where Q is unknown, `places` contains NaN and the density is set to
+    0.  The argument `squares` is f.
     """
     log = np.where(np.isnan(places), -np.inf, places) + (squares / 2 - 1) * np.log(energy)
     density = np.exp(log - log.max())
@@ -272,12 +276,13 @@ def demon_share(climb: float, layers: float, xi: float) -> float:
     """Return the fraction of a dilute gas in the fuller of two chambers above a vibrating floor.
 
     A floor that moves as a sawtooth with the velocity V supplies the power n m g V to the n disks
-    of a chamber.  In a column of uniform temperature T, collisions dissipate the power n^2 m g s
-    sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w, where s is the diameter of a disk and w the width of a
-    chamber.  In a steady state both powers are equal, so that T/m = (2 V w / (n s sqrt(pi) (1 -
-    xi^2)))^2.  The flux out of a chamber through a hole at the height h is proportional to n^2
-    exp(-m g h / T) (Eggers, Physical Review Letters 83, 5322 (1999)).  In a steady state the fluxes
-    in both directions are equal.  The state with equal fractions is unstable if m g h > T.
+    in a chamber.  If the temperature T in the chamber is uniform, collisions dissipate the power
+    n^2 m g s sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w, where s is the diameter of a disk and w the width
+    of a chamber.  In a steady state the supplied power equals the dissipated power, so that T/m =
+    (2 V w / (n s sqrt(pi) (1 - xi^2)))^2.  The flux out of a chamber through a hole at the height h
+    is proportional to n^2 exp(-m g h / T) (Eggers, Physical Review Letters 83, 5322 (1999)).  In a
+    steady state equal fluxes of disks pass through the hole in both directions.  The state with
+    equal numbers of disks in both chambers is unstable if m g h > T.
 
     Parameters
     ----------
