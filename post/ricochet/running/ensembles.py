@@ -55,8 +55,8 @@ def sweep(
 ) -> "pandas.DataFrame":
     """Run an input with all combinations of the given values of variables.
 
-    Finished member runs are not repeated, and interrupted member runs are continued.  After an
-    interrupt, repeat the same call.
+    Finished member runs are not repeated, and interrupted member runs are continued.  A sweep that
+    was interrupted is continued by a repetition of the call with the same arguments.
 
     If the input has changed only in variables that may change when a run is resumed, finished
     member runs are extended.  Examples are a later end of the run or a different sampling schedule.
@@ -66,8 +66,9 @@ def sweep(
     system : str, Path or mapping
         the input, as for `ricochet.run`
     values : mapping of str to object, or list of them
-        for each variable a list of values, or a single value; None stands for the default value.
-        The first variable varies slowest.  For a list of dictionaries, `sweep` runs the
+        a dictionary that contains, for each variable, a list of values or a single value; the value
+        None stands for the default value of the variable.  In the order of the member runs, the
+        first variable varies slowest.  If `values` is a list of dictionaries, `sweep` runs the
         combinations of values in each dictionary, so that several variables can be varied together
     folder : str or Path
         folder for the files of the member runs
@@ -281,7 +282,8 @@ def put(path: Path, text: str) -> None:
 def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
     """Return the paths of the finished and the unfinished output of a member run, or None.
 
-    A finished run that is being extended has both files and is regarded as unfinished.
+    While a finished run is being extended, the finished and the unfinished output exist; the member
+    run is then regarded as unfinished.
     """
     whole, part = folder / f"{name}.h5", folder / f"{name}.h5.part"
     unfinished = part if part.is_file() else None
@@ -356,7 +358,8 @@ def is_there(pid: int) -> bool:
 def wanted(mark: Path) -> bool:
     """Return whether the call of `sweep` that created the file `mark` is still in progress.
 
-    If the process of that call no longer exists, the file `mark` is deleted.
+    If a process of this machine created the file `mark` and no longer exists, the function deletes
+    the file.
     """
     _, pid, _, host = mark.name.split(" ", 3)
     if host == os.uname().nodename and not is_there(int(pid)):

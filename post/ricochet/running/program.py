@@ -170,8 +170,9 @@ def whole_threads(threads: int | None) -> int:
 def find_program() -> str:
     """Return the path of the program.
 
-    If the environment variable RICOCHET is set, its value is the path.  Otherwise the program is
-    searched in the installed package, in the folder `build` of this clone, and on PATH.
+    If the environment variable RICOCHET is set, its value is the path of the program.  Otherwise
+    the function searches for the program in the installed package, in the folder `build` of this
+    clone, and on PATH.
     """
     root = HERE.parents[1]
     if wish := os.environ.get("RICOCHET"):
@@ -230,9 +231,10 @@ def watched(command: list[str], progress: bool = True) -> tuple[int, list[str]]:
 def tied(command: list[str]) -> list[str]:
     """Return a command that receives the signal SIGTERM when this Python process ends.
 
-    The signal lets the program write a checkpoint and end.  If the tool setpriv of util-linux is
-    installed, it requests the signal, because a Python function between fork and exec would not be
-    safe in a process with several threads.
+    When the program receives SIGTERM, the program writes a checkpoint and ends.  The returned
+    command starts the program with the tool setpriv of util-linux, if installed, which requests the
+    signal.  A Python function that requests the signal between fork and exec would not be safe in a
+    process with several threads.
     """
     setpriv = shutil.which("setpriv") if sys.platform == "linux" else None
     return [setpriv, "--pdeathsig", "TERM", "--", *command] if setpriv else command

@@ -1,4 +1,4 @@
-"""A session with the engine in this process: its handle, its lock, and the texts it returns."""
+"""Sessions with the engine in this process; a session owns one simulation in memory."""
 
 import ctypes
 import os

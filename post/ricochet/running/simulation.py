@@ -142,9 +142,9 @@ class Simulation(State):
     def save(self, path: str | Path, force: bool = False, input: str | Path | None = None) -> Path:
         """Write an output file that the command `ricochet INPUT -o path --resume` can continue.
 
-        The file contains samples of the initial state and of the present state.  If `change` has
-        changed variables, INPUT must be the changed input, which this method writes to the file
-        `input`.
+        The output file contains samples of the initial state and of the present state.  If
+        variables have been changed with `change`, INPUT must name the changed input, which `save`
+        writes to the file that the argument `input` names.
 
         Parameters
         ----------
@@ -185,10 +185,10 @@ class Simulation(State):
     def copy(self) -> Self:
         """Return an independent simulation in the same state.
 
-        After the same calls, the copy and the original are in bit-identical states.  The functions
-        `copy.copy`, `copy.deepcopy` and `pickle.dumps` also copy a simulation.  A pickle contains a
-        checkpoint, so that another process can load the pickle.  If the input names a starting
-        file, this file must exist when the pickle is loaded.
+        If the same methods are called on the copy and on the original, their states remain
+        bit-identical.  The functions `copy.copy`, `copy.deepcopy` and `pickle.dumps` also copy a
+        simulation.  A pickle contains a checkpoint, so that another process can load the pickle.
+        If the input names a starting file, this file must exist when the pickle is loaded.
 
         Returns
         -------
@@ -246,8 +246,8 @@ class Simulation(State):
         on_event : callable, optional
             function that is called with an `Event` after each event.  The function may read and
             change the simulation, which is in the state just after the event.  If the function
-            returns a true value, `advance` ends after all events of that time.  If `on_event` is
-            given, each event takes about 20 microseconds
+            returns a true value, `advance` ends after all events that are simultaneous with this
+            event.  If `on_event` is given, each event takes about 20 microseconds
 
         Returns
         -------
@@ -375,14 +375,14 @@ class Simulation(State):
             return called(library().ricochet_advance, handle, *limits, patience)
 
     def _settle(self) -> float:
-        """Advance to the next time at which the state is reproducible, and return this time.
+        """Advance to a time at which another simulation can reproduce the state; return this time.
 
         After a call of `advance`, the attribute `time` may be rounded, and the engine may still
-        have to shift its origin of time.  Therefore `_settle` advances to a slightly later time
-        that the engine reaches exactly.  Another simulation that advances to that later time has
-        the same state.  The time of a simulation is the sum of this origin and the time since the
-        origin.  The sum may skip every second floating-point number, so that several later times
-        are tried.
+        have to shift its origin of time.  Therefore `_settle` advances to a slightly later time t
+        that the engine reaches exactly, so that another simulation that advances to t reaches the
+        same state.  The engine computes the time of a simulation as the sum of the origin of time
+        and the time since this origin.  Because some floating-point numbers cannot result from this
+        sum, `_settle` tries several values of t.
         """
         ulps = 0
         while self.time != self._settled:

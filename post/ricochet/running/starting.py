@@ -23,7 +23,7 @@ NUMBERS = itertools.count(1)
 
 
 def with_start(group: Mapping[str, Any], place: Path | None) -> Mapping[str, Any]:
-    """Write the arrays of a species to a starting file, and return the species with that file.
+    """Write the arrays of a species to a starting file; return a species that names this file.
 
     The name of the file begins with `place`.  If `place` is None, the file is temporary and exists
     until this process ends.

@@ -179,8 +179,8 @@ class State(Session):
     def image(self) -> np.ndarray:
         """Number of box lengths that each disk has moved across periodic sides, (N, 2).
 
-        Adding these numbers, times the edges of the box, to the positions gives continuous paths.
-        If no side is periodic, AttributeError is raised.
+        If the box lengths that a disk has moved across periodic sides are added to its positions,
+        the positions form a continuous path.  If no side is periodic, AttributeError is raised.
         """
         return self._column("image")
 
@@ -325,9 +325,11 @@ class State(Session):
 
 
 def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return the table of all obstacles or walls if a row of the input names a file or points.
+    """Return a table of all obstacles or walls if a row of the input stands for several of them.
 
-    In such a row, the coordinates are replaced by NaN.
+    A row stands for several obstacles or walls if the row contains the variable `file` or `points`.
+    In each such row, the coordinates are replaced by NaN.  If `rows` contains no such row, the
+    returned dictionary is empty.
     """
     if not any({"file", "points"} & row.keys() for row in rows):
         return {}
