@@ -60,7 +60,7 @@ contains
   end subroutine collide_wall
 
   !> Ends a series of bounces on a moving side when a collision dissipates less than the rounding error. The normal velocity of the
-  !> disk is then set to the velocity of the side. Otherwise the series of bounces would be infinite.
+  !> disk is then set to the velocity of the side. A series of bounces on a moving side could otherwise be infinite.
   pure subroutine end_bouncing(v, before, normal_velocity, normal)
     real(real64), intent(inout) :: v(2)          !! velocity of the disk after the collision [length/time]
     !> Velocity of the disk before the collision, and normal velocity of the side [length/time]
@@ -92,8 +92,8 @@ contains
       v = sim%box%side_velocity(1 - code, t)
       given = dot_product(disk%v - before, normal)*mass/(mass + motion%mass)
       disk%v = disk%v - given*normal
-      ! The piston is moved into contact with the disk, by the same formula as in `side_time`. Otherwise rounding errors would
-      ! separate the piston from a disk at rest.
+      ! The piston is moved into contact with the disk, by the same formula as in `side_time`. Without the shift of the piston,
+      ! rounding errors would separate the piston from a disk at rest.
       side%position = merge(disk%x(axis) - (sim%box%lower(axis) + disk%radius), &
         (sim%box%upper(axis) - disk%radius) - disk%x(axis), sense_of(code) < 0)
       side%velocity = min(v - given, dot_product(disk%v, normal))  ! rounding errors must not make the piston faster than the disk
@@ -123,9 +123,9 @@ contains
   end subroutine draw_thermal_velocity
 
   !> Separates disk i from a surface on which the disk rests. With restitution 0 the normal velocity of the disk vanishes in the
-  !> first collision. The elastic collisions of the TC model would not separate such a disk from the surface, and infinitely many
-  !> collisions would occur at the same time. The normal velocity of the disk is therefore set such that the next contact with the
-  !> surface is 0.4 to 0.8 contact durations later.
+  !> first collision. The elastic collisions of the TC model would not separate a disk without normal velocity from the surface, and
+  !> infinitely many collisions would occur at the same time. The normal velocity of the disk is therefore set such that the next
+  !> contact with the surface is 0.4 to 0.8 contact durations later.
   pure subroutine separate_from_surface(sim, i, code, normal)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -166,8 +166,8 @@ contains
   end subroutine apply_tangential_impulse_at_wall
 
   !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk is the sum of the work of the
-  !> moving surface and a remainder. At a thermal wall the remainder of the energy change is heat. At any other wall the remainder
-  !> is the negative of the dissipated energy.
+  !> moving surface and a remainder. At a thermal wall, the energy change of the disk minus the work of the surface is the
+  !> transferred heat. At any other wall, the work of the surface minus the energy change of the disk is the dissipated energy.
   pure subroutine add_wall_sums(sim, i, k, heats, u, v, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

@@ -116,7 +116,7 @@ contains
     lengths = self%upper - self%lower
   end function edges
 
-  !> Period of the box along each axis; `never` along an axis with walls.
+  !> Period of the box along each axis. Along an axis with walls, the period is set to the constant `never`, a very large number.
   pure function periods(self) result(lengths)
     class(box_t), intent(in) :: self
     real(real64) :: lengths(2)
@@ -124,8 +124,8 @@ contains
     lengths = merge(self%upper - self%lower, never, self%periodic)
   end function periods
 
-  !> The periodic images of the box, for times relative to the time origin `epoch`. Without the argument `epoch` the result contains
-  !> the images at the start of the run.
+  !> The periodic images of the box, for times relative to the time origin `epoch`. If the argument `epoch` is absent, the result
+  !> contains the images at the start of the run.
   pure function images_of(self, epoch) result(images)
     class(box_t), intent(in) :: self
     real(real64), intent(in), optional :: epoch    !! [time]
@@ -161,8 +161,8 @@ contains
     v = self%shear_rate*(self%upper(2) - self%lower(2))
   end function shear_velocity
 
-  !> Velocity of the linear shear profile at the point x. Averages of quantities relative to this profile are the same everywhere
-  !> in the box.
+  !> Velocity of the linear shear profile at the point x. Averages of quantities relative to the shear profile are the same
+  !> everywhere in the box.
   pure function shear_profile(self, x) result(v)
     class(box_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
@@ -260,11 +260,11 @@ contains
     yes = self%highest_temperature() > 0 .or. self%does_work()
   end function gives_energy
 
-  !> Largest outward displacement of each moving side from its mean position. Disks can follow a moving side up to this distance
-  !> beyond its mean position.
+  !> Largest outward displacement of each moving side from its mean position. The displacement is also the largest distance by which
+  !> disks can be beyond the mean position of an oscillating side.
   pure function side_excursion(self) result(length)
     class(box_t), intent(in) :: self
-    real(real64) :: length(2, 2)                !! (axis, lower or upper) [length]
+    real(real64) :: length(2, 2)                !! (axis, 1: lower side, 2: upper side) [length]
 
     length = transpose(reshape(self%surface(:n_sides)%motion%amplitude, [2, 2]))
   end function side_excursion
@@ -299,7 +299,7 @@ contains
   pure subroutine next_obstacle(box, disk, last, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    !> The value of `last_partner` of the disk. After a collision with an obstacle, this value is the code of the obstacle.
+    !> The value of `last_partner` of the disk. After a collision with an obstacle, `last_partner` is the code of the obstacle.
     integer(int32), intent(in) :: last
     integer(int32), intent(in) :: list(:)       !! codes of the obstacles to be tested, in descending order
     real(real64), intent(inout) :: t
@@ -325,7 +325,7 @@ contains
   pure subroutine find_image_contact(box, disk, last, obstacle, shift, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    !> The value of `last_partner` of the disk. After a collision with an obstacle, this value is the code of the obstacle.
+    !> The value of `last_partner` of the disk. After a collision with an obstacle, `last_partner` is the code of the obstacle.
     integer(int32), intent(in) :: last
     integer(int32), intent(in) :: obstacle      !! code of the obstacle
     real(real64), intent(in) :: shift(2)        !! shift from the obstacle to its image [length]

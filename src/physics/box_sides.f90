@@ -34,8 +34,8 @@ contains
 
   !> Time when the boundary of a disk touches a wall, or its centre reaches a periodic side. A gap that is negative because of
   !> rounding is set to zero: a disk at a wall that still moves outwards is then reflected immediately and cannot leave the box. At
-  !> a moving side, a gap smaller than the rounding error is also set to zero. Otherwise a series of ever shorter bounces between
-  !> the disk and the side would be infinite.
+  !> a moving side, a gap smaller than the rounding error is also set to zero. A series of ever shorter bounces between a disk and a
+  !> moving side would otherwise be infinite.
   pure function side_time(box, disk, side) result(t)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -71,7 +71,7 @@ contains
     end associate
   end function side_time
 
-  !> The first side that a disk reaches. If a disk reaches two sides at the same time, the first of these sides in the order left,
+  !> The first side that a disk reaches. If a disk reaches two sides at the same time, the side that comes first in the order left,
   !> right, bottom, top is chosen.
   pure subroutine next_side(box, disk, t, side)
     type(box_t), intent(in) :: box
@@ -93,8 +93,8 @@ contains
   end subroutine next_side
 
   !> Moves a disk away from the moving sides that the disk would touch before the time `now`. A change of the time origin rounds the
-  !> position and velocity of a moving side. If a disk nearly touches the side, this rounding can shift the predicted contact to a
-  !> time before `now`. The displacement of the disk is of the order of the rounding error.
+  !> position and velocity of a moving side. If a disk nearly touches a moving side, the rounding can shift the predicted contact to
+  !> a time before `now`. The disk is moved only by a distance of the order of the rounding errors of positions.
   pure subroutine separate_from_sides(box, disk, now)
     type(box_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk

@@ -7,7 +7,7 @@ module collisions
   public :: tangential_impulse, tangential_law_t, wall_law_t, wall_rebound, wall_rules
 
   !> Names of the wall rules in the input. The restitution of a wall multiplies the whole velocity ('velocity') or only the normal
-  !> component ('normal'). The program represents a rule by its position in this list.
+  !> component ('normal'). Elsewhere in the program a wall rule is represented by its position in the list `wall_rules`.
   character(len=*), parameter :: wall_rules = "velocity normal"
   integer, parameter :: normal_rule = 2              !! position of the rule 'normal' in `wall_rules`
 
@@ -21,8 +21,8 @@ module collisions
   !> chosen such that the restitution at g0 equals the restitution given by the input. For g >= g0 the restitution given by the
   !> input is used.
   type :: speed_law_t
-    real(real64) :: speed = 0.0_real64               !! reference impact velocity g0; 0: constant restitution [length/time]
-    real(real64) :: c = 0.0_real64                   !! coefficient c, see `series_terms`
+    real(real64) :: speed = 0.0_real64               !! reference impact velocity g0; 0 if the restitution is constant [length/time]
+    real(real64) :: c = 0.0_real64                   !! coefficient c of the series 1 - y + c y**2: see `series_terms`
   contains
     procedure :: restitution_at
     procedure :: least
@@ -32,7 +32,7 @@ module collisions
   !> (1998)).
   type :: tangential_law_t
     real(real64) :: restitution = -1.0_real64        !! tangential restitution, from -1 (smooth) to 1
-    real(real64) :: friction = huge(1.0_real64)      !! Coulomb friction coefficient; huge: no limit
+    real(real64) :: friction = huge(1.0_real64)      !! Coulomb friction coefficient; set to huge() if the impulse is not limited
   contains
     procedure :: is_rough
   end type tangential_law_t
@@ -43,7 +43,7 @@ module collisions
     integer :: rule = 1                              !! position in `wall_rules`
     type(speed_law_t) :: by_speed = speed_law_t()
     type(tangential_law_t) :: tangential = tangential_law_t()
-    real(real64) :: temperature = 0.0_real64         !! kT of a thermal wall; 0: not thermal [energy]
+    real(real64) :: temperature = 0.0_real64         !! kT of a thermal wall; 0 if the wall is not thermal [energy]
     real(real64) :: speed = 0.0_real64               !! tangential velocity of the surface [length/time]
   end type wall_law_t
 
@@ -83,8 +83,8 @@ contains
     xi = 1 - y + self%c*y**2
   end function restitution_at
 
-  !> Smallest coefficient of restitution at g0 for which the restitution is a monotonic function of the impact velocity. For this
-  !> smallest value the series 1 - y + c y**2 has its minimum at g0.
+  !> Smallest coefficient of restitution at g0 for which the restitution is a monotonic function of the impact velocity. At the
+  !> smallest coefficient, the series 1 - y + c y**2 for the restitution has its minimum at the impact velocity g0.
   elemental function least(self) result(xi)
     class(speed_law_t), intent(in) :: self
     real(real64) :: xi
@@ -121,7 +121,7 @@ contains
     real(real64), intent(in) :: inertia  !! moment of inertia divided by mass times radius squared, equal for both bodies
     real(real64), intent(in) :: mass                 !! reduced mass [mass]
     real(real64), intent(in) :: slip                 !! tangential velocity of the surface at the contact [length/time]
-    real(real64), intent(in) :: normal_impulse       !! normal impulse of the same collision, not negative [mass length/time]
+    real(real64), intent(in) :: normal_impulse       !! magnitude of the normal impulse in the collision [mass length/time]
     real(real64) :: impulse
 
     impulse = -inertia/(1 + inertia)*mass*(1 + law%restitution)*slip

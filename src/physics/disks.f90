@@ -18,7 +18,7 @@ module disks
     real(real64) :: clock = 0.0_real64          !! time of `x` and `v`, relative to the time origin `box%epoch` [time]
     real(real64) :: radius = 0.0_real64         !! [length]
     ! Derived data: the collision counter, and the next event as predicted by the search. The collision counter is the number of
-    ! changes of x and v in this epoch. A changed collision counter shows that an event is stale.
+    ! changes of x and v of the disk in the present epoch. A changed collision counter shows that an event is stale.
     integer(int32) :: collision_counter = 0
     integer(int32) :: partner = 0               !! partner in the next event: index of a disk (> 0), or another code of `partners`
     real(real64) :: event_time = 0.0_real64     !! time of the next event, relative to the time origin `box%epoch` [time]
@@ -87,7 +87,7 @@ contains
     end do
   end function names_of
 
-  !> Number of disks in all species before species s. These disks have lower ids than the disks of species s.
+  !> Number of disks in all species before species s. Disks of earlier species have lower ids than the disks of species s.
   pure function disks_before(species, s) result(n)
     class(species_t), intent(in) :: species(:)
     integer, intent(in) :: s

@@ -6,7 +6,8 @@ module drive
   private
   public :: drive_kinds, drive_t
 
-  !> Names of the kinds of driving in the input. The program represents a kind of driving by its position in this list.
+  !> Names of the kinds of driving in the input. Elsewhere in the program a kind of driving is represented by its position in the
+  !> list `drive_kinds`.
   character(len=*), parameter :: drive_kinds = "none noise andersen brownian active"
   integer, parameter, public :: no_kicks = 1, noise = 2, andersen = 3, brownian = 4, active = 5
 
@@ -15,7 +16,7 @@ module drive
     real(real64) :: interval = never                 !! time between kicks [time]
     !> Noise strength: growth rate of the variance of each velocity component [velocity**2/time]
     real(real64) :: strength = 0.0_real64
-    logical :: keep_momentum = .false.               !! whether noise conserves the total momentum; .false. for other kinds
+    logical :: keep_momentum = .false.  !! whether white noise conserves the total momentum; .false. for other kinds of driving
     real(real64) :: fraction = 1.0_real64            !! mean fraction of the disks that a kick of 'andersen' affects
     real(real64) :: temperature = 0.0_real64         !! kT of the velocities drawn by 'andersen', 'brownian' and 'active' [energy]
     real(real64) :: speed = 0.0_real64               !! self-propulsion speed of active disks [length/time]

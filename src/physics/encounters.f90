@@ -19,9 +19,9 @@ module encounters
 
   !> Limits for the detection of an inelastic collapse. A series of at most `most_visible` simultaneous collisions of a pair is not
   !> considered a collapse. The limit `rounded` is an approach velocity, divided by the speed of the faster disk and by 1 -
-  !> restitution. Below this approach velocity, further collisions only result from rounding errors. The limit `slowest` is an
-  !> absolute approach velocity, which is far below all velocities in an input [length/time]. The absolute limit is needed if walls
-  !> slow down all disks.
+  !> restitution. Below the approach velocity `rounded`, further collisions only result from rounding errors. The limit `slowest` is
+  !> an absolute approach velocity, which is far below all velocities in an input [length/time]. The absolute limit `slowest` is
+  !> needed if collisions with walls slow down all disks.
   integer(int32), parameter :: most_visible = most_repeats - 3
   real(real64), parameter :: rounded = 1.0e-12_real64, slowest = 1.0e-120_real64
 
@@ -32,8 +32,9 @@ contains
 
   !> Executes the collision of disk i at the time t with the partner `code`: another disk, a side or an obstacle. `collide` is the
   !> general procedure for rotation, friction, velocity-dependent restitution, the virial tensor and the event log. `collide_pair`
-  !> is the fast procedure for collisions of two disks without these features. The log entry does not depend on which of the two
-  !> disks predicted the event. If the two disks are still in contact after their last collision, no new collision is executed.
+  !> is the fast procedure for collisions of smooth disks with constant restitution, without the virial tensor and the event log.
+  !> The log entry does not depend on which of the two disks predicted the event. If the two disks are still in contact after their
+  !> last collision, no new collision is executed.
   subroutine collide(sim, i, code, t, counts, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -108,19 +109,19 @@ contains
     dx = sim%disk(j)%x - sim%disk(i)%x
     dv = sim%disk(j)%v - sim%disk(i)%v
     if (any(sim%box%periodic)) then
-      if (any(abs(dx) >= 0.5_real64*sim%box%edges())) call use_nearest_image(sim, t, dx, dv)  ! needed for few pairs
+      if (any(abs(dx) >= 0.5_real64*sim%box%edges())) call use_nearest_image(sim, t, dx, dv)  ! few pairs touch across a side
     end if
     b = dx(1)*dv(1) + dx(2)*dv(2)
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
     mass_i = sim%species(si)%mass
     mass_j = sim%species(sj)%mass
-    if (allocated(sim%own_mass)) then                ! one test of the allocation for both disks
+    if (allocated(sim%own_mass)) then                ! faster than `mass_of`, which would test the allocation for each disk
       mass_i = sim%own_mass(i)
       mass_j = sim%own_mass(j)
     end if
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
-    ! The impulse is divided by the mass. A multiplication by a stored reciprocal mass would repeat the same rounding error in all
-    ! collisions.
+    ! The velocity change is the impulse divided by the mass. A multiplication by a stored reciprocal mass would repeat the same
+    ! rounding error in all collisions.
     sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     dv = sim%disk(j)%v - sim%disk(i)%v
@@ -156,9 +157,9 @@ contains
   end function impact_velocity
 
   !> Counts an inelastic collision of two disks, both of which have already collided at exactly the time t. A series of simultaneous
-  !> collisions is common when more than two disks are in contact, and this series is usually finite. An inelastic collapse is an
-  !> infinite series: the same disks collide again and again until their approach velocity is as small as the rounding error of
-  !> their velocities. Elastic disks and disks with a contact duration (TC model) cannot collapse.
+  !> collisions is common when more than two disks are in contact, and is usually finite. An inelastic collapse is an infinite
+  !> series: the same disks collide again and again until their approach velocity is as small as the rounding error of their
+  !> velocities. Elastic disks and disks with a contact duration (TC model) cannot collapse.
   pure subroutine count_simultaneous_collision(sim, i, j, t, counts, n)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
@@ -172,8 +173,8 @@ contains
     restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(j)%species)
     if (sim%law%contact_time > 0 .or. .not. restitution < 1) return
     last_partner = sim%tag([i, j])%last_partner
-    ! Each disk stores a count of its series. A collision with a wall erases the count of a disk, and the count of the other disk is
-    ! then used.
+    ! Each disk stores the number of collisions in its series. If a collision with a wall has erased the number of a disk, the
+    ! number of the other disk is used.
     n = minval(merge(repeats(last_partner), most_repeats, last_partner > 0)) + 1
     fastest = max(magnitude(sim%disk(i)%v), magnitude(sim%disk(j)%v))
     if (impact_velocity(sim, i, j, t) > max(rounded*(1 - restitution)*fastest, slowest)) n = min(n, most_visible)
@@ -195,7 +196,7 @@ contains
       along = q%x - p%x
       dv = q%v - p%v
       call use_nearest_image(sim, p%clock, along, dv)
-      along = [along(2), -along(1)]/magnitude(along)             ! z x n, with n from j to i
+      along = [along(2), -along(1)]/magnitude(along)             ! tangential unit vector z x n, where n points from j to i
       dv = -dv
       slip = dot_product(dv, along) - (p%radius*sim%spin(i) + q%radius*sim%spin(j))
       mass_i = sim%mass_of(i)
@@ -213,8 +214,8 @@ contains
   end subroutine apply_tangential_impulse
 
   !> Change of the momentum of disk i in a collision with a surface or with disk j. If disk i is far heavier than its partner,
-  !> rounding errors dominate the velocity change of disk i. The momentum change of disk i is then computed from the velocity change
-  !> of the partner.
+  !> rounding errors dominate the velocity change of disk i. The momentum change of a far heavier disk is therefore computed from
+  !> the velocity change of its partner.
   pure function momentum_change(sim, i, j, v, w) result(change)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
@@ -312,7 +313,7 @@ contains
     type(images_t) :: images
     type(image_t) :: image
 
-    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! this condition holds for nearly all pairs
+    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! nearly all pairs of disks return here
     images = sim%images()
     image = images%image(images%nearest_image(dx, t))
     dx = dx + [image%shift(1) + image%velocity*t, image%shift(2)]
@@ -400,8 +401,8 @@ contains
   end subroutine pass_side
 
   !> Moves disk i across the lower or upper boundary of a sheared box (Lees-Edwards). The position of the disk is shifted by the
-  !> displacement of the periodic image, and the velocity of the disk by the velocity of the image. This shift is a change of the
-  !> reference frame: no force acts on the disk.
+  !> displacement of the periodic image, and the velocity of the disk by the velocity of the image. The shift of the position and
+  !> velocity is a change of the reference frame: no force acts on the disk.
   subroutine pass_sheared_boundary(sim, i, rows, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

@@ -6,17 +6,17 @@ module exact_sums
   private
   public :: exact_sum_t
 
-  integer, parameter :: digits_of_bound = 62             !! number of binary digits of a term as large as the bound
+  integer, parameter :: digits_of_bound = 62             !! number of binary digits of a term that equals the bound of `choose_unit`
   integer, parameter :: digits_of_rare = 90              !! binary logarithm of `rare_unit`
   real(real64), parameter :: most_units = 2.0_real64**digits_of_bound
   real(real64), parameter :: rare_unit = 2.0_real64**digits_of_rare
   integer, parameter :: digits_of_most = 125
-  !> Limit of the two integers that represent a sum. A sum beyond this limit is NaN.
+  !> Limit of the integer `rare` of a sum. If `rare` reaches the limit, the value of the sum is NaN.
   integer(int128), parameter :: most = 2_int128**digits_of_most
 
-  !> A fixed-point sum. A term may exceed the bound that was passed to `choose_unit`. The addition of such a term is exact but takes
-  !> slightly longer. A sum of 2**35 terms below 2**90 units cannot overflow. For a larger term, the integer `rare` counts the
-  !> number of multiples of 2**90 units.
+  !> A fixed-point sum. The addition of a term that exceeds the bound passed to `choose_unit` is exact but takes slightly longer. A
+  !> sum of 2**35 terms below 2**90 units cannot overflow. For terms of at least 2**90 units, the integer `rare` stores the number
+  !> of multiples of 2**90 units.
   type :: exact_sum_t
     integer(int128) :: units = 0
     integer(int128) :: rare = 0                          !! number of multiples of 2**90 units
@@ -53,7 +53,7 @@ contains
   !> Divides the unit of the sum by 2 to the power `digits`.
   elemental subroutine make_finer(self, digits)
     class(exact_sum_t), intent(inout) :: self
-    integer, intent(in) :: digits                        !! binary logarithm of the factor
+    integer, intent(in) :: digits                        !! binary logarithm of the factor by which the unit changes
     integer(int128) :: moved
 
     if (self%units == 0 .and. self%rare == 0) return
@@ -71,7 +71,7 @@ contains
   !> Multiplies the unit of the sum by 2 to the power `digits`.
   elemental subroutine make_coarser(self, digits)
     class(exact_sum_t), intent(inout) :: self
-    integer, intent(in) :: digits                        !! binary logarithm of the factor
+    integer, intent(in) :: digits                        !! binary logarithm of the factor by which the unit changes
     integer(int128) :: left
 
     left = self%rare/2_int128**digits
@@ -97,8 +97,8 @@ contains
     end if
   end subroutine add
 
-  !> Adds a very large term in two parts. Both parts are exact, because a number in double precision has fewer digits than each of
-  !> the two integers that represent the sum.
+  !> Adds a very large term in two parts. The two parts of the term are exact, because a number in double precision has fewer digits
+  !> than each of the two integers that represent the sum.
   elemental subroutine add_rare(self, units)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: units
@@ -131,7 +131,7 @@ contains
     self%rare = 0
   end subroutine clear
 
-  !> The value of the sum; NaN if the sum has become too large.
+  !> The value of the sum, which is NaN if the sum has become too large.
   elemental function value(self)
     class(exact_sum_t), intent(in) :: self
     real(real64) :: value

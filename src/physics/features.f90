@@ -1,4 +1,4 @@
-!> Optional features of a run. In a run without these features the motion of a disk consists of free flight and collisions, and a
+!> Optional features of a run. In a run without optional features the motion of a disk consists of free flight and collisions, and a
 !> collision changes only velocities. The features determine which data of disks and which observables exist, which collision
 !> procedure is used, and which inputs are rejected.
 module features

@@ -36,8 +36,8 @@ module observables
   integer, parameter :: own_kinetic = 9, own_momentum = 10
   integer, parameter :: flux = 12  !! kinetic flux relative to the velocity profile, five components: see `tally: kinetic_flux`
   integer, parameter :: tensor(*) = flux + [0, 1, 1, 2]                    !! components xx, xy, yx, yy of the momentum flux
-  !> Total energy, and the rounding error of the sum that yields the total energy. Both sums are computed only in driven
-  !> simulations.
+  !> Total energy, and the rounding error of the sum that yields the total energy. The sums `energy` and `lost` are computed only in
+  !> driven simulations.
   integer, parameter :: energy = 17, lost = 18
 
 contains
@@ -177,7 +177,7 @@ contains
     empty%features%helfand = .true.
     list = observed(empty)
     allocate (names(list%n + 1))
-    names(list%n + 1) = "obstacles"                 ! the empty box has no obstacles that would add this name
+    names(list%n + 1) = "obstacles"                 ! name of a group that exists only if the box has obstacles
     do k = 1, list%n
       associate (name => list%row(k)%name)
         names(k) = name(:index(name//"/", "/") - 1)
@@ -205,8 +205,8 @@ contains
     if (sim%is_driven()) total = sums(energy) + sums(lost)
   end function total
 
-  !> Adds a term to the energy with compensated summation (Neumaier, ZAMM 54, 39 (1974)). The energy gained from driving is small
-  !> compared with the energy of many disks, and simple summation would lose its digits.
+  !> Adds a term to the energy with compensated summation (Neumaier, ZAMM 54, 39 (1974)). The energy gained from driving is so small
+  !> compared with the energy of many disks that simple summation would lose digits of the gain.
   pure subroutine add_energy(sums, term)
     real(real64), intent(inout) :: sums(:)
     real(real64), intent(in) :: term
@@ -265,7 +265,7 @@ contains
 
   !> Pressure in two dimensions by the virial theorem, P A = K + W/(2t). K is the present kinetic energy, A is the present
   !> accessible area, and t is the time since the start of the run. W is the sum of impulse times distance over all collisions of
-  !> disks during this time.
+  !> disks since the start of the run.
   pure function pressure(sim, kinetic)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: kinetic           !! kinetic energy relative to the velocity profile of a sheared box [energy]

@@ -1,7 +1,7 @@
 !> Defines integer codes for the partners of a disk in an event. The partner is another disk (> 0), a surface of the box (0, -1, -2,
 !> -3 for the left, right, bottom and top side; -4, -5, ... for an obstacle), or the boundary of the cell of the disk (large
-!> negative codes). The event log contains the same codes for disks and surfaces. Side k of the box has the code 1 - k, and the m-th
-!> obstacle has the code -3 - m.
+!> negative codes). The event log also uses the codes of surfaces, but identifies disks by their ids. Side k of the box has the code
+!> 1 - k, and the m-th obstacle has the code -3 - m.
 module partners
   use kinds, only: int32
   implicit none
@@ -13,7 +13,7 @@ module partners
   integer(int32), parameter :: n_sides = 4
   integer(int32), parameter :: first_crossing = -2000000000
   !> Code of an event that requires a new search: the disk leaves the region in which contacts were searched, but stays in its cell.
-  !> The code is `looks_again` - 1 if the disk leaves this region through its right or upper edge.
+  !> If the disk leaves the region of the search through its right or upper edge, the code is `looks_again` - 1.
   integer(int32), parameter :: looks_again = first_crossing - n_sides
   integer(int32), parameter :: nothing = -huge(1_int32)
   !> Largest number of collisions in a series of simultaneous collisions that `last_partner` can store.
@@ -23,7 +23,8 @@ module partners
 
 contains
 
-  !> Whether a code represents a side of the box. The code must not be the index of a disk.
+  !> Whether a code represents a side of the box. The argument `code` must not be positive, because positive values are indices of
+  !> disks.
   elemental function is_side(code) result(yes)
     integer(int32), intent(in) :: code
     logical :: yes
@@ -31,7 +32,8 @@ contains
     yes = code > -n_sides
   end function is_side
 
-  !> Whether a code represents a side or an obstacle, and not the boundary of a cell. The code must not be the index of a disk.
+  !> Whether a code represents a side or an obstacle, and not the boundary of a cell. The argument `code` must not be positive,
+  !> because positive values are indices of disks.
   elemental function is_wall(code) result(yes)
     integer(int32), intent(in) :: code
     logical :: yes
@@ -80,7 +82,7 @@ contains
     code = first_crossing + side
   end function crossing
 
-  !> The side of the box that corresponds to the face in the code of a crossing.
+  !> The side of the box in whose direction a disk leaves its cell. The argument is the code of the crossing.
   elemental function side_crossed(code) result(side)
     integer(int32), intent(in) :: code
     integer(int32) :: side

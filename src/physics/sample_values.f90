@@ -44,7 +44,7 @@ contains
     real(real64) :: x(2), v(2), image(2)
     integer(int32) :: i, k, n
     integer :: c, first
-    integer :: at(size(columns))                  ! index of the first element of each column; 0 without the column
+    integer :: at(size(columns))                  ! index of the first element of each column; 0 for columns that the frame lacks
 
     n = sim%n_disks()
     allocate (sample(2 + n*sum(list%width), 1))
@@ -97,7 +97,7 @@ contains
           x(1) = x(1) - periods*(upper - lower)
           image(1) = image(1) + periods
         end if
-        x(axis) = max(x(axis), lower)             ! only a rounding error can put the position outside
+        x(axis) = max(x(axis), lower)             ! a rounding error may have moved the position out of the box
       end associate
     end do
   end subroutine wrap

@@ -18,7 +18,8 @@ module simulation_state
   !> term of the heaviest disks or `rare` times a typical term of the lightest disks, whichever is smaller.
   real(real64), parameter :: common = 2.0_real64**7, rare = 2.0_real64**22
   !> Factor by which the units of the sums are multiplied in driven simulations. The work of walls and kicks may be far less than
-  !> the estimate from their parameters. With the smaller units, the sums also resolve the energies of undriven disks.
+  !> the estimate from their parameters. The factor `finer` makes the units so small that the sums also resolve the energies of
+  !> undriven disks.
   real(real64), parameter :: finer = 2.0_real64**(-30)
 
   !> The system: box, contact law, driving and features, which together determine the motion of the disks.
@@ -46,9 +47,10 @@ module simulation_state
     real(real64) :: epoch_begin = 0.0_real64      !! start of the epoch, relative to the time origin `box%epoch` [time]
     real(real64) :: epoch_end = 0.0_real64        !! end of the epoch, relative to `box%epoch`; 0 if not known yet [time]
     integer(int64) :: epoch_events = 0            !! number of events from the start of the run to the start of the epoch
-    ! The next components serve to detect a collapse, which is an infinite series of events during which time does not advance.
+    ! The components `negligible_time`, `last_advance` and `events_then` serve to detect a collapse, which is an infinite series of
+    ! events during which time does not advance.
     real(real64) :: negligible_time = 0.0_real64  !! duration in which no disk moves noticeably; 0 if not known yet [time]
-    !> Time of the last advance by more than `negligible_time`, relative to `box%epoch` [time]
+    !> Time at which the simulation last advanced by more than `negligible_time`, relative to the time origin `box%epoch` [time]
     real(real64) :: last_advance = 0.0_real64
     integer(int64) :: events_then = 0             !! number of events that had been executed at the time `last_advance`
     integer(int64) :: kicks = 0                   !! number of kicks since the start of the run
@@ -289,8 +291,8 @@ contains
   end subroutine register_contact
 
   !> Updates the sums of the flux changes after the velocity of disk i has changed at the time t. The time integral of a flux is the
-  !> present flux times the present time, minus the sum over all changes of the flux, each multiplied by the time of the change.
-  !> This expression is exact at any time.
+  !> present flux times the present time, minus the sum over all changes of the flux, each multiplied by the time of the change. The
+  !> expression for the time integral is exact at any time.
   pure subroutine record_velocity_change(self, i, before, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -348,7 +350,7 @@ contains
     call self%choose_units()
   end subroutine start_sums
 
-  !> Root mean square speed that kicks produce in the fastest species; 0 without kicks.
+  !> Root mean square speed that kicks produce in the fastest species; 0 if the disks are not driven by kicks.
   pure function fastest_drive(self) result(speed)
     class(simulation_t), intent(in) :: self
     real(real64) :: speed                         !! [length/time]

@@ -78,7 +78,7 @@ contains
   end subroutine choose_units
 
   !> Fluxes of a disk in free flight: the components xx, xy and yy of the momentum flux [energy], and the components x and y of the
-  !> kinetic energy flux [energy length/time]. The time integrals of these fluxes are the kinetic parts of the Helfand moments
+  !> kinetic energy flux [energy length/time]. The time integrals of the fluxes are the kinetic parts of the Helfand moments
   !> (Physical Review 119, 1 (1960)).
   pure function kinetic_flux(mass, v)
     real(real64), intent(in) :: mass
