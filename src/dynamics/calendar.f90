@@ -33,7 +33,8 @@ module calendar
   integer(int32), parameter :: chunk = shiftl(1_int32, log_chunk)
   integer(int32), parameter :: none = -1
 
-  !> An entry: a disk and the window of its event. In the first entry of a chunk, `disk` is the number of another chunk instead.
+  !> An entry: a disk and the window of its event. In the first entry of a chunk, which is a link, `disk` contains the number of the
+  !> previous chunk of the list instead of a disk.
   type :: filed_t
     integer(int32) :: disk
     integer(int32) :: window
@@ -42,8 +43,8 @@ module calendar
   type :: calendar_t
     type(bucket_t), allocatable :: bucket(:)       !! (0:last_bucket) circular buffer of the buckets of the next windows
     !> (0:last_span) position in `filed` after the last entry in the list of each span, 0 if the list is empty. `list_end` is a
-    !> circular buffer, like `bucket`. A span contains half as many windows as there are buckets. A list may also contain events of
-    !> later spans with the same index in the circular buffer.
+    !> circular buffer, like `bucket`. A span contains half as many windows as there are buckets. Because the buffer is circular,
+    !> the list of a span can also contain events of later spans that use the same element of `list_end`.
     integer(int32), allocatable :: list_end(:)
     !> (0:) the chunks of all lists. Each chunk contains a link to the previous chunk of the same list.
     type(filed_t), allocatable :: filed(:)
@@ -67,8 +68,8 @@ module calendar
 
 contains
 
-  !> Empties the calendar, and chooses the numbers of buckets and spans. With the intended mean number of events per window, buckets
-  !> and spans together cover 2n events, so that most events of n disks fit into the calendar. For many disks the number of buckets
+  !> Empties the calendar, and chooses the numbers of buckets and spans. The windows of all buckets and spans are intended to
+  !> contain at least 2n events in total, so that most events of n disks fit into the calendar. For many disks the number of buckets
   !> is limited, so that buckets and disks fit into the cache together. The number of cache lines that are written is smallest if
   !> the numbers of buckets and spans are equal.
   subroutine empty(self, n)
@@ -110,7 +111,8 @@ contains
     self%announced = window
   end subroutine begin
 
-  !> Adds a disk to the bucket of a later window before `ring_end`, unless the bucket is full.
+  !> Adds a disk to the bucket of a window that is later than the current window and earlier than `ring_end`, unless the bucket is
+  !> full.
   subroutine put_near(self, i, window, full)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: i, window
@@ -173,9 +175,8 @@ contains
     yes = iand(window, shiftl(1_int32, self%log_span) - 1) == 0
   end function span_begins
 
-  !> Moves the events of the next span into their buckets. The list can also contain events of later spans with the same index.
-  !> These events stay in the list if they are still valid. Disks whose events do not fit into a full bucket are returned in
-  !> `surplus`.
+  !> Moves the events of the next span into their buckets. Events of later spans, which the list can also contain, stay in the list
+  !> if the events are still valid. Disks whose events do not fit into a full bucket are returned in `surplus`.
   subroutine open_span(self, tag, n_surplus, surplus)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
@@ -211,9 +212,9 @@ contains
     end do
   end subroutine open_span
 
-  !> Lists disks that probably have events in the next windows, for one stage of prefetching. Each stage lists the disks of each
-  !> window once. The first stage looks ahead by the largest number of windows, and later stages look ahead by fewer windows. The
-  !> later stages omit disks whose entries have become invalid.
+  !> Lists disks that probably have events in the next windows, for one stage of prefetching. Each stage of prefetching lists the
+  !> disks of a window exactly once. The first stage looks ahead by the largest number of windows, and later stages look ahead by
+  !> fewer windows. All stages except the first omit disks whose entries have become invalid.
   subroutine list_coming(self, tag, window, stage, n, disks)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)

@@ -23,7 +23,7 @@ contains
   subroutine change_system(sim, system, problem)
     type(simulation_t), intent(inout) :: sim
     type(system_t), intent(in) :: system
-    !> Reason why the replacement is impossible; empty if the replacement succeeded.
+    !> Reason why the system cannot be replaced; empty if the system has been replaced.
     character(len=:), allocatable, intent(out) :: problem
     type(simulation_t) :: other
     ! Energy before the change [energy], old and new positions of the sides [length], velocity of a side [length/time]
@@ -60,8 +60,8 @@ contains
     call book(sim, before)
   contains
 
-    !> Sets `kicks` to the number of kicks that the new driving would have applied since the start of the run. This number of kicks
-    !> determines the time and the random numbers of the next kick.
+    !> Sets `kicks` to the number of kicks that the new driving would have applied since the start of the run. The time and the
+    !> random numbers of the next kick depend on the number of previous kicks.
     subroutine count_kicks()
       if (.not. sim%drive%is_on()) return
       sim%kicks = int(min(sim%time()/sim%drive%interval, 2.0_real64**62), int64)
@@ -109,7 +109,7 @@ contains
       if (any(sim%box%periodic)) image = sim%extra(i)%image
       old = sim%disk(i)%x
       v = sim%disk(i)%v
-      call wrap(sim, old, v, image)                          ! moves the old position into the box, as for a frame
+      call wrap(sim, old, v, image)                          ! moves the old position by whole periods into the box
       sim%disk(i)%x = x(:, sim%tag(i)%id)
       call wrap(sim, sim%disk(i)%x, v, image)
       if (any(sim%box%periodic)) sim%extra(i)%image = image
@@ -118,9 +118,10 @@ contains
     call book(sim, before)
   end subroutine change_positions
 
-  !> Advances all disks to the present time with the previous forces. The clocks of all disks are then equal. The procedure also
-  !> erases the last partner of each disk. After a change, as after a kick, a disk may collide with its last partner again
-  !> immediately. Without this erasure, such a collision would be mistaken for a rounding error of the previous collision.
+  !> Advances all disks to the present time with the previous forces. After this advance the clocks of all disks are equal. The
+  !> procedure also erases the last partner of each disk. After a change, as after a kick, a disk may collide with its last partner
+  !> again immediately. Without the erasure of the last partner, a new collision with this partner would be mistaken for a rounding
+  !> error of the previous collision.
   subroutine advance_all(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i
@@ -132,8 +133,8 @@ contains
     end do
   end subroutine advance_all
 
-  !> Adds the energy change that results from a change of the simulation to the work. The units of the exact sums are chosen as in a
-  !> run that starts with the new system.
+  !> Counts the change of the total energy since `before` as work on the disks. The units of the exact sums are chosen as in a run
+  !> that starts with the new system.
   subroutine book(sim, before)
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: before                       !! total energy before the change [energy]

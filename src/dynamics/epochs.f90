@@ -22,7 +22,7 @@ module epochs
   integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
   real(real64), parameter :: shortest = 2.0_real64**(-20)  !! shortest epoch in units of `negligible_time`
   real(real64), parameter :: last_time = 0.5_real64*never
-  real(real64), parameter :: crushing = 1.0e6_real64 !! disks are crushed if their energy grows by this factor
+  real(real64), parameter :: crushing = 1.0e6_real64 !! growth factor of the energy above which disks are considered crushed
   real(real64), parameter :: densest = 0.9_real64  !! largest packing fraction used in the estimate of the event rate
 
 contains
@@ -49,8 +49,8 @@ contains
     sim%events_then = sim%tally%events
   contains
 
-    !> Mean number of events of a disk per length of its path. The events are collisions with walls, and collisions with other disks
-    !> according to the equation of state of Henderson (Molecular Physics 30, 971 (1975)).
+    !> Mean number of events of a disk per length of its path. The estimate includes collisions with walls, and collisions with
+    !> other disks according to the equation of state of Henderson (Molecular Physics 30, 971 (1975)).
     pure function events_per_path() result(rate)
       real(real64) :: rate                           !! [1/length]
       real(real64) :: packing
@@ -98,9 +98,9 @@ contains
     call begin_epoch(sim, length)
   end subroutine move_epoch
 
-  !> Ends the epoch because the disks, the forces or the contact laws have been changed. Disks may be much faster after the change.
-  !> The time origin therefore moves exactly to the present time, and the length of the next epoch is determined when the evolution
-  !> starts. In time-stepped dynamics, which has no epochs, the procedure does nothing.
+  !> Ends the epoch because the disks, the forces or the contact laws have been changed. Disks can be much faster after a change of
+  !> the disks, forces or contact laws. The time origin therefore moves exactly to the present time, and the length of the next
+  !> epoch is determined when the evolution starts. In time-stepped dynamics, which has no epochs, the procedure does nothing.
   subroutine restart_epoch(sim)
     type(simulation_t), intent(inout) :: sim
 
@@ -131,7 +131,7 @@ contains
     end do
   end subroutine move_origin
 
-  !> Number of events since the start of the run at which the epoch ends early. This number is reached only if the event rate is far
+  !> Number of events since the start of the run at which the epoch ends early. An epoch ends early only if the event rate is far
   !> higher than expected, for example before an inelastic collapse.
   pure function most_events(sim) result(n)
     type(simulation_t), intent(in) :: sim
@@ -140,8 +140,8 @@ contains
     n = sim%epoch_events + 2*events_per_epoch(sim)
   end function most_events
 
-  !> Whether moving sides compress the disks beyond close packing, so that their energy grows without limit. The test does not apply
-  !> to simulations with another source of energy, such as driving or thermal walls.
+  !> Whether moving sides compress the disks beyond close packing, so that their energy grows without limit. The result is .false.
+  !> for simulations in which driving or thermal walls supply energy to the disks.
   pure function are_crushed(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes

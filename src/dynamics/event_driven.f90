@@ -1,5 +1,5 @@
 !> Event-driven dynamics: exact trajectories from event to event. Each disk stores one event, the earliest of its predicted events.
-!> When this event is due, the disks involved collide, and their next events are predicted.
+!> When the stored event of a disk is due, the disks involved collide, and their next events are predicted.
 !>
 !> The event of a disk becomes stale when its partner collides with a third disk before the event. The queue is not searched for
 !> stale events. A stale event is recognised by the collision counter of the partner when the event is due. A stale event is not
@@ -71,8 +71,8 @@ contains
     call self%queue%fill(sim%disk, sim%tag, sim%now, self%windowed)
   end subroutine start
 
-  !> Predicts the events of the changed disks again. If another disk stores an event with a changed disk, this event has become
-  !> stale.
+  !> Predicts the events of the changed disks again. An event that another disk stores, with a changed disk as its partner, has
+  !> become stale.
   subroutine renew(self, sim, changed)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -118,8 +118,8 @@ contains
     end do
   end subroutine renew_all
 
-  !> Executes events until a limit is reached. After a stop request the procedure returns early. Some predictions may then be
-  !> missing, but the state of the simulation is complete.
+  !> Executes events until a limit is reached. After a stop request the procedure returns early. When the procedure has returned
+  !> early, some predictions may be missing, but the state of the simulation is complete.
   subroutine advance(self, sim, limits, error, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -240,7 +240,7 @@ contains
     if (code > 0) then
       if (sim%disk(code)%collision_counter == sim%tag(i)%partner_counter) then
         ! The clocks of two disks are equal only if the disks are still in contact, or if both disks have collided at exactly this
-        ! time. Both cases are rare and need the general procedure.
+        ! time. Collisions of two disks with equal clocks are rare and need the general procedure.
         if (self%general .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0) then
           call collide(sim, i, code, t, counts, log)
         else
@@ -271,8 +271,8 @@ contains
   end subroutine execute
 
   !> Updates predicted events after a collision has changed the motion of a piston. Events are predicted again for disks whose next
-  !> event was a collision with the piston, and for disks that now reach the piston before their next event. The event loop then
-  !> returns, because the piston may leave its strip (see `piston_strips`) earlier.
+  !> event was a collision with the piston, and for disks that now reach the piston before their next event. After this update the
+  !> event loop returns, because the piston may leave its strip of cells (see `piston_strips`) earlier than expected.
   subroutine follow_side(self, sim, side)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -38,8 +38,9 @@ contains
     if (.not. (yes .or. a%time > b%time)) yes = wins(a, b, tag)
   end function precedes
 
-  !> Nonzero if a and b are different events at the same time, so that `precedes` has to determine their order. Event a must not be
-  !> earlier than event b. Two simultaneous events are usually one collision that both disks store; such events need no order.
+  !> Nonzero if a and b are different events at the same time, so that `precedes` has to determine their order. The caller ensures
+  !> that event a is not earlier than event b. Two simultaneous events are usually one collision that both disks store; the two
+  !> stored events of one collision need no order.
   elemental function need_order(a, b) result(bits)
     type(event_t), intent(in) :: a, b
     integer(int32) :: bits

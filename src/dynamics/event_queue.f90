@@ -1,7 +1,7 @@
 !> The event queue: a calendar combined with a heap (Paul, Journal of Computational Physics 221, 615 (2007)).
 !>
-!> Events of the current time window are in a short sorted list. If this list becomes full, its events are moved to the heap, and
-!> the heap is used until the end of the window. Events of later windows are in the calendar, or in the heap if their bucket is
+!> Events of the current time window are in a short sorted list. If the sorted list becomes full, its events are moved to the heap,
+!> and the heap is used until the end of the window. Events of later windows are in the calendar, or in the heap if their bucket is
 !> full. Single entries are never searched for or removed. An entry is valid only if the entry still equals the event that its disk
 !> stores. Without the calendar all events are in the heap.
 module event_queue
@@ -61,7 +61,7 @@ contains
     type(disk_t), intent(in) :: disk(:)
     type(tag_t), intent(inout) :: tag(:)
     real(real64), intent(in) :: now                !! time relative to the time origin `box%epoch` [time]
-    logical, intent(in) :: windowed                !! whether the calendar is used; .false.: all events are in the heap
+    logical, intent(in) :: windowed                !! whether the calendar is used; if not, all events are in the heap
     integer(int32) :: i
 
     self%n_disks = size(disk, kind=int32)
@@ -89,7 +89,8 @@ contains
   contains
 
     !> Width of a window that contains `events_per_window` events on average, from the event rate since the last call of `fill`. The
-    !> first estimate of the width uses the median waiting time of a sample of disks. The width is `never` if there are no events.
+    !> first estimate of the width uses the median waiting time of a sample of disks. If there are no events, the width is set to
+    !> the constant `never`.
     pure function window_width() result(width)
       real(real64) :: width, waits(sample_size), swap
       integer :: i, k, n_waits
@@ -126,7 +127,7 @@ contains
     logical :: full
 
     number = disk(i)%event_time*self%per_time
-    if (.not. number >= self%next_window) then     ! also true for a time of NaN, so that this error is detected immediately
+    if (.not. number >= self%next_window) then     ! also .true. if the event time is NaN, so that the error is detected immediately
       tag(i)%window = window_none
       call self%insert_near(disk, tag, i)
       return
@@ -144,8 +145,8 @@ contains
     end if
   end subroutine schedule
 
-  !> Removes the entry of a disk from the queue. The procedure only erases the window number of the disk. The entry itself becomes
-  !> invalid when the event of the disk changes.
+  !> Removes the entry of a disk from the queue. The procedure only erases the window number in the tag of the disk. The entry
+  !> remains stored, but becomes invalid when the event of the disk changes.
   pure subroutine remove_entry(self, tag)
     class(event_queue_t), intent(in) :: self
     type(tag_t), intent(inout) :: tag
@@ -194,7 +195,7 @@ contains
   end subroutine insert_into_heap
 
   !> Inserts an event into a sorted list of n events. The comparison of the times nearly always suffices to order two events. Two
-  !> simultaneous events are usually one collision that both disks store; such events need no order.
+  !> simultaneous events are usually one collision that both disks store; the two stored events of one collision need no order.
   pure subroutine insert(list, n, event, tag)
     type(event_t), intent(inout) :: list(0:*)
     integer(int32), intent(in) :: n
@@ -271,7 +272,8 @@ contains
   end subroutine drop_first
 
   !> Removes the next entry of the queue if this entry belongs to disk i. If both disks of a collision have stored the collision,
-  !> the two entries are adjacent. The removal of the second entry saves time but is not necessary.
+  !> the two entries are adjacent. The removal of the second entry of a collision saves time but is not necessary, because the entry
+  !> would later be recognised as invalid.
   subroutine drop_if_next(self, i)
     class(event_queue_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -317,9 +319,9 @@ contains
     if (self%calendar%span_begins(self%window)) call self%open_next_span(disk, tag)
   end subroutine open_next_window
 
-  !> Moves the valid events in a bucket to a sorted list. Events that are not before the next window are invalid. The position of
-  !> each event is found by counting the later events. Because a bucket contains few events, this counting is fast, and its branches
-  !> do not depend on times.
+  !> Moves the valid events in a bucket to a sorted list. If the stored event of a disk is not before the next window, the entry of
+  !> the disk in the bucket is invalid. The position of each event in the sorted list is found by counting the later events.
+  !> Counting is fast, because a bucket contains few events and no branch depends on their times.
   pure subroutine take_bucket(bucket, disk, tag, per_time, next_window, list, n)
     type(bucket_t), intent(inout) :: bucket
     type(disk_t), intent(in) :: disk(*)

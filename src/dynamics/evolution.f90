@@ -74,9 +74,9 @@ contains
     yes = tally%events >= self%events .or. tally%collisions >= self%collisions .or. self%outgrown(tally)
   end function reached
 
-  !> Whether a limit on a quantity that any collision may change is reached. The quantity must never decrease. A parallel run
-  !> detects only at the end of a time window that the quantity has exceeded its limit. The parallel run then repeats the window to
-  !> find the collision at which the limit was reached.
+  !> Whether a quantity that can change in any collision, such as the dissipated energy, has reached its limit. A quantity with a
+  !> limit must never decrease during a run. A parallel run detects only at the end of a time window that a quantity has exceeded
+  !> its limit. To find the collision at which a limit was reached, a parallel run repeats the window.
   pure function outgrown(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally
@@ -85,7 +85,7 @@ contains
     yes = tally%total(dissipated) >= self%dissipated
   end function outgrown
 
-  !> Whether there is a limit on a quantity that any collision may change.
+  !> Whether the run has a limit on a quantity that can change in any collision, such as the dissipated energy.
   pure function watches(self) result(yes)
     class(limits_t), intent(in) :: self
     logical :: yes
@@ -102,7 +102,8 @@ contains
     text = ""
   end function warning
 
-  !> The earliest time, at or after `time`, at which a change to all disks can occur between two steps of the dynamics.
+  !> The earliest time, not before `time`, at which the dynamics can pause for an action on all disks. Time-stepped dynamics can
+  !> pause only between two steps.
   pure function pause_at(self, time) result(t)
     class(evolution_t), intent(in) :: self
     real(real64), intent(in) :: time              !! time since the start of the run

@@ -31,8 +31,8 @@ module histories
     integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! range of columns and rows outside of all other patches
     !> Range of columns and rows of the cells whose eight neighbours are all in the patch.
     integer(int32) :: safe_low(2) = 0, safe_high(2) = 0
-    !> (0:,0:) 1 if, outside of the domain, a disk that the domain owns was in this cell or in one of the eight cells around this
-    !> cell.
+    !> (0:,0:) 1 for each cell that a disk of the domain has reached outside of the domain, and for the eight neighbours of the
+    !> cell; 0 for all other cells.
     integer(int8), allocatable :: reached(:, :)
     logical :: left_patch = .false.                !! whether a disk that the domain owns has reached the edge of the patch
   contains
@@ -52,7 +52,7 @@ module histories
 
 contains
 
-  !> Starts a new window. At its start no disk that the domain owns has left the domain.
+  !> Starts a new window. At the start of a window, no disk that the domain owns has left the domain.
   subroutine begin_window(self)
     class(histories_t), intent(inout) :: self
 
@@ -159,7 +159,7 @@ contains
 
     if (self%history_of(i) == 0) then
       if (within(cell, self%deep_low, self%deep_high)) return
-      call self%add_history(i)                     ! a disk in this cell can be in the patches of other domains
+      call self%add_history(i)                     ! a disk in this cell can also be in the patches of other domains
       self%history(self%history_of(i)) = history_t(0_int64, i, .true., cell, cell)
     end if
     associate (history => self%history(self%history_of(i)))
@@ -169,8 +169,8 @@ contains
     end associate
   end subroutine record_cell
 
-  !> Records that a disk that the domain owns is in a cell outside of the domain. The disk may touch any disk in this cell and in
-  !> the eight neighbouring cells.
+  !> Records that a disk that the domain owns is in a cell outside of the domain. A disk in a cell can touch any disk in the cell
+  !> and in the eight neighbouring cells.
   subroutine reach(self, cell)
     class(histories_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)

@@ -66,7 +66,8 @@ contains
   end subroutine kick
 
   !> Applies a kick to disk i. In a sheared box the random velocity is relative to the velocity profile. The procedure erases the
-  !> last partner of disk i, because the two disks may now collide again immediately. A kick does not count as a collision.
+  !> last partner of disk i, because the kick may cause an immediate collision of disk i with its last partner. A kick does not
+  !> count as a collision.
   subroutine kick_disk(sim, i, key, is_hit, z)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

@@ -1,8 +1,9 @@
 !> Determines when a run ends: when one of the stop rules in the input is met, or when rounding errors dominate.
 !>
-!> Inelastic disks in a periodic box cool without end. The run ends when rounding errors dominate the temperature. This test is made
-!> at the start of each epoch, so that the end of the run depends on the trajectory alone. The test compares the energy with the
-!> energy at the time when the velocities were last set, because that energy determines the magnitude of the rounding errors.
+!> Inelastic disks in a periodic box cool without end. The run ends when rounding errors dominate the temperature. The test for a
+!> negligible temperature is made at the start of each epoch, so that the end of the run depends on the trajectory alone. The test
+!> compares the kinetic energy with its value at the time when the velocities were last set, because the earlier value determines
+!> the magnitude of the rounding errors.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use epochs, only: is_at_rest, stands_still
@@ -63,8 +64,8 @@ contains
       .and. .not. sim%is_driven()
   end function new_stop_rule
 
-  !> A real number of collisions, rounded up to an integer. Rounding errors of the number are ignored. The result is huge(n) if the
-  !> number exceeds the range of 64-bit integers.
+  !> A real number of collisions, rounded up to an integer. A number of collisions may exceed an integer by a few rounding errors
+  !> without being rounded up to the next integer. The result is huge(n) if the number exceeds the range of 64-bit integers.
   pure function whole_collisions(number) result(n)
     real(real64), intent(in) :: number
     integer(int64) :: n
@@ -83,8 +84,8 @@ contains
     if (.not. yes .and. self%limits%at_rest) yes = stands_still(sim) .and. is_at_rest(sim)
   end function is_met
 
-  !> Whether the disks are at rest and the input contains the stop rule `at_rest`. This test is needed in simulations without
-  !> gravity. Disks at rest then have no events, so that the test at the end of an epoch is never made.
+  !> Whether the disks are at rest and the input contains the stop rule `at_rest`. The function `rests` is needed in simulations
+  !> without gravity. Without gravity disks at rest have no events, so that the test for rest at the end of an epoch is never made.
   pure function rests(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -94,7 +95,7 @@ contains
     if (yes) yes = is_at_rest(sim)
   end function rests
 
-  !> Whether the kinetic energy relative to the mean velocity was negligible at the beginning of the epoch.
+  !> Whether rounding errors dominate the kinetic energy of the motion relative to the mean velocity, at the start of an epoch.
   pure function too_cold(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -118,8 +119,8 @@ contains
       yes = self%rests(sim) .or. .not. min(self%limits%time, next_kick(evolution, sim)) < never
   end function is_over
 
-  !> Kinetic energy of the motion relative to the mean velocity. The computation has two passes, because a difference of two large
-  !> sums would lose precision.
+  !> Kinetic energy of the motion relative to the mean velocity. The mean velocity is computed first, in a separate pass over the
+  !> disks, because a difference of two large sums would lose precision.
   pure function relative_energy(sim) result(energy)
     type(simulation_t), intent(in) :: sim
     real(real64) :: energy                          !! [energy]
@@ -138,8 +139,8 @@ contains
     end do
   end function relative_energy
 
-  !> Completed fraction of the run, from 0 to 1. For each stop rule the present value is divided by the limit, and the largest of
-  !> these ratios is returned.
+  !> Completed fraction of the run, from 0 to 1. The result is the largest ratio of a present value to its limit among all stop
+  !> rules.
   pure function share(self, sim, elapsed) result(done)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

@@ -1,7 +1,7 @@
-!> Time-stepped dynamics. In each step of fixed length all disks first move in exact free flight. After this flight each disk beyond
-!> a wall is reflected, and each pair of disks that overlap and approach each other collides once. A contact is detected up to one
-!> step late, and a contact that begins and ends within a step is not detected. The method serves for comparisons with event-driven
-!> dynamics.
+!> Time-stepped dynamics. In each step of fixed length all disks first move in exact free flight. After the free flight each disk
+!> beyond a wall is reflected, and each pair of disks that overlap and approach each other collides once. A contact is detected up
+!> to one step late, and a contact that begins and ends within a step is not detected. The method serves for comparisons with
+!> event-driven dynamics.
 !>
 !> As in event-driven dynamics, the stored state of a disk changes only when this disk collides, so that rounding errors do not
 !> accumulate from step to step.
@@ -112,8 +112,8 @@ contains
     end do
   end subroutine advance
 
-  !> Number of steps before the present time: the largest integer k with k*dt <= now. The number depends on the present time and the
-  !> length of a step alone.
+  !> Number of steps before the present time: the largest integer k with k*dt <= now. The number of steps depends on the present
+  !> time and the length of a step alone.
   pure function steps_taken(now, dt) result(k)
     real(real64), intent(in) :: now, dt             !! [time]
     integer(int64) :: k
@@ -138,8 +138,9 @@ contains
   end function at_rest
 
   !> Advances all disks to the time t and executes all collisions at this time. Collisions with sides come first, then collisions
-  !> with obstacles, then collisions of two disks. Each kind is in ascending order of the indices, so that the result does not
-  !> depend on the search for pairs. A stop request ends a long search before the state has changed.
+  !> with obstacles, then collisions of two disks. Within each of the three kinds, collisions are executed in ascending order of the
+  !> indices, so that the result does not depend on the search for pairs. A stop request ends a long search before the state has
+  !> changed.
   subroutine take_step(self, sim, t, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

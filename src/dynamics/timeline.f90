@@ -1,5 +1,5 @@
 !> Executes the actions that affect all disks at once, in a fixed order. At equal times collisions are executed first, then kicks,
-!> then the actions of the caller (samples, end of the run). The time origin moves between these actions.
+!> then the actions of the caller (samples, end of the run). The time origin moves between these actions, at the end of an epoch.
 module timeline
   use encounters, only: encounter_text
   use box_geometry, only: wall_normal
@@ -37,8 +37,9 @@ contains
     end do
   end subroutine advance
 
-  !> Advances the simulation until a limit is reached, a kick is due, or the epoch ends. The procedure then executes the kick or
-  !> starts the next epoch. The trajectory does not depend on the times at which the procedure returns.
+  !> Advances the simulation until a limit is reached, a kick is due, or the epoch ends. If a kick is due or the epoch has ended,
+  !> the procedure executes the kick or starts the next epoch. The trajectory does not depend on the times at which the procedure
+  !> returns.
   subroutine advance_once(evolution, sim, limits, error, log)
     class(evolution_t), intent(inout) :: evolution
     type(simulation_t), intent(inout) :: sim
@@ -57,7 +58,7 @@ contains
     due = min(limits%time, kick_time)
     goal = limits
     until = due - sim%box%epoch
-    if (sim%box%epoch + until < due) until = nearest(until, 1.0_real64)   ! a time that is rounded down would never be reached
+    if (sim%box%epoch + until < due) until = nearest(until, 1.0_real64)   ! rounded up; otherwise `due` would never be reached
     goal%time = until
     if (sim%epoch_end > 0) then                    ! time-stepped dynamics has no epochs
       goal%time = min(goal%time, sim%epoch_end)
@@ -109,9 +110,9 @@ contains
     end subroutine end_epoch
   end subroutine advance_once
 
-  !> Number of iterations that take about `pause_interval`. The number of iterations increases only if all iterations were used.
-  !> Otherwise the number would become arbitrarily large in a run with many samples, and signals would not be checked for hours
-  !> after the last sample.
+  !> Number of iterations that take about `pause_interval`. The number is increased only after a call that used all its iterations.
+  !> If calls that reach a limit early also increased the number, the number would become arbitrarily large in a run with many
+  !> samples, and signals would not be checked for hours after the last sample.
   pure function adapted_iterations(iterations, elapsed, cut_short) result(n)
     integer(int64), intent(in) :: iterations
     real(real64), intent(in) :: elapsed               !! wall-clock time of the iterations that were used [s]
@@ -127,7 +128,7 @@ contains
   pure function next_kick(evolution, sim) result(t)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
-    real(real64) :: t                              !! time since the start of the run, or `never` without kicks
+    real(real64) :: t                              !! time since the start of the run; set to `never` if there are no kicks
 
     t = evolution%pause_at(sim%drive%time_of(sim%kicks + 1))
   end function next_kick
@@ -200,7 +201,7 @@ contains
   end function collapse_note
 
   !> Advice to set a contact duration that is much longer than the times in a collapse and much shorter than the mean time between
-  !> collisions. The advice contains numbers if these times are known.
+  !> collisions. The advice contains a suitable contact duration, unless the present contact duration is already long.
   pure function longer_contacts(sim) result(text)
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text

@@ -49,7 +49,7 @@ contains
   end subroutine shift
 
   !> Makes a new list, unless all disks have moved by less than half the skin since the last list was made. With `all_pairs` a new
-  !> list is made in every step, by a test of all pairs. A stop request ends this procedure early, and the list is then incomplete.
+  !> list is made in every step, by a test of all pairs. After a stop request the procedure returns early, with an incomplete list.
   subroutine update(self, sim, x, step, all_pairs)
     class(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -129,8 +129,8 @@ contains
 
   !> Adds the pairs of disks that are close to each other. The search for each disk finds smaller disks, and disks of equal size
   !> with higher indices. The search for a small disk therefore covers only few bins, however large the largest disk is. The grid of
-  !> bins is treated as periodic along both axes. Near walls this periodicity has no effect, because disks near opposite walls are
-  !> too far apart to form a pair.
+  !> bins is treated as periodic along both axes. Near walls the periodicity of the grid has no effect, because disks near opposite
+  !> walls are too far apart to form a pair.
   subroutine list_disks(self, sim, x, bins)
     type(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -158,7 +158,7 @@ contains
       do iy = low(2), high(2)
         row = bins(1)*modulo(iy, bins(2))
         call add_run(row + from, row + min(to, bins(1)))
-        call add_run(row + 1, row + to - bins(1))           ! part of the range of bins beyond the last column
+        call add_run(row + 1, row + to - bins(1))           ! the rest of the range, which continues at the first column
       end do
     end do
     call sort_pairs(self%i(first_pair:self%n), self%partner(first_pair:self%n), size(x, 1, kind=int32))
@@ -247,7 +247,7 @@ contains
     self%partner(self%n) = partner
   end subroutine append
 
-  !> Sorts pairs of disks by i, then by partner.
+  !> Sorts pairs of disks by the first disk `i`, and pairs with the same first disk by the second disk `partner`.
   subroutine sort_pairs(i, partner, n_disks)
     integer(int32), intent(inout) :: i(:), partner(:)
     integer(int32), intent(in) :: n_disks
