@@ -1,7 +1,7 @@
 !> Compares and corrects copies of disks after each time window. A domain compares its copies of disks with the original disks,
 !> which other domains own. A copy is wrong if the copy has not moved in the same way as the original disk. If a disk that the
-!> domain owns can have touched a wrong copy, the window is invalid. If not, the wrong copies are corrected. The page docs/theory.md
-!> proves that this criterion is sufficient.
+!> domain owns can have touched a wrong copy, the window is invalid. If the window is valid, wrong copies are corrected. The page
+!> docs/theory.md proves that this criterion for valid windows is sufficient.
 module domain_borders
   use kinds, only: int16, int32, int64
   use domains, only: correction_t, domain_t, forever, list_copies, slot_of_copy
@@ -105,7 +105,7 @@ contains
       yes = all(transfer(self%sim%extra(s), [0_int64]) == transfer(other%sim%extra(t), [0_int64]))
     end function same_state
 
-    !> Adds the true state of a disk to the list of corrections. The disk has the index t in the neighbouring domain.
+    !> Adds the true state of a disk, which has the index t in the neighbouring domain, to the list of corrections.
     subroutine add_correction()
       if (.not. allocated(self%corrections)) allocate (self%corrections(256))
       if (self%n_corrections == size(self%corrections)) self%corrections = [self%corrections, self%corrections]

@@ -30,7 +30,7 @@ contains
     logical, intent(in) :: periodic(2)
     integer(int16), intent(in) :: cell(:, :)       !! (2,disks) cell of each disk
     integer(int32), intent(in) :: wanted, threads, halo
-    integer(int32), allocatable :: slab(:), piece(:)       ! first cell of each piece; last element: number of cells plus 1
+    integer(int32), allocatable :: slab(:), piece(:)       ! first cell of each piece, followed by the number of cells plus 1
     integer(int32), allocatable :: weight(:), weights(:, :)
     integer(int32) :: n(2), i, s, k, r
 

@@ -1,8 +1,8 @@
 !> One domain of a simulation that is divided among threads. A domain owns the disks in a rectangle of cells. The domain also
-!> contains copies of the disks in the halo, which consists of the cells around this rectangle. The rectangle and the halo form the
-!> patch of the domain. Each domain has its own event-driven engine. Disks that would enter the patch during a time window are
-!> missing in the domain. Errors in the motion of copies therefore spread inwards from the edge of the patch during the window,
-!> until `domain_borders` corrects the copies.
+!> contains copies of the disks in the halo, which consists of the cells around the rectangle of the domain. The rectangle and the
+!> halo form the patch of the domain. Each domain has its own event-driven engine. Disks that would enter the patch during a time
+!> window are missing in the domain. Errors in the motion of copies therefore spread inwards from the edge of the patch during the
+!> window, until `domain_borders` corrects the copies.
 module domains
   use kinds, only: int32, int64, real64
   use cell_faces, only: patch_t
@@ -27,8 +27,8 @@ module domains
   !> A domain with n disks has n/spare + spare_at_least vacant slots (array elements without a disk) for disks that enter the patch.
   integer(int32), parameter :: spare = 32, spare_at_least = 200
 
-  !> The true state of a disk, with which a domain updates a wrong copy of the disk or adds a missing copy. If the disk has left the
-  !> patch, the domain removes its copy.
+  !> The true state of a disk, with which a domain updates a wrong copy of the disk or adds a missing copy. If a disk has left the
+  !> patch, the domain removes its copy of the disk.
   type, extends(whole_disk_t) :: correction_t
     integer(int32) :: global_index = 0             !! index of the disk in the whole simulation
     !> Column and row of the disk relative to the patch of this domain; the disk may be outside the patch.
@@ -48,7 +48,7 @@ module domains
     !> (slots) Index of each disk in the whole simulation. The elements of `global_index` at vacant slots form a linked list of the
     !> vacant slots.
     integer(int32), allocatable :: global_index(:)
-    integer(int32) :: vacant = 0                   !! first vacant slot; 0: none
+    integer(int32) :: vacant = 0                   !! index of the first vacant slot; 0 if no slot is vacant
     type(event_log_t), allocatable :: log          !! log of the collisions that this domain counts
     integer(int64) :: iterations = 0               !! number of iterations of the engine in this window
     logical :: done = .false.                      !! whether the engine has reached the end of the window
@@ -246,7 +246,7 @@ contains
   end subroutine write_back
 
   !> Moves the log entries of all domains to the log of the whole simulation, sorted by time. The order of simultaneous collisions
-  !> in different domains is unknown. If such collisions exist, `good` is .false.
+  !> in different domains is unknown. `good` is .false. if the logs of different domains contain simultaneous collisions.
   subroutine merge_logs(domain, log, good)
     type(domain_t), intent(inout) :: domain(:)
     type(event_log_t), intent(inout) :: log

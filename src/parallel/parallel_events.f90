@@ -20,12 +20,12 @@ module parallel_events
   integer, parameter :: most_windows = 24                      !! largest number of windows in one call of `run_domains`
   real(real64), parameter :: shortest = 0.1_real64             !! shortest window that is tried, relative to the usual length
   !> Numbers of events per disk that must remain before a limit is reached; with fewer remaining events the serial engine is used.
-  !> `least_left` applies while domains are in use, and `least_left_to_begin` applies before domains are started.
+  !> The required number of events per disk is `least_left` while domains are in use, and `least_left_to_begin` otherwise.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
   ! Shortest and longest periods for which the serial engine is used [events per disk]
-  integer(int64), parameter :: brief(2) = 5                         !! after a situation in which domains cannot be used
-  integer(int64), parameter :: after_failures(2) = [5, 5*2**20]     !! after invalid windows
-  integer(int64), parameter :: while_busy(2) = [50, 1600]           !! while other programs use the cores
+  integer(int64), parameter :: brief(2) = 5                         !! shortest and longest period if domains cannot be used
+  integer(int64), parameter :: after_failures(2) = [5, 5*2**20]     !! shortest and longest period after invalid windows
+  integer(int64), parameter :: while_busy(2) = [50, 1600]  !! shortest and longest period while other programs use the cores
 
   !> Values of `predicted_by`: the engine that has predicted the events.
   integer, parameter :: no_engine = 0, serial_engine = 1, all_domains = 2
@@ -34,8 +34,8 @@ module parallel_events
     !> Template of the serial engine, which is copied when the serial engine is needed.
     type(event_driven_t) :: serial
     type(partition_t) :: parts
-    !> Smallest number of disks in a domain. The number is doubled in a periodic box, because domains in a periodic box have
-    !> neighbouring domains on all sides.
+    !> Smallest number of disks in a domain. The smallest number is doubled in a periodic box, in which domains have neighbouring
+    !> domains on all sides.
     integer(int32) :: least_disks = 1250
     integer(int32) :: most_disks = 62000           !! largest number of disks in a domain that fits into the cache
     !> Average number of active cores below which the serial engine is faster than several threads.
@@ -73,7 +73,7 @@ contains
   end subroutine start
 
   !> Updates the predicted events after disks have been changed. The serial engine predicts the events of the changed disks again.
-  !> Domains cannot be updated and are loaded again.
+  !> Domains cannot update their predicted events and are loaded again.
   subroutine renew(self, sim, changed)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -114,7 +114,7 @@ contains
     if (serially) call advance_serially()
     if (self%parts%wanted > self%parts%threads .and. allocated(self%parts%domain) .and. &
       (sim%now >= sim%epoch_end .or. sim%tally%events >= most_events(sim))) then
-      deallocate (self%parts%domain)               ! frees memory for sorting the disks
+      deallocate (self%parts%domain)               ! the freed memory is needed to sort the disks
       self%predicted_by = no_engine
     end if
   contains
@@ -129,8 +129,8 @@ contains
         .and. limits%collisions - sim%tally%collisions > least .and. limits%time > sim%now
     end function domains_pay
 
-    !> Advances the domains by several windows. If one of these windows is invalid, the simulation keeps the state before the call,
-    !> and the next call tries shorter windows.
+    !> Advances the domains by several windows. If any window is invalid, the simulation keeps its state before the call, and the
+    !> next call tries shorter windows.
     subroutine run_domains()
       real(real64) :: t
       integer :: windows, listed
@@ -173,17 +173,17 @@ contains
       if (all(self%parts%domain%engine%idle)) call use_serial_engine(brief)
     end subroutine run_domains
 
-    !> Largest number of windows in a call of `run_domains`. This number is smaller after recent failures, because an invalid window
-    !> invalidates all windows of the call.
+    !> Largest number of windows in a call of `run_domains`. After recent failures the largest number is smaller, because an invalid
+    !> window invalidates all windows of the call.
     pure function most_windows_now() result(n)
       integer :: n
 
       n = max(1, int(most_windows*self%parts%shortening**4))
     end function most_windows_now
 
-    !> Makes windows longer after a call in which all windows were valid. The length of windows is constant within a call. If the
-    !> length increased after each window, a single call could undo the reduction after the last failure. An invalid window would
-    !> then discard the whole call again, and the run would make no progress.
+    !> Makes windows longer after a call in which all windows were valid. The length of windows is constant within a call. If
+    !> windows became longer after each valid window, a single call could undo the shortening after the last failure. An invalid
+    !> window at the end of each call would discard all windows of the call, and the run would make no progress.
     subroutine lengthen_windows(windows)
       integer, intent(in) :: windows               !! number of windows in the last call
 

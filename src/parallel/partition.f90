@@ -21,7 +21,7 @@ module partition
   !> Wall-clock time after which `run_windows` returns, so that the caller can check signals [s]
   real(real64), parameter :: longest_call = 1.0_real64
   real(real64), parameter :: averaging_time = 0.1_real64       !! averaging time for the number of active cores [s]
-  !> If fewer events than this number remain before a limit is reached, the domains advance one event at a time.
+  !> If fewer than `few_events` events remain before a limit is reached, the domains advance one event at a time.
   real(real64), parameter :: few_events = 20.0_real64
 
   !> The next step of all threads, which one thread determines while the other threads wait.
@@ -43,7 +43,7 @@ module partition
     integer(int32) :: wanted = 1                   !! number of domains
     real(real64) :: window = 0.5_real64            !! length of a window [collisions per disk]
     integer(int32) :: halo = 6                     !! width of the halo around a domain [cells]
-    !> Limit of the iterations of one engine in a step, relative to the number of iterations expected in all domains.
+    !> Largest number of iterations of one engine in a step, divided by the number of iterations expected in all domains together.
     real(real64) :: overload = 4.0_real64
     type(patch_t) :: whole                         !! all cells of the box, which are constant during a run
     type(domain_cuts_t) :: cuts
@@ -129,7 +129,7 @@ contains
   end function total_tally
 
   !> Executes successive windows in all domains, until a window is invalid, a limit is reached, or `longest_call` has passed. A
-  !> window ends early when a count reaches its limit. `good` is .true. if all windows are valid.
+  !> window ends early when the number of events or collisions reaches its limit. `good` is .true. if all windows are valid.
   !>
   !> The threads synchronise twice in each window: before the domains are compared, and before the states that the comparison uses
   !> are changed.
@@ -209,9 +209,10 @@ contains
       call choose_target()
     end subroutine begin_window
 
-    !> Chooses the time up to which all domains advance next. This time is the end of the window, unless a count would exceed its
-    !> limit in the window. If a limit is near, the domains first advance through most of the remaining events, and finally one
-    !> event at a time. The limit of iterations bounds the work of each engine if the estimated event rate is wrong.
+    !> Chooses the time up to which all domains advance next. The chosen time is the end of the window, unless the number of events
+    !> or collisions would exceed its limit in the window. If a limit is near, the domains first advance through most of the
+    !> remaining events, and finally one event at a time. The limit of iterations bounds the work of each engine if the estimated
+    !> event rate is wrong.
     subroutine choose_target()
       real(real64) :: expected, sure, next
       integer(int32) :: k
@@ -235,7 +236,7 @@ contains
 
     !> Determines after the comparison whether the window is valid, and whether another window is started.
     subroutine end_window()
-      ! If events_left() is negative, simultaneous events have exceeded the limit.
+      ! A negative value of events_left() means that simultaneous events have exceeded the limit of events or collisions.
       plan%valid = all(self%domain%done) .and. all(self%domain%valid) .and. events_left() >= 0
       if (plan%valid) then
         call self%update_rates(sum(self%domain%sim%tally%events) - plan%events, sum(self%domain%iterations), plan%t - plan%t_begin)
@@ -247,7 +248,7 @@ contains
       if (plan%continues) call begin_window()
     end subroutine end_window
 
-    !> Number of events that remain before a count reaches its limit.
+    !> Number of events that can be executed before the number of events or the number of collisions reaches its limit.
     pure function events_left() result(events)
       real(real64) :: events
 
