@@ -13,12 +13,12 @@ module cell_contents
   integer(int32), parameter :: cell_capacity = 3
   integer(int32), parameter :: count_slot = cell_capacity + 1
   integer(int32), parameter :: counted = 65535               !! bit mask of the number of disks in the slots
-  integer(int32), parameter :: crowd = counted + 1           !! increment that counts one crowded cell
+  integer(int32), parameter :: crowd = counted + 1           !! increment of the bit field that counts crowded cells
   integer(int32), parameter :: marked = shiftl(crowd, 8)     !! bit of the mark, above the bits that count crowded cells
 
-  !> The slots of a cell, and a last element that consists of bit fields. A slot contains the index of a disk, counted from 0. In
-  !> the last element, bits 0 to 15 contain the number of disks in the slots. Bits 16 to 23 contain the number of crowded cells
-  !> among the cell and its eight neighbours. Bit 24 is the mark of the cell: see `cell_grid: mark`.
+  !> The array `slot` of a cell contains the slots and, as its last element, bit fields. A slot contains the index of a disk,
+  !> counted from 0. In the last element of `slot`, bits 0 to 15 contain the number of disks in the slots. Bits 16 to 23 contain the
+  !> number of crowded cells among the cell and its eight neighbours. Bit 24 is the mark of the cell: see `cell_grid: mark`.
   type :: cell_t
     integer(int32) :: slot(count_slot)
   contains
@@ -213,9 +213,9 @@ contains
     n = first + iand(first, merge(0, 1, self%slot(2) == i - 1))
   end function slots_before
 
-  !> Lists the disks in the slots of cell c and its eight neighbours, except disk i, which is in cell c. Occupied and vacant slots
-  !> of a cell are copied, so that no branch depends on the numbers of disks. If disk i is in the linked list of a crowded cell and
-  !> not in a slot, the procedure omits the head of the linked list instead of disk i.
+  !> Lists the disks in the slots of cell c and its eight neighbours, except disk i, which is in cell c. All slots of a cell are
+  !> copied, whether occupied or vacant, so that no branch depends on the numbers of disks. If disk i is in the linked list of a
+  !> crowded cell and not in a slot, the procedure omits the head of the linked list instead of disk i.
   subroutine gather(cell, c, stride, i, list, n)
     type(cell_t), intent(in) :: cell(0:*)
     integer(int32), intent(in) :: c, stride, i
@@ -252,9 +252,9 @@ contains
     n = n + cell%in_slots()
   end subroutine append
 
-  !> Prefetches the data that are needed to predict the events of some disks. The first stage prefetches the records of these disks,
-  !> the second stage prefetches their cells, and the third stage prefetches the disks in the cells. The data for the collision
-  !> partner of a disk are prefetched one stage later than the data for the disk.
+  !> Prefetches the data that are needed to predict the events of some disks. Prefetching has three stages: first the records of the
+  !> given disks, then their cells, and finally the disks in the cells. The data for the collision partner of a disk are prefetched
+  !> one stage later than the data for the disk.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(cell_contents_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)

@@ -1,8 +1,8 @@
 !> The faces of the cells, and the times when disks leave their cells. The sides of the box are also faces of cells.
 !>
 !> Neighbouring cells overlap. The overlap is as wide as possible under the condition that disks in cells that are not adjacent
-!> cannot touch. A disk in the overlap of two cells is assigned to the cell that the disk leaves last. If the cells are wide, the
-!> overlap halves the number of crossings of faces.
+!> cannot touch. A disk in the overlap of two cells is assigned to the cell that the disk leaves last. If cells are much wider than
+!> disks, the overlap halves the number of events in which disks cross faces.
 module cell_faces
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t
@@ -18,8 +18,8 @@ module cell_faces
   public :: all_cells, cell_faces_t, line_t, patch_t
 
   !> A patch: a rectangular block of cells. A patch usually consists of all cells into which the box is divided. In a parallel run
-  !> the patch of a domain consists of a part of these cells, and may extend across a periodic side. An outer face of a patch that
-  !> is not a side of the box is open: a disk that crosses an open face leaves the patch.
+  !> the patch of a domain consists of a part of the cells of the box, and may extend across a periodic side. An outer face of a
+  !> patch that is not a side of the box is open: a disk that crosses an open face leaves the patch.
   type :: patch_t
     integer(int32) :: whole(2) = 0                 !! numbers of columns and rows in the box
     integer(int32) :: first(2) = 1                 !! first column and row of the patch; less than 1 beyond a periodic side
@@ -28,8 +28,8 @@ module cell_faces
     real(real64) :: reach = 0.0_real64             !! largest distance between the centres of two disks in contact [length]
     real(real64) :: lower(2) = 0.0_real64          !! lower left corner of the box [length]
     real(real64) :: width(2) = 0.0_real64          !! distance between the centres of adjacent cells [length]
-    ! Columns and rows at a periodic side inside the patch: `last` is before the side, and `next` is behind the side. Both
-    ! components are 0 along an axis without a periodic side inside the patch.
+    ! If a periodic side of the box is inside the patch, `last` is the last column or row before the side, and `next` is the first
+    ! column or row behind the side. Along an axis without a periodic side inside the patch, `last` and `next` are 0.
     integer(int32) :: last(2) = 0
     integer(int32) :: next(2) = 0
   contains
@@ -46,8 +46,8 @@ module cell_faces
   !> A line that limits a cell, parallel to an axis: a face of a column or row of cells, or a side of the box.
   type :: line_t
     real(real64) :: place = 0.0_real64             !! position of the face or side [length]
-    !> Distance between the line and the centre of a disk at the event, in radii of the disk. The distance is 0 for a face or a
-    !> periodic side, 1 for a lower wall, and -1 for an upper wall.
+    !> Signed distance from the line to the centre of a disk at the event, in radii of the disk. The signed distance is 1 for a left
+    !> or bottom wall, -1 for a right or top wall, and 0 for a face or a periodic side.
     real(real64) :: inset = 0.0_real64
     integer(int32) :: code = 0                     !! code of the event: contact with a side, or crossing of a face
     logical :: struck = .false.                    !! whether a moving side may touch disks in this cell
@@ -64,7 +64,7 @@ module cell_faces
     real(real64) :: due = never                    !! time when the first piston leaves its strip, relative to `box%epoch` [time]
     !> Centre of the strip of each piston, as an inward displacement from the mean position of the side [length]
     real(real64) :: centre(n_sides) = 0.0_real64
-    real(real64) :: beyond(2, 2) = 0.0_real64      !! (axis, lower or upper) largest distance of disks beyond the sides [length]
+    real(real64) :: beyond(2, 2) = 0.0_real64  !! (axis, lower or upper side) largest distance of disks beyond each side [length]
     type(line_t), allocatable :: column(:, :)      !! (0:1,columns) left and right faces
     type(line_t), allocatable :: row(:, :)         !! (0:1,rows) lower and upper faces
   contains
@@ -91,7 +91,7 @@ contains
     patch%n = n
     patch%reach = reach
     patch%lower = box%lower
-    ! The factor ensures that rounding does not place the last face inside the box.
+    ! The width is slightly increased, so that rounding errors cannot place the last face inside the box.
     patch%width = box%edges()/n*(1 + 4*epsilon(reach))
     call patch%find_sides(box%periodic)
   end function all_cells
@@ -139,7 +139,7 @@ contains
     yes = all(cell >= 1 .and. cell <= self%n)
   end function holds
 
-  !> Whether each cell in a list of cells of the whole grid is inside the patch.
+  !> Determines for each given cell, whose column and row refer to the whole grid, whether the patch contains the cell.
   pure function covers(self, cell) result(yes)
     class(patch_t), intent(in) :: self
     integer(int16), intent(in) :: cell(:, :)       !! (2,n)
@@ -183,7 +183,7 @@ contains
     end associate
   end subroutine step
 
-  !> Whether two patches consist of equal cells for disks of equal size.
+  !> Whether two patches have the same cells, which were chosen for disks of the same sizes.
   pure function equals(self, other) result(yes)
     class(patch_t), intent(in) :: self
     type(patch_t), intent(in) :: other
@@ -250,9 +250,8 @@ contains
     end subroutine find_struck
   end subroutine set
 
-  !> Finds the columns and rows in which a piston may touch disks before it has moved by the width of a cell. The outermost cells
-  !> also contain the disks outside of all cells. A piston outside of all cells can therefore touch the disks in the outermost
-  !> cells.
+  !> Finds the columns and rows in which a piston may touch disks before the piston has moved by the width of a cell. Disks outside
+  !> of all cells belong to the outermost cells. A piston outside of all cells can therefore touch the disks in the outermost cells.
   pure subroutine find_strips(self, box, small, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -269,7 +268,7 @@ contains
     call self%watch_pistons(box, now)
   contains
 
-    !> Marks the columns or rows along one axis that are in a strip.
+    !> Marks the columns (axis 1) or rows (axis 2) that belong to the strip of a piston.
     pure subroutine mark(line, axis)
       type(line_t), intent(inout) :: line(0:, :)
       integer, intent(in) :: axis
@@ -283,7 +282,8 @@ contains
     end subroutine mark
   end subroutine find_strips
 
-  !> Finds the earliest time at which a piston leaves its strip. The result is valid until a disk collides with a piston.
+  !> Finds the earliest time at which a piston leaves its strip, the columns or rows in which the piston may touch disks. The result
+  !> is valid until a disk collides with a piston.
   pure subroutine watch_pistons(self, box, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -304,8 +304,8 @@ contains
     end do
   end subroutine watch_pistons
 
-  !> The rectangle that contains the centres of the disks in a cell. An outermost cell extends as far as its side can move. If this
-  !> side is a piston, the cell is unbounded.
+  !> The rectangle that contains the centres of the disks in a cell. An outermost cell extends as far as its side can move. If an
+  !> outermost cell is at a piston, the cell is unbounded towards the piston.
   pure subroutine rectangle(self, cell, n, low, high)
     class(cell_faces_t), intent(in) :: self
     integer(int32), intent(in) :: cell(2)          !! column and row in the box
@@ -372,8 +372,8 @@ contains
     end if
   end subroutine next
 
-  !> Finds the earliest event at which the disk reaches one of four given lines around its position. The given lines may be closer
-  !> to the disk than the faces of its cell.
+  !> Finds the earliest event at which the disk reaches one of four given lines around its position. The lines may be closer to the
+  !> disk than the faces of its cell, for example if the lines limit its neighbourhood.
   pure subroutine next_within(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -389,8 +389,8 @@ contains
     end if
   end subroutine next_within
 
-  !> Like `next_within`, for a straight path. The axis and the direction are selected without branches, because a processor cannot
-  !> predict such branches.
+  !> Version of `next_within` for disks on straight paths. The axis and the direction are selected without branches, because a
+  !> processor cannot predict such branches.
   pure subroutine next_straight(column, row, disk, cell, t, code)
     type(line_t), intent(in) :: column(0:1, *), row(0:1, *)
     type(disk_t), intent(in) :: disk
@@ -423,7 +423,7 @@ contains
     t = merge(t, never, speed > slowest)
   end function line_time
 
-  !> Like `next_within`, for a parabolic path, or for a box with moving sides.
+  !> Version of `next_within` for disks on parabolic paths, and for boxes with moving sides.
   pure subroutine next_falling(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -445,7 +445,7 @@ contains
     near%time = merge(t_y, t_x, t_y < t_x)
   end subroutine next_falling
 
-  !> Like `next_falling`, along one axis and without moving sides.
+  !> Version of `next_falling` for a single axis, without moving sides.
   pure subroutine next_along(box, line, axis, disk, now, t, code)
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
@@ -470,9 +470,9 @@ contains
       x = flight(disk%x(axis), disk%v(axis), g, now - disk%clock)
       v = flight_velocity(disk%v(axis), g, now - disk%clock)
       up = merge(1, 0, v > -g*resolution(now))
-      sense = 2*up - 1                             ! the roots from `time_to_line`, in a simplified form
+      sense = 2*up - 1                             ! simplified formulas for the roots in `time_to_line`
       gap = max(sense*(line(up)%place - x), 0.0_real64)
-      disc = (v*v + tiny(v)) + 2*sense*g*gap       ! positive even if the disk is at rest on the face
+      disc = (v*v + tiny(v)) + 2*sense*g*gap       ! `tiny` keeps `disc` positive if the disk is at rest on the face
       if (disc >= 0) then
         t = now + 2*gap/(abs(v) + sqrt(disc))
       else
@@ -484,7 +484,7 @@ contains
     code = line(up)%code
   end subroutine next_along
 
-  !> Like `next_falling`, along one axis, for a box with moving sides.
+  !> Version of `next_falling` for a single axis of a box with moving sides.
   pure subroutine next_beside(box, line, axis, disk, now, t, code)
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
@@ -501,7 +501,7 @@ contains
     end if
   end subroutine next_beside
 
-  !> Like `next_along`, for a cell that a moving side may enter, even if that side is not a face of the cell.
+  !> Version of `next_along` for a cell that a moving side may enter, even if the side is not a face of the cell.
   pure subroutine next_moving(line, axis, box, disk, now, t, code)
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
     integer(int32), intent(in) :: axis
@@ -548,8 +548,8 @@ contains
     t = max(now, disk%clock + time_to_line(sense*(line%place - disk%x(axis)), sense*disk%v(axis), sense*g))
   end function falling_time
 
-  !> Smallest resolvable time step at `now`. Without this lower bound a disk that reverses its motion at a face could cross this
-  !> face infinitely often.
+  !> Smallest time difference that is resolved at the time `now`. Without a smallest time difference, a disk that reverses its
+  !> motion at a face could cross the face infinitely often.
   elemental function resolution(now)
     real(real64), intent(in) :: now
     real(real64) :: resolution

@@ -20,14 +20,14 @@ module cell_grid
   private
   public :: cell_grid_t
 
-  real(real64), parameter :: spacious = 1.2_real64  !! smallest width of cells, in diameters, for which overlaps save time
+  real(real64), parameter :: spacious = 1.2_real64  !! width of cells, in largest diameters, above which overlapping cells save time
 
   type :: cell_grid_t
     private
-    type(patch_t), public :: patch                 !! block of cells; `build` chooses the block, except in a domain
+    type(patch_t), public :: patch                 !! block of cells; chosen by `build`, unless the search belongs to a domain
     logical, public :: is_part = .false.
     logical, public :: undivided = .false.         !! whether the box is a single cell, so that all pairs are tested
-    logical, public :: everyone = .false.          !! whether all disks are predicted after each event
+    logical, public :: everyone = .false.          !! whether each event is followed by predictions for all disks
     type(cell_faces_t), public :: faces                    !! faces of the cells, and sides
     logical, public :: roomy = .false.             !! whether cells overlap, so that a disk can change its cell in a collision
     type(cell_contents_t), public :: cells                 !! disks in each cell; a ring of empty cells surrounds the patch
@@ -96,7 +96,7 @@ contains
     end associate
   end subroutine build
 
-  !> Removes all disks from the cells that are stored in the tags of the disks. `all_found` is .true. if all cells are then empty.
+  !> Removes all disks from the cells that are stored in the tags of the disks. `all_found` is .true. if all cells become empty.
   subroutine clear_cells(self, sim, all_found)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -124,7 +124,7 @@ contains
     associate (patch => self%patch)
       do i = 1, sim%n_disks()
         if (sim%disk(i)%radius > patch%small) then
-          sim%tag(i)%cell = 1                      ! this cell is always marked
+          sim%tag(i)%cell = 1                      ! cell (1,1), which is always marked
         else if (sim%tag(i)%id > 0) then
           cell = int(patch%cell_at(sim%position(i)), int16)
           call put(self, sim%tag(i), i, cell)
@@ -259,7 +259,7 @@ contains
     end if
   end subroutine cross_with_care
 
-  !> Moves disk i into the cell beyond a face. If the face is a periodic side, this cell is the first cell behind the side.
+  !> Moves disk i into the cell beyond a face. If the face is a periodic side, the new cell is the first cell behind it.
   subroutine change_cell(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -274,7 +274,7 @@ contains
     cell = sim%tag(i)%cell
     cell(axis) = cell(axis) + int(sense_of(side), int16)
     if (is_wall(code) .and. self%patch%last(axis) > 0) then
-      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%patch%cell_at(sim%position(i)), int16)   ! shear shifts the cells
+      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%patch%cell_at(sim%position(i)), int16)   ! shear displaces the image
       cell(axis) = int(merge(self%patch%next(axis), self%patch%last(axis), sense_of(side) > 0), int16)
     end if
     inside = .true.
@@ -344,7 +344,7 @@ contains
     end if
   end subroutine predict_both
 
-  !> Predicts the next events of two disks that have collided, in the general case. Usually both disks have neighbour lists.
+  !> Predicts the next events of two disks that have collided, in the general case. In most calls both disks have neighbour lists.
   subroutine predict_both_with_care(self, sim, i, j)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -363,7 +363,7 @@ contains
     call predict_collided(j)
   contains
 
-    !> Predicts the next event of disk k, which is one of the two disks.
+    !> Predicts the next event of disk k, which is disk i or disk j.
     subroutine predict_collided(k)
       integer(int32), intent(in) :: k
 
@@ -469,7 +469,7 @@ contains
     call gather(self%cells%cell, near%cell, self%cells%stride, near%disk, near%list, near%n)
   end subroutine survey
 
-  !> Tests the candidates of a disk, and stores the earliest event found in the record of the disk.
+  !> Tests the candidates of a disk, finds its earliest event, and stores this event in the record of the disk.
   subroutine take_earliest(gravity, disk, tag, now, known, near)
     real(real64), intent(in) :: gravity(2)         !! [length/time**2]
     type(disk_t), intent(inout) :: disk(*)
@@ -481,7 +481,7 @@ contains
     call earliest_contact(disk, tag, near, now, gravity, known)
     disk(near%disk)%event_time = near%time
     disk(near%disk)%partner = near%partner
-    tag(near%disk)%partner_counter = disk(max(near%partner, 1))%collision_counter  ! used if partner > 0
+    tag(near%disk)%partner_counter = disk(max(near%partner, 1))%collision_counter  ! used only if the partner is a disk
   end subroutine take_earliest
 
   !> Prefetches, in several stages, the data that are needed to predict the events of some disks.
@@ -498,7 +498,7 @@ contains
     end if
   end subroutine read_ahead
 
-  !> Predicts the next event of a disk in the general case. If the disk has left the patch, the disk is removed from the search.
+  !> Predicts the next event of a disk in the general case. A disk that has left the patch is removed from the search.
   subroutine predict_with_care(self, sim, i, has_collided)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

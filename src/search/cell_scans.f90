@@ -81,7 +81,7 @@ contains
     type(images_t), intent(in) :: images
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prospect_t), intent(inout) :: near
-    integer(int32) :: e, last(2)                   ! index of an entry; image that contains the big disks in `near`
+    integer(int32) :: e, last(2)                   ! index of a list entry; periodic image that contains the candidates in `near`
     real(real64) :: number(2), shift(2)            ! index of the image of an obstacle; shift to this image [length]
     logical :: falling                             ! .false. if there is no gravity
 
@@ -221,7 +221,7 @@ contains
 
     do row = near%cell - cells%stride, near%cell + cells%stride, cells%stride
       do c = row - 1, row + 1
-        ! The first disk of the linked list is also in a slot, unless `gather` omitted this disk.
+        ! The first disk of a linked list is also in a slot of its cell and already a candidate, unless `gather` omitted the disk.
         j = cells%chain(c)
         if (j > 0 .and. c /= near%cell) j = cells%next(j)
         do while (j > 0)
@@ -235,7 +235,9 @@ contains
   end subroutine add_chains_around
 
   !> Finds contacts of a disk if some of the nine cells around the disk are across a periodic side. All cells that belong to the
-  !> same periodic image are searched in one call.
+  !> same periodic image are searched in one call. In a sheared box the images above and below the box move along x. In a sheared
+  !> box the search includes all columns that the disk can reach before the images above and below have moved by the width of a
+  !> column. Disks in columns that are not adjacent cannot touch.
   subroutine scan_around_seam(cells, patch, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch

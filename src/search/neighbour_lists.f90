@@ -1,10 +1,10 @@
 !> Neighbour lists. The list of a disk contains the disks that it can touch while both disks stay in their neighbourhoods.
 !>
-!> A neighbourhood is a square around the position at which the disk received its list, clipped at the faces of its cell and at the
-!> sides of the box. Two disks are in each other's lists if they can touch somewhere in their neighbourhoods. An event occurs when a
-!> disk leaves its neighbourhood: the nine cells around the disk are then searched, and the disk receives a new neighbourhood and a
-!> new list. A prediction therefore tests only a few neighbours, however many disks the cells contain (Donev, Torquato and
-!> Stillinger, Journal of Computational Physics 202, 737 (2005)).
+!> The neighbourhood of a disk is the part of a square that is inside its cell and inside the box. The centre of the square is the
+!> position at which the disk received its neighbour list. Two disks are in each other's lists if they can touch somewhere in their
+!> neighbourhoods. An event occurs when a disk leaves its neighbourhood: the nine cells around the disk are then searched, and the
+!> disk receives a new neighbourhood and a new list. A prediction therefore tests only a few neighbours, however many disks the
+!> cells contain (Donev, Torquato and Stillinger, Journal of Computational Physics 202, 737 (2005)).
 !>
 !> Neighbour lists only save time and do not change results. A list without space for a further neighbour is marked as incomplete
 !> until the disk receives a new list. While the list of a disk is incomplete, each prediction searches the nine cells around the
@@ -22,18 +22,18 @@ module neighbour_lists
   private
   public :: neighbour_lists_t
 
-  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! values that replace the number of entries
-  !> Number of entries that are copied from every list, so that no branch depends on the actual number.
+  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! marks that are stored instead of the number of entries
+  !> Number of entries that are copied even from shorter lists, so that no branch depends on the lengths of short lists.
   integer(int32), parameter :: always_copied = 15
   !> Factor of the image index in an entry. The factor is larger than any number of disks.
   integer(int32), parameter :: image_unit = 2**27
   !> Largest number of disks for which neighbour lists are used, so that 32-bit integers can number all entries.
   integer(int32), parameter :: most_listed = image_unit/4
 
-  !> The region around a disk for which its neighbour list is valid. When the centre of the disk leaves this region, the disk
+  !> The region around a disk for which its neighbour list is valid. When the centre of a disk leaves its neighbourhood, the disk
   !> receives a new list.
   type :: neighbourhood_t
-    type(line_t) :: column(0:1), row(0:1)          !! left and right lines; lower and upper lines
+    type(line_t) :: column(0:1), row(0:1)          !! (left, right) and (lower, upper) lines that limit the region
   end type neighbourhood_t
 
   real(real64), parameter, public :: candidates_that_pay = 30.0_real64
@@ -75,7 +75,7 @@ module neighbour_lists
 contains
 
   !> Determines whether neighbour lists save time, and allocates the lists in that case. With neighbour lists, a prediction after a
-  !> collision tests fewer disks. However, the lists have to be renewed, and these renewals are more frequent at lower densities.
+  !> collision tests fewer disks. The disadvantage of neighbour lists is their renewal, which is more frequent at lower densities.
   !> The limit `least_candidates` and the margin were optimised for polydisperse disks.
   subroutine prepare(self, disk, tag, lower, edges, patch)
     class(neighbour_lists_t), intent(inout) :: self
@@ -125,7 +125,7 @@ contains
     end if
     if (.not. allocated(self%first)) then
       allocate (self%first(n + 1), self%neighbourhood(n))
-      allocate (self%extent(4, n), source=0.0_real32)           ! initialised, because disks without a list may be candidates
+      allocate (self%extent(4, n), source=0.0_real32)           ! initial values, which are read for candidates without a list
     end if
     self%first(1) = 0
     do i = 1, n
@@ -178,8 +178,8 @@ contains
   end subroutine lay
 
   !> Finds the disks that disk i can touch in its new neighbourhood, among the disks in the nine cells around disk i. The procedure
-  !> adds disk i to the list of each disk found, and each disk found to the list of disk i. If a disk found has no list yet, the
-  !> pair is added later, when the list of this disk is made.
+  !> adds disk i to the list of each disk found, and each disk found to the list of disk i. Pairs with a disk that has no list yet
+  !> are added later, when the list of that disk is made.
   subroutine enter(self, i, cells, patch, cell)
     class(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -332,7 +332,7 @@ contains
     last = self%entry(at + n)
     self%entry(at + place) = last
     self%back(at + place) = self%back(at + n)
-    ! This value is not used if the list of the other disk is incomplete.
+    ! The new value of `back` is not used if the list of the other disk is incomplete.
     self%back(self%first(iand(last, image_unit - 1) + 1) + self%back(at + n)) = place
     self%entry(at) = n - 1
   end subroutine remove
@@ -402,7 +402,7 @@ contains
     end associate
   end function is_short
 
-  !> Copies the neighbour list of a disk to the list of candidates. No neighbour may be across a periodic side.
+  !> Copies the neighbour list of a disk to the list of candidates. The list must not contain neighbours across a periodic side.
   pure subroutine copy_list(self, near)
     class(neighbour_lists_t), intent(in) :: self
     type(prospect_t), intent(inout) :: near
@@ -439,9 +439,9 @@ contains
     end associate
   end subroutine neighbour
 
-  !> Prefetches the data that are needed to predict the events of some disks. The first stage prefetches the records of these disks,
-  !> the second stage prefetches their neighbour lists, and the third stage prefetches the disks in the lists. The data for the
-  !> collision partner of a disk are prefetched one stage later than the data for the disk.
+  !> Prefetches the data that are needed to predict the events of some disks. Prefetching has three stages: first the records of the
+  !> given disks, then their neighbour lists, and finally the disks in the lists. The data for the collision partner of a disk are
+  !> prefetched one stage later than the data for the disk.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(neighbour_lists_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)

@@ -10,10 +10,10 @@ module neighbour_search
   public :: event_t, prospect_t, earliest_contact, event_of, list_capacity, latest_clock, no_gravity, wins
 
   integer(int32), parameter :: list_capacity = 64
-  !> Flags for conditions that the caller of `earliest_contact` guarantees. The sum of both flags states both conditions. The flag
-  !> `latest_clock` means that the clock of the disk is `now` and that no candidate has a later clock. The flag `no_gravity` means
-  !> that no gravity acts on the disks. The compiler generates versions of `earliest_contact` without the operations that these
-  !> conditions make unnecessary.
+  !> Flags for conditions that the caller of `earliest_contact` guarantees. The sum of the two flags states that both conditions
+  !> hold. The flag `latest_clock` means that the clock of the disk is `now` and that no candidate has a later clock. The flag
+  !> `no_gravity` means that no gravity acts on the disks. The compiler generates versions of `earliest_contact` without the
+  !> operations that a flag makes unnecessary.
   integer(int32), parameter :: latest_clock = 1, no_gravity = 2
   real(real64), parameter :: margin_of_times = 32*epsilon(1.0_real64)    !! larger than all rounding errors in `earliest_contact`
 
@@ -45,17 +45,18 @@ contains
   !> contacts. A contact time before `now` results from rounding errors. For example, the distance of two disks after a perfectly
   !> inelastic collision equals the sum of their radii within rounding errors, and the shift of one disk by a period changes these
   !> errors. If the contact time is before `now`, the procedure decides whether a contact occurs at the time `now` or not at all.
-  !> The shift of a disk by a period is an event, after which the contact is predicted again. Predictions at later times do not
-  !> change the decision of the procedure.
+  !> The shift of a disk by a period is an event, after which the contact is predicted again. Predictions for the two disks at later
+  !> times lead to the same decision.
   !>
-  !> The root of |dx + dv s| = sigma is s = c/(sqrt(disc) - b). This expression has no cancellation near contact. The discriminant
-  !> sigma**2 dv**2 - (dx x dv)**2 has no cancellation for distant grazing pairs. If two disks approach each other and touch, or
-  !> overlap because of rounding errors, the disks collide at the time `now`.
+  !> The root of |dx + dv s| = sigma is s = c/(sqrt(disc) - b). The expression for the root s has no cancellation for disks that are
+  !> close to contact. The discriminant sigma**2 dv**2 - (dx x dv)**2 has no cancellation for distant grazing pairs. If two disks
+  !> approach each other and touch, or overlap because of rounding errors, the disks collide at the time `now`.
   !>
-  !> One combined test excludes most candidates. A candidate is excluded if the root is not real, if the root is not earlier than
-  !> the earliest contact found so far, or if the root is not earlier than the next event of the candidate. The events of a
-  !> candidate are predicted again after its next event, and that prediction tests the pair. A root before t requires c < -2 b (t -
-  !> late). This condition is tested with a margin that is larger than all rounding errors.
+  !> A single test, which combines several conditions, excludes most candidates. A candidate is excluded if the root is not real, if
+  !> the root is not earlier than the earliest contact found so far, or if the root is not earlier than the next event of the
+  !> candidate. The events of a candidate are predicted again after its next event, and that prediction tests the pair. If the root
+  !> is earlier than a time t, then c < -2 b (t - late), where `late` is the later clock of the two disks. The condition for c is
+  !> tested with a margin that is larger than all rounding errors.
   pure subroutine earliest_contact(disk, tag, near, now, gravity, known, image)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, with indices that start at 0
     type(tag_t), intent(in) :: tag(*)
@@ -78,7 +79,7 @@ contains
     do k = 1, n
       j = near%list(k)
       call read_state(disk(j), xj, yj, uj, vj, clock_j, rj)
-      if (.not. fresh) then                   ! with si = 0 these operations would change nothing
+      if (.not. fresh) then                   ! skipped if si = 0: the state would not change
         late = merge(clock, clock_j, clock > clock_j)
         from = 2*late - margin
         si = late - clock
@@ -104,7 +105,7 @@ contains
       in_time = merge(in_time, disc, in_time < disc)
       if (in_time > 0 .and. b < 0) then
         t_j = late + max(c, 0.0_real64)/(sqrt(min(disc, b*b)) - b)
-        if (t_j < now .and. .not. fresh) then ! a rounding error: no contact, or a contact at the time `now`
+        if (t_j < now .and. .not. fresh) then ! rounding error: contact at `now`, or none
           t_j = merge(2*never, now, b + (du*du + dv*dv)*(now - late) >= 0)
         end if
         if (t_j < best) then
@@ -131,7 +132,7 @@ contains
   !> operations.
   elemental function moved(x, v, g, s, falling) result(there)
     real(real64), intent(in) :: x, v, g, s
-    logical, intent(in) :: falling            !! .false. if g is zero
+    logical, intent(in) :: falling            !! whether gravity acts; if not, g is zero
     real(real64) :: there
 
     if (falling) then

@@ -1,6 +1,6 @@
-!> For each cell of the box, a list of the obstacles that a disk with its centre in the cell may overlap. With these lists, the cost
-!> of a test for overlaps at one point does not depend on the number of obstacles. The cost of making the lists is proportional to
-!> the number of obstacles.
+!> For each cell of the box, a list of the obstacles that a disk with its centre in the cell may overlap. With lists of nearby
+!> obstacles, the cost of a test for overlaps at one point does not depend on the number of obstacles. The cost of making the lists
+!> is proportional to the number of obstacles.
 module obstacle_cells
   use box_geometry, only: box_t
   use kinds, only: int32, real64
@@ -20,7 +20,7 @@ module obstacle_cells
     real(real64), private :: radius = -1.0_real64   !! largest radius of disks for which the lists are valid [length]
     real(real64), private :: lower(2) = 0.0_real64  !! lower left corner of the box [length]
     real(real64), private :: side(2) = 0.0_real64   !! edges of a cell [length]
-    integer(int32), allocatable, private :: head(:, :)  !! (columns,rows) first entry of each cell; 0: empty list
+    integer(int32), allocatable, private :: head(:, :)  !! (columns,rows) first entry of each cell; 0 if the list is empty
     integer(int32), private :: n_entries = 0
     type(entry_t), allocatable :: entry(:)
   contains
@@ -55,7 +55,7 @@ contains
     allocate (self%head(n(1), n(2)), source=0_int32)
     if (.not. allocated(self%entry)) allocate (self%entry(2*box%n_obstacles()))
     self%n_entries = 0
-    do k = box%n_obstacles(), 1, -1                 ! in descending order, so that each list begins with the smallest index
+    do k = box%n_obstacles(), 1, -1                 ! descending, because each list begins with the entry added last
       call enter(self, k, box%obstacle(k)%shape, box%periodic)
     end do
   end subroutine serve

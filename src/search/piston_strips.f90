@@ -1,6 +1,6 @@
 !> Lists the disks that a piston may touch in the near future. A piston can reach every disk in the course of time. Before the
 !> piston has moved by the width of a cell, the piston can touch only disks in a strip of adjacent columns or rows of cells
-!> (`cell_faces: find_strips`). Only the disks in the strip are tested against the piston.
+!> (`cell_faces: find_strips`). Only the disks in its strip are tested against a piston.
 module piston_strips
   use kinds, only: int16, int32
   use cell_grid, only: cell_grid_t
@@ -36,7 +36,7 @@ contains
         do m = 1, self%cells%cell(c)%in_slots()
           call add(self%cells%cell(c)%slot(m) + 1)
         end do
-        i = self%cells%chain(c)                    ! the first disk of the linked list is also in a slot
+        i = self%cells%chain(c)                    ! the first disk of a linked list is also in a slot of its cell
         if (i > 0) i = self%cells%next(i)
         do while (i > 0)
           call add(i)
