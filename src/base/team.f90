@@ -46,7 +46,7 @@ module team
       type(barrier_t), intent(inout) :: barrier
     end subroutine release
 
-    !> Destroys the barrier. No thread may be waiting at the barrier.
+    !> Destroys a barrier at which no thread is waiting.
     subroutine close_barrier(barrier) bind(C, name="barrier_close")
       import :: barrier_t
       type(barrier_t), intent(inout) :: barrier

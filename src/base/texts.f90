@@ -208,7 +208,7 @@ contains
   pure function suggestion(word, known, listed) result(advice)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
-    character(len=*), intent(in), optional :: listed(:)  !! words to list in place of `known`
+    character(len=*), intent(in), optional :: listed(:)  !! if present, words that the advice lists in place of `known`
     character(len=:), allocatable :: advice
 
     advice = nearest_word(word, known)
