@@ -12,7 +12,7 @@ module h5md_layout
     events_group = "events/", &
     parameters_group = "parameters/", &
     provenance = "provenance", &
-    checkpoint_group = "checkpoint/", &           !! state from which a run can be resumed
+    checkpoint_group = "checkpoint/", &           !! group of the data from which a run can be resumed
     box_group = disks_group//"box", &
     all_disks = "all"                             !! group for averages over all disks, in `observables_group`
 
@@ -49,7 +49,7 @@ module h5md_layout
     event_counter = events_group//"committed"
 
   !> Names that a species must not have, because HDF5 groups that contain the names of species also contain objects with these
-  !> names. A species must not have the name of an observable either.
+  !> names. The names of observables are not allowed as names of species either.
   character(len=*), parameter, public :: beside_species(3) = [character(len=9) :: "committed", "names", "counts"]
 
 end module h5md_layout

@@ -20,8 +20,8 @@ module hdf5_objects
 
   integer, parameter :: scalar(0) = [integer ::]  !! extents of a dataset with a single value
 
-  ! Largest lengths of texts in a file. The limits are needed because a damaged file may contain wrong lengths. No output of this
-  ! program exceeds the limits.
+  ! Largest lengths of texts in a file. The limits are needed because a damaged file may contain wrong lengths. All texts that this
+  ! program writes are within the limits.
   integer(int64), parameter :: most_texts = 10000
   integer(size_t), parameter :: longest_text = 67108864      !! [bytes]
 
@@ -68,7 +68,7 @@ contains
     call self%flush()
     if (allocated(self%failure)) return
     call write_word(self%path, header_end, int(offset + bytes, int64), done)
-    if (done) call h5dclose_f(dataset, closed)     ! after a failure the dataset stays open: closing it would truncate the file
+    if (done) call h5dclose_f(dataset, closed)     ! after a failure, closing the dataset would truncate the file
     call self%check(merge(0, -1, done), "remove "//name)
   end subroutine remove_last
 
@@ -97,12 +97,12 @@ contains
     character(len=*), intent(in) :: name
     integer(hid_t), intent(out) :: dataset
     integer(hsize_t), allocatable, intent(out) :: extents(:)
-    integer, intent(out) :: status                !! negative if the dataset does not exist or cannot be used
+    integer, intent(out) :: status                !! error status: negative if the dataset does not exist or cannot be used
     integer(hid_t), intent(in), optional :: like  !! an HDF5 type; the dataset must be of the same class: real, integer or text
-    integer, intent(out), optional :: bytes_each  !! size of a value
+    integer, intent(out), optional :: bytes_each  !! size of one value [bytes]
     integer(hid_t) :: creation, space, type
     integer(hsize_t) :: most(32), shape(32), n, stored
-    integer(size_t) :: bytes                      ! size of a value
+    integer(size_t) :: bytes                      ! size of one value [bytes]
     integer :: layout, n_files, kinds(2), rank, closed
 
     extents = [-1_hsize_t]
@@ -117,7 +117,7 @@ contains
     if (status >= 0) call h5dget_space_f(dataset, space, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
     call h5sget_simple_extent_npoints_f(space, n, closed)
-    ! HDF5 reports a failure for a dataset without values, here and for the storage size.
+    ! For a dataset without values, HDF5 reports a failure when the number of values or the storage size is queried.
     if (closed < 0) n = 0
     if (status >= 0) call h5sget_simple_extent_dims_f(space, shape, most, status)
     call h5sclose_f(space, closed)
@@ -135,11 +135,11 @@ contains
     end if
     call h5tclose_f(type, closed)
     if (status >= 0) extents = shape(:rank)
-    if (status >= 0 .and. rank == 0 .and. n == 0) extents = [n]           ! a dataset that was created without values
+    if (status >= 0 .and. rank == 0 .and. n == 0) extents = [n]           ! the dataset was created without values
     if (status < 0) call h5dclose_f(dataset, closed)
   end subroutine open_dataset
 
-  !> Shape of a dataset; [-1] if the dataset does not exist.
+  !> Shape of a dataset; the result is [-1] if the dataset does not exist.
   function extents(self, name, bytes) result(extent)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -187,7 +187,7 @@ contains
     integer(hid_t) :: dataset, in_file, in_memory
     integer(hsize_t) :: start(size(counts))
     integer(hsize_t), allocatable :: extents(:)
-    integer(size_t) :: bytes                      ! size of a value
+    integer(size_t) :: bytes                      ! size of one value [bytes]
     type(c_ptr) :: place
     integer :: status, closed
 
@@ -206,7 +206,7 @@ contains
     call self%check(status, trim(merge("write   ", "be read:", writing))//" "//name)
     call h5sclose_f(in_file, closed)
     call h5sclose_f(in_memory, closed)
-    call h5dclose_f(dataset, status)              ! this call also writes buffered values to the file
+    call h5dclose_f(dataset, status)              ! when a dataset is closed, HDF5 writes its buffered values
     call self%check(status, "write "//name)
   end subroutine transfer
 
@@ -244,7 +244,7 @@ contains
   subroutine put_text(self, name, text)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, text
-    character(len=:), allocatable, target :: padded     ! allocated, because a long text would not fit on the stack
+    character(len=:), allocatable, target :: padded     ! allocatable: a long text would not fit on the stack
     integer(hid_t) :: string
     integer :: closed
 
@@ -308,7 +308,7 @@ contains
     if (product_of(there) /= product(int(extents, int64))) call self%check(-1, "write "//name)
     if (.not. allocated(self%failure)) call h5dwrite_f(dataset, in_memory, address, status)
     call self%check(status, "write "//name)
-    call h5dclose_f(dataset, status)              ! this call also writes buffered values to the file
+    call h5dclose_f(dataset, status)              ! when a dataset is closed, HDF5 writes its buffered values
     call self%check(status, "write "//name)
   end subroutine put_values
 
@@ -383,7 +383,7 @@ contains
       call h5oclose_f(object, closed)
     else
       if (in_memory == h5t_native_double) then
-        call self%open_dataset(name, dataset, extents, status)      ! integers are converted to reals
+        call self%open_dataset(name, dataset, extents, status)      ! HDF5 may convert integers to reals
       else
         call self%open_dataset(name, dataset, extents, status, like=in_memory)
       end if

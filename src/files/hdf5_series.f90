@@ -1,7 +1,7 @@
 !> Series: datasets to which samples are added along the last dimension. The whole storage of a dataset is allocated when the
-!> dataset is created, although the file system uses disk space only for the part that has been written. After the creation only
-!> values are written. The file is therefore consistent at any time, for other programs that read the file and after the program has
-!> been killed.
+!> dataset is created, although the file system uses disk space only for the part that has been written. After a dataset has been
+!> created, only its values are written. The file is therefore consistent at any time, for other programs that read the file and
+!> after the program has been killed.
 module hdf5_series
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8, real32
@@ -95,7 +95,8 @@ contains
     call file%make_dataset(trim(self%name), self%storage_type(), int(self%extents(capacity), hsize_t))
   end subroutine make
 
-  !> Locates the series in a file. The samples in the file must have the expected shape, but their integers may have more bits.
+  !> Locates the series in a file. The samples in the file must have the expected shape. Integers may have 64 bits in the file even
+  !> if 32 bits are expected.
   subroutine find(self, file)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -111,8 +112,9 @@ contains
     call file%check(merge(0, -1, there), "be read: there is no "//trim(self%name)//" of the expected shape")
   end subroutine find
 
-  !> Converts samples to the type in the file and stores the samples. HDF5 could convert the values to single precision, too, but
-  !> ten times more slowly. A single sample in double precision is written without a copy, because a sample may be large.
+  !> Converts samples to the type in the file and stores the samples. The values are converted to single precision by this procedure
+  !> and not by HDF5, because HDF5 would need ten times as long. A single sample in double precision is written without a copy,
+  !> because a sample may be large.
   subroutine store(self, file, first, values)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file

@@ -18,8 +18,8 @@ module record
   type :: record_t
     character(len=:), allocatable :: name         !! path of the dataset
     integer :: mode = counting
-    integer(int64) :: words = 0                   !! number of words so far
-    integer(int64), private :: crc = 0            !! checksum of the words so far
+    integer(int64) :: words = 0                   !! number of words that have been counted, written or read
+    integer(int64), private :: crc = 0            !! checksum of the words that have been written or read
   contains
     generic :: exchange => exchange_real, exchange_reals, exchange_long, exchange_longs
     procedure :: make
@@ -107,7 +107,7 @@ contains
   end subroutine exchange_longs
 
   !> Writes the checksum at the end of a record, or reads the stored checksum and compares it with the checksum of the numbers. If
-  !> the two checksums differ, a failure of the file is recorded.
+  !> the stored checksum differs from the calculated checksum, the procedure records a failure of the file.
   subroutine seal(self, file)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file

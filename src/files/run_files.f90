@@ -13,7 +13,7 @@ module run_files
   ! Endings that are appended to the name of the output
   character(len=*), parameter, public :: &
     unfinished = ".part", &                       !! ending of the output during the run
-    unfinished_new = ".part_new", &               !! ending of a new unfinished output until its constant data are written
+    unfinished_new = ".part_new", &               !! ending of a new output file until its contents are complete
     lock = ".lock"                                !! ending of the lock file that prevents other runs from writing to this output
   character(len=9), parameter :: endings(*) = [character(len=9) :: "", unfinished, unfinished_new, lock]
 

@@ -1,9 +1,10 @@
-!> A track: a set of series to which samples are added together. The frames, the observables and the event log are tracks. A counter
-!> in the file contains the number of complete samples of a track. The counter is written after the values have been flushed;
-!> readers and resumed runs can therefore rely on the counter.
+!> A track: a set of series that are sampled together, so that each sample adds values to every series of the track. The frames, the
+!> observables and the event log are tracks. A counter in the file contains the number of complete samples of a track. The counter
+!> is written after the values have been flushed; readers and resumed runs can therefore rely on the counter.
 !>
-!> A sample is an array of reals that contains the values of all series, one series after another. The array represents integers
-!> exactly up to 2**53. Small samples are buffered, because one HDF5 call takes as much time as writing a hundred kilobytes.
+!> A sample is an array of reals that contains the values of all series, one series after another. Integers in a sample are exact
+!> only up to 2**53, because they are stored as double-precision numbers. Small samples are buffered, because one HDF5 call takes as
+!> much time as writing a hundred kilobytes.
 module sample_track
   use kinds, only: int64, real64
   use hdf5_objects, only: hdf5_file_t, scalar
@@ -21,9 +22,10 @@ module sample_track
   integer(int64), parameter :: growth = 4               !! factor by which the capacity increases when the file is full
 
   type :: track_t
-    !> The series of the track. If a common step and time belong to all series, the first two series are the step and the time.
+    !> The series of the track. If all series of the track share a step and a time, the first two series contain the step and the
+    !> time.
     type(series_t), allocatable :: series(:)
-    character(len=:), allocatable :: counter            !! path of the counter dataset
+    character(len=:), allocatable :: counter            !! path of the dataset that contains the number of complete samples
     integer(int64) :: planned = 0                       !! number of samples of the whole run; 0 if unknown
     integer(int64) :: capacity = 0                      !! number of samples that fit into the file
     integer(int64), private :: committed = 0            !! number of complete samples in the file
@@ -94,8 +96,8 @@ contains
     end do
   end function enlarged
 
-  !> Changes the type of series to 64-bit integers if the given samples contain integers that are too large for 32 bits. The new
-  !> type takes effect when the next file is created.
+  !> Changes the type of series to 64-bit integers if the given samples contain integers that are too large for 32 bits. The present
+  !> file keeps its types; the 64-bit integers are used in the next file that is created.
   subroutine widen(self, samples, widened)
     class(track_t), intent(inout) :: self
     real(real64), intent(in) :: samples(:, :)           !! (width,count)
@@ -168,8 +170,8 @@ contains
     self%committed = count
   end subroutine resume
 
-  !> Writes the number of complete samples to the file. A call after `resume` makes readers ignore samples that were written after
-  !> the checkpoint.
+  !> Writes the number of complete samples to the file. If this procedure is called after `resume`, readers ignore samples that were
+  !> written after the checkpoint.
   subroutine put_counter(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -190,7 +192,7 @@ contains
     end do
   end subroutine move
 
-  !> Checks that the file contains all samples and no unused space. If the check fails, a failure of the file is recorded.
+  !> Checks that the file contains all samples and no unused space; otherwise the procedure records a failure of the file.
   subroutine verify(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file

@@ -8,8 +8,8 @@ module table_file
   public :: read_table
 
   interface
-    !> Reads a table. The submodule `table_in_hdf5` implements this procedure. The submodule `table_without_hdf5` only reports that
-    !> such files cannot be read. The linker selects one of the two submodules.
+    !> Reads a table. The submodule `table_in_hdf5` reads the table from the file; the submodule `table_without_hdf5` only reports
+    !> that HDF5 files cannot be read. The linker selects either `table_in_hdf5` or `table_without_hdf5`.
     module subroutine read_table(path, names, widths, most, table, error)
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: names(:)                 !! names of the datasets
