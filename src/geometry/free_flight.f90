@@ -37,8 +37,8 @@ contains
     then = v + g*s
   end function flight_velocity
 
-  !> Time until a point crosses a line in the forward direction; `never` if the point does not cross the line. Each branch
-  !> calculates the root of a quadratic equation by the formula that avoids cancellation.
+  !> Time until a point crosses a line in the forward direction; the result is `never` if the point does not cross the line. Each
+  !> branch calculates the root of a quadratic equation by the formula that avoids cancellation.
   pure function time_to_line(distance, speed, acceleration) result(s)
     real(real64), intent(in) :: distance  !! distance to the line, negative if the line is behind the point [length]
     real(real64), intent(in) :: speed         !! velocity component towards the line [length/time]
@@ -249,7 +249,7 @@ contains
         right = s
       end if
     end do
-    s = left  ! the last representable time at which `cubic` still has the sign of its value at lo
+    s = left  ! `left` is the latest number at which `cubic` has the same sign as at lo
   end function root_between
 
   !> Value of a cubic polynomial by Horner's method.

@@ -20,7 +20,7 @@ module images
   !> 1) is the image above the box. The indices are whole numbers stored as reals, because two disks may be any number of periods
   !> apart.
   type :: images_t
-    real(real64) :: period(2) = never           !! edges of the box; `never` along an axis with walls [length]
+    real(real64) :: period(2) = never           !! edges of the box; set to `never` along an axis with walls [length]
     real(real64) :: velocity = 0.0_real64       !! velocity of the image above the box [length/time]
     real(real64) :: offset = 0.0_real64  !! displacement, at the epoch, of the image above the box, modulo the period [length]
     real(real64) :: removed_periods = 0.0_real64  !! number of periods that were subtracted from `offset`
@@ -59,12 +59,12 @@ contains
     end associate
   end function moving_images
 
-  !> Splits a number into two parts whose sum is the number. Each part has at most 27 significant binary digits, so that the product
-  !> of two such parts is exact.
+  !> Splits a number into two parts whose sum is the number. Each part has at most 27 significant binary digits; the product of a
+  !> part of one number and a part of another number is therefore exact.
   pure function halves(x)
     real(real64), intent(in) :: x
     real(real64) :: halves(2)
-    integer, parameter :: half = 26             ! number of significant binary digits of the first part
+    integer, parameter :: half = 26             ! number of significant binary digits of `halves(1)`
 
     halves(1) = scale(aint(scale(fraction(x), half)), exponent(x) - half)
     halves(2) = x - halves(1)
@@ -78,8 +78,8 @@ contains
     n = product(2*self%reach() + 1)
   end function count_around
 
-  !> Largest index, along each axis, of the images in which a search must look for collision partners. Until the time `valid_until`,
-  !> a disk in the box can touch only disks in images with indices up to `reach`, unless a disk passes a side of the box before.
+  !> Largest index, along each axis, of the images in which a search must look for collision partners. If no disk leaves the box
+  !> before the time `valid_until`, a disk in the box can until then touch only disks in images whose indices are at most `reach`.
   pure function reach(self)
     class(images_t), intent(in) :: self
     integer :: reach(2)
@@ -114,13 +114,13 @@ contains
     displacement = rows*(self%offset + self%velocity*now)
   end function displacement
 
-  !> Time at which the image above the box will have moved by `distance` from its present position; `never` if the images do not
-  !> move. Until this time a search can use the present result of `around`, if the search allows for displacements of the images of
-  !> up to `distance`.
+  !> Time at which the image above the box will have moved by `distance` from its present position; the result is `never` if the
+  !> images do not move. A search that allows for displacements of the images of up to `distance` can use the present result of
+  !> `around` until the image has moved by `distance`.
   pure function valid_until(self, now, distance) result(t)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: now             !! [time]
-    real(real64), intent(in), optional :: distance    !! default: half a period [length]
+    real(real64), intent(in), optional :: distance    !! displacement of the image; if absent, half a period [length]
     real(real64) :: t, farthest
 
     farthest = 0.5_real64*self%period(1)
@@ -129,7 +129,8 @@ contains
     if (abs(self%velocity) > farthest/never) t = now + farthest/abs(self%velocity)
   end function valid_until
 
-  !> Indices of the image in which an object at the separation dx is nearest. The result is almost always (0, 0).
+  !> Indices of the image in which an object at the separation dx is nearest. In almost all calls the nearest image is the box
+  !> itself, and the result is (0, 0).
   pure function nearest_image(self, dx, now) result(number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: dx(2)           !! [length]
@@ -162,8 +163,8 @@ contains
     image = image_t(self%shift(number), number(2)*self%velocity)
   end function image
 
-  !> Transforms the state of a disk into the reference frame of the image that is `rows` periods above the box. Only the coordinates
-  !> and velocity components of the disk change; its physical state does not change.
+  !> Transforms the state of a disk into the reference frame of the image that is `rows` periods above the box. The procedure
+  !> changes only the coordinates and velocity components of the disk, not the physical state of the disk.
   pure subroutine enter_image_frame(self, rows, clock, x, v, periods)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: rows

@@ -99,9 +99,9 @@ contains
 
   contains
 
-    !> Time until the centre of a disk reaches the straight side of the stadium in the direction `across`; `never` if the centre
-    !> passes beyond an end of the wall. The centre reaches a straight side from outside at most once, because the distance is a
-    !> quadratic function of time.
+    !> Time until the centre of a disk reaches one straight side of the stadium around the wall, the side in the direction `across`.
+    !> The result is `never` if the centre passes beyond an end of the wall. The centre reaches a straight side from outside at most
+    !> once, because the distance is a quadratic function of time.
     pure function time_to_side() result(t)
       real(real64) :: t, away, speed, fall, disc
 

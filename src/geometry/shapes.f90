@@ -100,8 +100,8 @@ contains
   end function magnitude
 
   !> Vector to the point x from the middle of the nearest periodic image of the obstacle. Obstacles that enclose disks have no
-  !> images. If x is at equal distances from two images, a disk at x may touch both images. The vector `heading` then selects an
-  !> image: the component of the result along the axis has the sign of `heading`.
+  !> images. If x is at equal distances from two images, a disk at x may touch both images. In this case the vector `heading`
+  !> selects one of the two images: along the axis of the period, the components of the result and of `heading` have the same sign.
   pure function from_nearest(self, x, images, heading) result(d)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]

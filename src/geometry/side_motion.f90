@@ -3,7 +3,8 @@
 !>
 !> In a time interval in which the acceleration of a disk relative to the side does not change its sign, the gap between disk and
 !> side is a convex or concave function of time. The first zero of such a function can be bracketed. A period of the motion consists
-!> of a few such intervals. No contact can therefore be missed, even if side and disk stay close together for a long time.
+!> of a few intervals in which the gap is convex or concave. No contact can therefore be missed, even if side and disk stay close
+!> together for a long time.
 module side_motion
   use free_flight, only: flight, flight_velocity, time_to_line
   use kinds, only: never, pi, real64
@@ -16,14 +17,14 @@ module side_motion
   integer, parameter, public :: still = 1, sine = 2, parabolic = 3, sawtooth = 4, constant_velocity = 5, piston = 6
   !> Angle below which differences of sines are calculated by a power series, to avoid cancellation [radian]
   real(real64), parameter :: small_angle = 0.5_real64
-  !> Length of a negligible time interval, as a fraction of the period. If an acceleration acts for a shorter time, its effect on
-  !> the gap is smaller than the rounding error of the gap.
+  !> Length of a negligible time interval, as a fraction of the period. An acceleration that acts only for a negligible time changes
+  !> the gap by less than the rounding error of the gap.
   real(real64), parameter :: negligible = 1.0e-10_real64
-  !> Number of successive intervals (see `curvature_interval`) whose total length exceeds a period, even if some of the intervals
-  !> are negligible.
+  !> Number of successive intervals, as returned by `curvature_interval`, that are sufficient to cover a period of the motion even
+  !> if some of the intervals are negligibly short.
   integer, parameter :: intervals_in_reach = 6
 
-  !> The state, if the side is a piston. Collisions with disks change this state.
+  !> The state of a side that is a piston. Collisions with disks change the state of a piston.
   type :: side_state_t
     real(real64) :: position = 0.0_real64            !! displacement inwards from the mean position, at the time `clock` [length]
     real(real64) :: velocity = 0.0_real64            !! velocity inwards, at the time `clock` [length/time]
@@ -32,9 +33,9 @@ module side_motion
 
   type :: side_motion_t
     integer :: kind = still                          !! position in `motions`
-    real(real64) :: offset = 0.0_real64              !! displacement inwards at which the motion starts [length]
-    !> Amplitude of an oscillation. For a motion at constant velocity: sum of `offset` and the length of the path. For a piston:
-    !> width of the box. [length]
+    real(real64) :: offset = 0.0_real64              !! displacement inwards of the side at the start of its motion [length]
+    !> A length that depends on the kind of motion: the amplitude of an oscillation, the sum of `offset` and the length of the path
+    !> of a motion at constant velocity, or, for a piston, the width of the box. [length]
     real(real64) :: amplitude = 0.0_real64
     real(real64) :: period = 1.0_real64              !! [time]
     real(real64) :: phase = 0.0_real64               !! phase at t = 0, in units of the period
@@ -96,13 +97,14 @@ contains
     if (self%kind == piston) speed = sqrt(2*abs(self%pull)*self%amplitude)
   end function highest_speed
 
-  !> Local time of the motion at the time epoch + t of the run. For an oscillation the local time is measured from the start of the
-  !> present period. For a motion at constant velocity it is measured from the start of the motion, and for a piston from the last
-  !> change of its state. Remainders modulo the period are exact, so that the precision does not decrease at late times.
+  !> Local time of the motion at the time epoch + t of the run. The local time of an oscillation is measured from the start of the
+  !> present period, the local time of a motion at constant velocity from the start of the motion, and the local time of a piston
+  !> from the last change of the state of the piston. Remainders modulo the period are exact, so that the precision does not
+  !> decrease at late times.
   elemental function local_time(self, epoch, t, state) result(tau)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! [time]
-    type(side_state_t), intent(in), optional :: state     !! state, if the side is a piston
+    type(side_state_t), intent(in), optional :: state     !! state of the side, if the side is a piston
     real(real64) :: tau                              !! [time]
 
     if (self%kind == piston) then
@@ -118,7 +120,7 @@ contains
   elemental function position(self, tau, state) result(x)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! time as returned by `local_time` [time]
-    type(side_state_t), intent(in), optional :: state     !! state, if the side is a piston
+    type(side_state_t), intent(in), optional :: state     !! state of the side, if the side is a piston
     real(real64) :: x                                !! [length]
     real(real64) :: s
 
@@ -139,7 +141,7 @@ contains
   elemental function velocity(self, tau, state) result(v)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! time as returned by `local_time` [time]
-    type(side_state_t), intent(in), optional :: state     !! state, if the side is a piston
+    type(side_state_t), intent(in), optional :: state     !! state of the side, if the side is a piston
     real(real64) :: v                                !! [length/time]
     real(real64) :: s
 
@@ -193,7 +195,7 @@ contains
 
     if (self%kind == sine) then
       yes = s < small_angle*self%period/(2*pi)
-    else                                             ! the motion is on the same parabola until tau + s
+    else                                             ! the side must stay on one parabola from tau to tau + s
       yes = s <= 0.5_real64*self%period - modulo(tau, 0.5_real64*self%period)
     end if
   end function is_short
@@ -242,7 +244,7 @@ contains
     real(real64) :: s                                !! [time]
     real(real64) :: bend(2), ratio
 
-    bend = [0.0_real64, 0.5_real64]                  ! in units of the period
+    bend = [0.0_real64, 0.5_real64]                  ! times in units of the period
     if (self%kind == sine) then
       ratio = g/(self%amplitude*(2*pi/self%period)**2)
       if (abs(ratio) < 1) bend = bend + [-1, 1]*asin(ratio)/(2*pi)
@@ -252,16 +254,16 @@ contains
     s = minval(bend)
   end function curvature_interval
 
-  !> Time until the side touches the boundary of a disk on a parabolic path; `never` if there is no contact. The side touches every
-  !> disk that stays within its range of motion for a whole period, except a slow disk at the very end of the range. If no contact
-  !> is found in a period, the disk is such an exception, and the search skips an increasing number of periods.
+  !> Time until the side touches the boundary of a disk on a parabolic path; the result is `never` if there is no contact. Every
+  !> disk that stays within the range of motion of the side for a whole period is touched by the side, except a slow disk at the
+  !> very end of the range. After a period without contact, the search therefore skips an increasing number of periods.
   pure function contact_time(self, tau, gap, v, g, state) result(s)
     class(side_motion_t), intent(in) :: self         !! a moving side
-    real(real64), intent(in) :: tau                  !! local time to which the result is relative [time]
+    real(real64), intent(in) :: tau                  !! local time from which the result `s` is measured [time]
     real(real64), intent(in) :: gap                  !! gap between the side and the boundary of the disk, not negative [length]
     real(real64), intent(in) :: v                    !! velocity of the disk [length/time]
     real(real64), intent(in) :: g                    !! acceleration of the disk [length/time**2]
-    type(side_state_t), intent(in), optional :: state     !! state, if the side is a piston
+    type(side_state_t), intent(in), optional :: state     !! state of the side, if the side is a piston
     real(real64) :: s, from, to, above, entry
     integer :: intervals
 
@@ -273,7 +275,7 @@ contains
       return
     end if
     above = gap + self%position(tau) - self%amplitude  ! distance of the disk from the range of motion of the side
-    entry = time_to_line(above, -v, -g)              ! time of the last entry of the disk into this range
+    entry = time_to_line(above, -v, -g)              ! time at which the disk enters the range of motion for the last time
     s = never
     from = 0
     intervals = 0
@@ -315,7 +317,7 @@ contains
     s = never
   end function contact_time_of_stroke
 
-  !> Time of contact within an interval in which the gap is convex or concave; `never` if there is no contact.
+  !> Time of contact within an interval in which the gap is convex or concave; the result is `never` if there is no contact.
   pure function contact_time_between(motion, tau, gap, v, g, from, to) result(s)
     class(side_motion_t), intent(in) :: motion
     real(real64), intent(in) :: tau, gap, v, g       !! as in `contact_time`
