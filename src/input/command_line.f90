@@ -88,7 +88,7 @@ contains
 
   contains
 
-    !> Reports an error in the command line. Only the first error is kept.
+    !> Reports an error in the command line, unless an earlier error has already been reported.
     subroutine refuse(why)
       character(len=*), intent(in) :: why
 

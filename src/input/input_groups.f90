@@ -1,5 +1,5 @@
-!> Values of the input variables as a run uses them, ordered by group and name. The output file lists all these values; the module
-!> `settings` contains the same values as typed data.
+!> Values of the input variables as a run uses them, ordered by group and name. The output file contains the value of every
+!> variable; the module `settings` contains the values as typed data.
 module input_groups
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
@@ -18,9 +18,9 @@ module input_groups
   type :: value_t
     integer :: row = 0                         !! row of the variable in the table of variables
     character(len=name_length) :: name = ""
-    character(len=8) :: kind = ""              !! "integer", "real", "logical" or "text"
-    logical :: given = .false.                 !! the user has set the variable
-    logical :: faulty = .false.                !! the user has set an invalid value, which has been reported
+    character(len=8) :: kind = ""              !! type of the values: "integer", "real", "logical" or "text"
+    logical :: given = .false.                 !! .true. if the user has set the variable
+    logical :: faulty = .false.                !! .true. if the user has set an invalid value, which has been reported
     integer :: line = 0                        !! line of the input file that sets the variable, or -k for override number k
     integer :: elements = 0                    !! bit mask: bit i is 1 if element i has been set by name(i) = value
     real(real64), allocatable :: reals(:)
@@ -33,11 +33,11 @@ module input_groups
     procedure :: json
   end type value_t
 
-  !> One group of the input, or one instance of a repeated group. The functions return the value of a variable, or `otherwise` if
-  !> the variable has no value.
+  !> One group of the input, or one instance of a repeated group. Functions of this type that return the value of a variable return
+  !> the argument `otherwise` if the variable has no value.
   type :: group_t
     character(len=8) :: name = ""
-    character(len=text_length) :: instance = ""  !! `name` of an obstacle or species; otherwise blank
+    character(len=text_length) :: instance = ""  !! `name` in a group that may occur several times; otherwise blank
     integer :: number = 0                      !! number among the groups of the same name, starting at 1
     integer :: line = 0                        !! first line of the group in the file; 0 if the group is not in the file
     integer :: first = 0, last = 0             !! positions of the first character (&) and the last character (/) of the group
@@ -84,7 +84,8 @@ contains
     end if
   end function integers
 
-  !> Whether all variables have the same values in two inputs. Default values are compared, too.
+  !> Whether all variables have the same values in two inputs. Variables that the user has not set are compared by their default
+  !> values.
   pure function same_values(one, other) result(yes)
     type(group_t), intent(in) :: one(:), other(:)  !! groups of the two inputs, in the same order
     logical :: yes
@@ -247,7 +248,7 @@ contains
   !> determine a choice, the last variable in the table takes precedence.
   pure subroutine infer_choices(self)
     class(group_t), intent(inout) :: self
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! words of the condition `goes_with`
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of another variable, and its values
     integer :: k
 
     do k = 1, size(self%values)
@@ -257,13 +258,13 @@ contains
     end do
   end subroutine infer_choices
 
-  !> Checks the variables that have an effect only with certain choices. A variable that a choice requires must be given. The value
-  !> of a variable that has no effect with the present choice is removed. If the user has given such a value, an error is reported,
-  !> because no part of an input may be ignored silently. Mutually exclusive variables are also reported.
+  !> Checks the variables that have an effect only with certain choices. A variable that a choice requires must be given. If a
+  !> variable has no effect with the present choice, its value is removed. If the user has set a variable that has no effect, an
+  !> error is reported, because no part of an input may be ignored silently. Mutually exclusive variables are also reported.
   pure subroutine check_choices(self, problems)
     class(group_t), intent(inout) :: self
     type(problem_list_t), intent(inout) :: problems
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! words of the condition `goes_with`
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of another variable, and its values
     character(len=len(table%goes_with)) :: word
     integer :: j, k
 
@@ -289,8 +290,8 @@ contains
     end do
   end subroutine check_choices
 
-  !> Indices of the first and the last group with one of the given names. If the input contains no such group, the last index is
-  !> smaller than the first index.
+  !> Indices of the first and the last group with one of the given names. If the input contains no group with one of these names,
+  !> the last index is smaller than the first index.
   pure function range_of(groups, names) result(range)
     type(group_t), intent(in) :: groups(:)   !! groups in the order of the table
     character(len=*), intent(in) :: names(:)           !! names of groups that are adjacent in the table

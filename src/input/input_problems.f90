@@ -7,7 +7,7 @@ module input_problems
   public :: problem_list_t
 
   integer, parameter, public :: most_problems = 100          !! largest number of problems that are reported
-  integer, parameter :: whole_file = 1000000000 !! larger than any line number
+  integer, parameter :: whole_file = 1000000000 !! rank of a problem of the whole file, larger than any line number
 
   type :: problem_t
     integer :: line                             !! line of the input file (> 0), 0 for the whole file, or -k for override number k
@@ -18,8 +18,8 @@ module input_problems
   !> problems of the whole file, and then problems of overrides.
   type :: problem_list_t
     integer :: count = 0
-    integer :: unreadable = 0                   !! number of problems that are files that cannot be read
-    logical :: cut_short = .false.              !! there were more problems than the list can contain
+    integer :: unreadable = 0                   !! number of problems that concern an unreadable file
+    logical :: cut_short = .false.              !! .true. if there were more problems than the list can contain
     type(problem_t) :: items(most_problems)
   contains
     procedure :: add

@@ -209,7 +209,7 @@ contains
   subroutine check_conflicts(settings, groups, must_end, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
-    logical, intent(in) :: must_end                       !! the input must contain a stop rule
+    logical, intent(in) :: must_end                       !! .true. if the input must contain a stop rule
     type(problem_list_t), intent(inout) :: problems
     character(len=*), parameter :: other_rule = "; give another rule", energy = "stop.energy_fraction", &
       rest = "stop.at_rest"

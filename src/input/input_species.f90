@@ -109,8 +109,8 @@ contains
       end associate
     end subroutine take_pairs
 
-    !> Sets the number of disks, which is given directly or follows from the grid or from the list of positions. The disks in a
-    !> starting file are counted later.
+    !> Sets the number of disks, which is given directly or follows from the grid or from the list of positions. If the number of
+    !> disks follows from a starting file, the module `input_fit` sets the number later.
     subroutine take_count(group, s)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(inout) :: s
@@ -213,7 +213,7 @@ contains
       relative = group%given("relative_to")
       radius = group%real_of("radius", 0.0_real64)
       if (group%given("packing_fraction") .and. (given .or. relative)) then
-        radius = 0                                        ! another procedure reports this problem
+        radius = 0                                        ! another procedure reports variables that exclude each other
       else if (group%given("packing_fraction")) then
         if (s%count > 0 .and. area(s%region) > 0) &
           radius = sqrt(group%real_of("packing_fraction", 0.0_real64)*area(s%region)/(pi*s%count))
@@ -229,7 +229,7 @@ contains
   !> Checks the name of an obstacle or species. The name must be unique and must be valid in paths of the output file, in overrides
   !> and in messages.
   subroutine check_name(groups, k, problems)
-    type(group_t), intent(in) :: groups(:)                !! all obstacles, or all species
+    type(group_t), intent(in) :: groups(:)                !! the groups of all obstacles, or of all species
     integer, intent(in) :: k
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: name
@@ -242,7 +242,7 @@ contains
     else if (any(own_names() == name) .or. any(beside_species == name)) then
       call groups(k)%complain("name", shown(name)//" is reserved for the output file", problems)
     end if
-    do j = 1, k - 1                                       ! an array expression would copy all names for each name
+    do j = 1, k - 1                                       ! a loop, because an array expression would copy all names
       if (groups(j)%instance == name) exit
     end do
     if (j < k) call groups(k)%complain("name", shown(name)//" is already the name of the group in line "// &

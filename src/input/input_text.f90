@@ -1,6 +1,6 @@
 !> Reads the text of an input file and splits the text into lines and tokens. The namelist reader of Fortran is not used: it accepts
-!> some invalid texts without a message, its messages contain neither the line nor the variable, and it can crash. This module and
-!> `namelist_input` read the text instead, with a small and strict grammar:
+!> some invalid texts without a message, its messages contain neither the line nor the variable, and it can crash. In its place,
+!> this module and `namelist_input` read the text with a small and strict grammar:
 !>
 !>     &group  name = value, value  name(2) = value  name = 3*value  /     ! comment
 !>
@@ -27,7 +27,8 @@ module input_text
   character(len=*), parameter :: blanks = " "//achar(9), quotes = "'""", marks = "&/=,()"
   character(len=*), parameter :: word_characters = digits//".+-"//letters//"_*%#:$@?<>|[]{}~^`\"
 
-  !> A token. `first` and `last` are the positions of its first and last character in the text, including quotation marks.
+  !> A token. `first` and `last` are the positions in the text of the first and the last character of the token, including quotation
+  !> marks.
   type :: token_t
     character(len=1) :: kind
     integer :: first, last, line

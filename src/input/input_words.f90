@@ -89,7 +89,7 @@ contains
       hint = ""
       associate (tokens => assignment%tokens)
         do k = 1, size(tokens), 2
-          if (tokens(k + 1)%first /= tokens(k)%last + 2) return     ! more than a comma separates the two numbers
+          if (tokens(k + 1)%first /= tokens(k)%last + 2) return     ! the two numbers are not separated by a comma alone
           if (verify(content(text, tokens(k + 1)), digits) > 0) return
         end do
         hint = "; did you mean "//content(text, tokens(1))//"."//content(text, tokens(2))// &
@@ -101,7 +101,7 @@ contains
     subroutine store_token(token, word)
       type(token_t), intent(in) :: token
       character(len=*), intent(in) :: word
-      character(len=:), allocatable :: normal        ! the word in its normal form
+      character(len=:), allocatable :: normal        ! the value in a standard form, such as `.true.` for `T`
       integer(int64) :: whole
       real(real64) :: number
       logical :: quoted
@@ -193,7 +193,7 @@ contains
     real(real64), intent(out) :: value
     character(len=:), allocatable, intent(out) :: problem
     integer, parameter :: longest = 60
-    character(len=longest) :: mantissa                 ! the digits before the exponent; 0 replaces the decimal point
+    character(len=longest) :: mantissa                 ! the word without exponent, and with 0 in place of the decimal point
     integer :: mark, exponent, status
 
     value = 0
@@ -212,7 +212,7 @@ contains
     end if
     problem = ""
     if (scan(word(:mark - 1), "123456789") == 0) return
-    if (abs(exponent) <= 200) then                 ! with such an exponent the number cannot overflow or underflow
+    if (abs(exponent) <= 200) then                 ! the limit of 200 excludes overflow and underflow
       read (word, "(f60.0)", iostat=status) value
       if (status == 0 .and. abs(value) >= smallest .and. abs(value) <= largest) return
     end if

@@ -36,8 +36,8 @@ contains
     integer :: group  ! index of the group that is being read; 0 if its name is unknown
     ! First line of the group that is being read; 0 between groups.
     integer :: opened
-    logical :: too_many                                             ! too many groups have the same name
-    logical :: quote_open  ! a quoted text in this group is not closed and may contain the /
+    logical :: too_many                                             ! .true. if too many groups have the same name
+    logical :: quote_open  ! .true. if a quoted text is not closed; the text may contain the / of the group
 
     complete = .true.
     too_many = .false.
@@ -49,7 +49,7 @@ contains
     end do
     allocate (found(size(group_names) + n_sides + min(count([(text(k:k) == "&", k=1, len(text))]), &
       count(is_repeated(group_names))*most_instances)))
-    do k = 1, size(group_names)                                     ! groups that cannot be repeated always exist
+    do k = 1, size(group_names)  ! groups that cannot be repeated exist even if the text lacks them
       if (.not. is_repeated(group_names(k))) call add_group(group_names(k), 0, 1)
     end do
     call open_source(unix_lines(text))
@@ -111,12 +111,12 @@ contains
       end associate
     end subroutine add_group
 
-    !> Stores a value that does not come from the input file: a default or an override. Such a value may contain a text without
+    !> Stores a value that does not come from the input file: a default or an override. A text in a default or an override needs no
     !> quotation marks.
     subroutine assign_text(slot, text, line, element)
       type(value_t), intent(inout) :: slot
       character(len=*), intent(in) :: text
-      integer, intent(in) :: line                         !! -k for override number k; 0 for a default
+      integer, intent(in) :: line                         !! -k for the value of override number k; 0 for a default
       integer, intent(in) :: element                      !! index of the element; 0 for all values of the variable
       type(assignment_t) :: assignment
 
@@ -151,7 +151,7 @@ contains
           if (follow("&"//word) .and. lower_case(content(source, token(at + 1))) == "end") then
             call problems%add(token(at)%line, own, "a group ends with /, not with &end")
             at = at + 2
-          else if (.not. quote_open) then                 ! otherwise the end of the group may be inside the quoted text
+          else if (.not. quote_open) then                 ! an unclosed quoted text may contain the end of the group
             call problems%add(opened, own, "the closing / is missing")
           end if
           opened = 0
@@ -304,7 +304,7 @@ contains
         if (own%first <= own%last) return
         if (scan(next%kind, "'"""//unclosed) > 0 .and. next%first == own%first) then
           next%repeats = own%repeats
-          own%kind = ","                                  ! marks that the repeat count has been read
+          own%kind = ","                                  ! the kind `,` marks a repeat count that has been read
         else
           call complain(assignment, "a value is missing after the *")
         end if
@@ -317,7 +317,7 @@ contains
       integer :: instances
 
       own = plain(name)
-      do group = n, 1, -1                                 ! finds the last group with this name; 0 if no group has this name
+      do group = n, 1, -1                                 ! `group` becomes 0 if no group has this name
         if (found(group)%name == name) exit
       end do
       instances = 0
@@ -395,7 +395,7 @@ contains
     !> `gravity(2)`. An empty VALUE restores the default.
     subroutine override(text, line)
       character(len=*), intent(in) :: text
-      integer, intent(in) :: line                         !! -k for override k
+      integer, intent(in) :: line                         !! -k for override number k
       character(len=:), allocatable :: group, instance, name, advice
       integer :: equals, first, last, row, g, element
 
@@ -436,7 +436,7 @@ contains
     !> name.
     subroutine split_element(name, element)
       character(len=:), allocatable, intent(inout) :: name
-      integer, intent(out) :: element                     !! index of the element; 0 without an index
+      integer, intent(out) :: element                     !! index of the element; set to 0 if the name has no index
       integer :: bracket
 
       element = 0
@@ -466,7 +466,7 @@ contains
     end subroutine replace_cadence
 
     !> Finds the group to which an override refers. If the override refers to a side without a group, the group is created. If the
-    !> input contains no such group, the result is 0 and the problem is reported.
+    !> override refers to any other group that the input does not contain, the problem is reported and g is set to 0.
     subroutine find_group(group, instance, line, g)
       character(len=*), intent(in) :: group, instance
       integer, intent(in) :: line

@@ -33,7 +33,8 @@ contains
   subroutine read_obstacles(path, walls, rows, error)
     character(len=*), intent(in) :: path
     logical, intent(in) :: walls                           !! .true. for straight walls, .false. for circles
-    real(real64), allocatable, intent(out) :: rows(:, :)   !! (columns,n) in the order of `of_circles` or `of_walls` [length]
+    !> (columns,n) numbers that describe each obstacle, in the order of `of_circles` or `of_walls` [length]
+    real(real64), allocatable, intent(out) :: rows(:, :)
     type(error_t), allocatable, intent(out) :: error
 
     if (is_hdf5(path)) then
@@ -58,7 +59,7 @@ contains
     if (allocated(error)) return
     do k = 1, size(rows, 2)
       do c = 1, size(rows, 1)
-        wrong = .not. ieee_is_finite(rows(c, k))           ! tested first, because debug builds stop at comparisons with NaN
+        wrong = .not. ieee_is_finite(rows(c, k))           ! NaN is excluded first: debug builds stop if it is compared
         if (.not. wrong) wrong = abs(rows(c, k)) > largest .or. (c == 3 .and. .not. walls .and. rows(c, k) < smallest)
         if (.not. wrong) cycle
         call fail(error, exit_usage, path//": row "//written(k)//": "//written(rows(c, k))//" is out of range")
@@ -71,11 +72,12 @@ contains
   subroutine read_text(path, walls, rows, error)
     character(len=*), intent(in) :: path
     logical, intent(in) :: walls                           !! .true. for straight walls, .false. for circles
-    real(real64), allocatable, intent(out) :: rows(:, :)   !! (columns,n) in the order of `of_circles` or `of_walls` [length]
+    !> (columns,n) numbers that describe each obstacle, in the order of `of_circles` or `of_walls` [length]
+    real(real64), allocatable, intent(out) :: rows(:, :)
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: text, line, problem
     character(len=6), allocatable :: names(:)
-    integer, allocatable :: column(:)  ! for each column of the file, index in `names`; empty at first
+    integer, allocatable :: column(:)  ! index in `names` of each column of the file; empty until the first line has been read
     integer :: first(longest_line), last(longest_line)     ! first and last position of each word in the line
     integer(int64) :: past
     integer :: number, n, n_words

@@ -8,7 +8,8 @@ module old_names
 
   type :: old_name_t
     character(len=8) :: group
-    character(len=name_length) :: name        !! old name of the variable; for a choice, present name of its variable
+    !> Old name of the variable; if only a choice was renamed, present name of the variable
+    character(len=name_length) :: name
     character(len=20) :: choice               !! old name of the choice; blank if the variable itself was renamed
     character(len=name_length) :: now
   end type old_name_t
@@ -35,7 +36,7 @@ contains
   !> Present name of a variable or choice that was renamed; empty if the name was never changed.
   pure function new_name(group, name, choice) result(now)
     character(len=*), intent(in) :: group, name
-    character(len=*), intent(in) :: choice     !! old name of the choice; blank for the variable itself
+    character(len=*), intent(in) :: choice     !! old name of the choice; blank if the name of a variable is looked up
     character(len=:), allocatable :: now
     integer :: k
 

@@ -71,7 +71,7 @@ contains
 
   !> Largest allowed polydispersity for a kind of distribution.
   pure function widest_spread(distribution) result(spread)
-    character(len=*), intent(in) :: distribution            !! 'uniform', 'gaussian' or 'lognormal'
+    character(len=*), intent(in) :: distribution            !! kind of distribution: 'uniform', 'gaussian' or 'lognormal'
     real(real64) :: spread
 
     spread = part/merge(sqrt(3.0_real64), deviations, distribution == "uniform")

@@ -21,11 +21,11 @@ module settings
   type :: run_settings_t
     character(len=:), allocatable :: title
     integer(int64) :: seed
-    character(len=:), allocatable :: dynamics         !! 'events' or 'steps'
-    real(real64) :: dt                                !! time step of 'steps' [time]
-    character(len=:), allocatable :: search           !! 'cells', 'pairs' or 'rescan'
-    character(len=:), allocatable :: queue            !! 'calendar' or 'heap'
-    !> Number of threads. If the value in the input is 0, a value from the environment replaces the 0 when the threads are started.
+    character(len=:), allocatable :: dynamics         !! method of advancing in time: 'events' or 'steps'
+    real(real64) :: dt                                !! time step if `dynamics` is 'steps' [time]
+    character(len=:), allocatable :: search           !! method of the neighbour search: 'cells', 'pairs' or 'rescan'
+    character(len=:), allocatable :: queue            !! kind of the event queue: 'calendar' or 'heap'
+    !> Number of threads. If the input contains 0, the number is taken from the environment when the threads are started.
     integer :: threads
     integer :: threads_asked = 1                      !! number of threads that the user requested
   end type run_settings_t
@@ -35,7 +35,7 @@ module settings
     real(real64), allocatable :: table(:, :)          !! (column_names,n) data of each disk; deallocated when the disks are placed
     logical, allocatable :: there(:)                  !! (column_names) whether the file contains each column
     integer, allocatable :: rows(:)                   !! (n) line numbers in a text file, or row numbers in the last frame of a run
-    type(error_t), allocatable :: error               !! reason why the disks in the file cannot be used
+    type(error_t), allocatable :: error               !! why the disks in the file cannot be used; not allocated if they can
   end type disks_in_file_t
 
   !> A species and its initial state.
@@ -45,30 +45,34 @@ module settings
     real(real64) :: mean_radius = 1.0_real64          !! mean of the radius distribution [length]
     !> Standard deviation of the radii divided by their mean; 0 if all radii are equal.
     real(real64) :: polydispersity = 0.0_real64
-    character(len=:), allocatable :: distribution     !! 'uniform', 'gaussian', 'lognormal'
-    !> Whether the masses of the disks are proportional to their areas. If .true., `mass` is the mass of a disk with the mean
-    !> radius.
+    character(len=:), allocatable :: distribution     !! distribution of the radii: 'uniform', 'gaussian', 'lognormal'
+    !> Whether the masses of the disks are proportional to the areas of the disks. If the masses are proportional to the areas,
+    !> `mass` is the mass of a disk with the mean radius.
     logical :: mass_by_area = .false.
-    logical :: mass_in_file = .false.                 !! masses are read from the file, if the file contains masses
-    logical :: radius_in_file = .false.               !! radii are read from the file
-    logical :: spin_in_file = .false.                 !! angular velocities are read from the file
-    logical :: angle_in_file = .false.                !! the file contains orientations
-    logical :: is_base = .false.                      !! other species have masses and radii relative to this species
+    logical :: mass_in_file = .false.                 !! .true. to read masses from the file, if the file contains masses
+    logical :: radius_in_file = .false.               !! .true. if radii are read from the file
+    logical :: spin_in_file = .false.                 !! .true. if angular velocities are read from the file
+    logical :: angle_in_file = .false.                !! .true. if the file contains orientations
+    logical :: is_base = .false.                      !! .true. if masses and radii of other species are relative to this species
     real(real64) :: region(4)                         !! xlo, xhi, ylo, yhi [length]
-    character(len=:), allocatable :: placement        !! 'random', 'grid', 'lattice', 'dense', 'explicit', 'file', 'grown'
+    !> Method of the initial positions: 'random', 'grid', 'lattice', 'dense', 'explicit', 'file', 'grown'
+    character(len=:), allocatable :: placement
     integer :: grid(2)                                !! numbers of columns and rows; 0, 0 if they are not given
     character(len=:), allocatable :: file             !! for placement 'file' or 'grown': text file, or HDF5 file of a run
-    logical :: scale_positions = .false.              !! positions from the output of another run are scaled to the box of this run
+    !> .true. to scale positions from the output of another run to the box of this run
+    logical :: scale_positions = .false.
     type(disks_in_file_t) :: in_file
     real(real64), allocatable :: position(:, :)       !! (2,count) given positions for 'explicit' [length]; otherwise shape (2,0)
-    character(len=:), allocatable :: velocities       !! 'rest', 'equal_speed', 'uniform', 'maxwell', 'explicit', 'file'
+    !> Method of the initial velocities: 'rest', 'equal_speed', 'uniform', 'maxwell', 'explicit', 'file'
+    character(len=:), allocatable :: velocities
     !> Speed for 'equal_speed', and largest velocity component for 'uniform' [length/time]
     real(real64) :: speed
     real(real64) :: temperature                       !! kT for 'maxwell' [energy]
     real(real64) :: exact_temperature = -1.0_real64   !! kT to which velocities are scaled; negative if it is not given [energy]
-    real(real64), allocatable :: velocity(:, :)       !! 'explicit' velocities, (2,count) or (2,1) for all disks; otherwise (2,0)
+    !> Given velocities for 'explicit': shape (2,count), or (2,1) if all disks have the same velocity; otherwise shape (2,0)
+    real(real64), allocatable :: velocity(:, :)
     real(real64) :: angular_velocity = 0.0_real64     !! angular velocity of all disks [1/time]
-    !> kT of rotation, the mean of I omega**2; negative if it is not given [energy]
+    !> kT of the rotation, which is the mean of I omega**2; negative if the input does not contain this temperature [energy]
     real(real64) :: rotational_temperature = -1.0_real64
   end type species_settings_t
 
@@ -89,11 +93,12 @@ module settings
 
   type :: output_settings_t
     type(sampling_t) :: sampling(2)                   !! schedule for each kind of samples in `sampled`
-    !> Columns of frames in addition to positions. If this array is not allocated, frames contain all columns.
+    !> Columns of frames in addition to positions; not allocated if frames contain all columns.
     character(len=text_length), allocatable :: frame_columns(:)
     logical :: single_precision                       !! .true. if frames are stored in single precision
     logical :: event_log
-    logical :: virial_tensor                          !! .true. to accumulate the virial tensor in all systems
+    !> .true. to accumulate the virial tensor even if no other setting requires it
+    logical :: virial_tensor
     logical :: helfand                                !! .true. to accumulate the Helfand moments
     real(real64) :: checkpoint_every                  !! wall-clock time between two checkpoints [s]
   end type output_settings_t
@@ -141,7 +146,8 @@ contains
     n = sum(int(self%species%count, int64), mask=self%drive%acts_on([(k, k=1, size(self%species))]))
   end function n_driven
 
-  !> Determines the features that the run needs, such as rotation. The starting files must have been read before.
+  !> Determines the features that the run needs, such as rotation. This procedure must be called after the starting files have been
+  !> read.
   pure subroutine choose_features(self)
     class(settings_t), intent(inout) :: self
 

@@ -1,5 +1,5 @@
-!> Texts about the input variables: the reference input file, the answers to `--explain`, and JSON for other programs. The JSON
-!> texts are the table of variables, and an input as the program interprets the input.
+!> Texts about the input variables: the reference input file, the answers to `--explain`, and JSON for other programs. The first
+!> JSON text contains the table of variables, and the second JSON text contains an input as the program interprets the input.
 module variable_help
   use choices, only: meaning_of
   use errors, only: error_t, exit_usage, fail
@@ -167,7 +167,7 @@ contains
     end function spaced
   end function matches
 
-  !> All data that the table contains about a variable, with one line for each.
+  !> The row of a variable in the table as a text with several lines, one for each property of the variable.
   pure function explanation(k) result(text)
     integer, intent(in) :: k                               !! row of the table
     character(len=:), allocatable :: text
@@ -206,7 +206,7 @@ contains
   end function default_of
 
   !> Condition under which a variable has an effect, such as a choice of another variable; empty if the variable always has an
-  !> effect. In &species, giving the variable can also set the choice.
+  !> effect. In `&species`, a variable that depends on a choice also sets the choice, unless the user has set the choice.
   pure function condition_of(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
