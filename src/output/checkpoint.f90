@@ -39,8 +39,8 @@ module checkpoint
   character(len=*), parameter :: described = checkpoint_group//"input_checksum"
 
   !> Path of a hard link to the first slot, which is created after all other links and never deleted. To delete the last link of a
-  !> group, HDF5 first overwrites the name of the link and then removes the link from a list. If the program were killed between
-  !> these two steps, h5dump could not list the file.
+  !> group, HDF5 first overwrites the name of the link and then removes the link from a list. If the program were killed after the
+  !> overwriting and before the removal, h5dump could not list the file.
   character(len=*), parameter :: kept = checkpoint_group//"kept"
 
 contains
@@ -55,7 +55,8 @@ contains
     if (index(build_flags, "-ffast-math") + index(build_flags, "-Ofast") > 0) text = text//", fast math"
   end function program
 
-  !> The input that the run uses, with one variable per line. Variables that may change on `--resume` are omitted.
+  !> Text of the input that the run uses, with one variable per line. The text does not contain variables that may change on
+  !> `--resume`.
   pure function fixed_input(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -64,7 +65,7 @@ contains
 
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
-        if (groups(g)%values(k)%name == "relative_to") cycle           ! the values of mass and radius include this factor
+        if (groups(g)%values(k)%name == "relative_to") cycle           ! mass and radius have their final values
         if (.not. groups(g)%values(k)%is_set() .or. table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add(groups(g)%value_line(k)//eol)
       end do
@@ -72,7 +73,7 @@ contains
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
         if (.not. allocated(groups(g)%values(k)%reals)) cycle
-        if (size(groups(g)%values(k)%reals) <= most_written) cycle      ! the lines above contain such a value completely
+        if (size(groups(g)%values(k)%reals) <= most_written) cycle      ! `value_line` has written all these values
         if (table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add("checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
           //trim(groups(g)%values(k)%name)//" = "//checksum(transfer(groups(g)%values(k)%reals, [0_int8]))//eol)
@@ -85,7 +86,8 @@ contains
   !> Overrides of variables that may change on `--resume` are not added.
   subroutine recall_overrides(output, overrides, error)
     character(len=*), intent(in) :: output                       !! path of the output
-    !> Overrides in the form GROUP.VARIABLE=VALUE. In: those of the present command line. Out: also those from the output file.
+    !> Overrides in the form GROUP.VARIABLE=VALUE. In: the overrides of the present command line. Out: the overrides from the output
+    !> file, followed by the overrides of the present command line.
     type(text_t), allocatable, intent(inout) :: overrides(:)
     !> Error if another version of the program wrote the output, or if the input in the output is damaged.
     type(error_t), allocatable, intent(out) :: error
@@ -99,7 +101,7 @@ contains
     call file%open(source_of(output), writable=.false.)
     call file%fetch_text(parameters_group//"overrides", text)
     if (checkpoint_number(file) /= none) then
-      call check_program(file, error)                         ! other versions may use other names of variables
+      call check_program(file, error)                         ! names of variables may differ between versions of the program
       if (.not. allocated(error)) call check_description(file, error)
     end if
     call file%close()
@@ -122,7 +124,7 @@ contains
   subroutine recall_input(file, text, overrides, changes, error)
     type(hdf5_file_t), intent(inout) :: file
     character(len=:), allocatable, intent(out) :: text, overrides
-    character(len=:), allocatable, intent(out) :: changes         !! changes during the run; not allocated without changes
+    character(len=:), allocatable, intent(out) :: changes         !! changes made during the run; not allocated if there are none
     type(error_t), allocatable, intent(out) :: error
 
     text = ""
@@ -183,8 +185,8 @@ contains
     call file%link(slots(1), kept)
   end subroutine make_checkpoints
 
-  !> Copies both slots of another file into a new file. The slots are created in the same order as in `make_checkpoints`, because
-  !> `remove_last` depends on this order.
+  !> Copies both slots (datasets for one checkpoint each) of another file into a new file. The slots are created in the same order
+  !> as in `make_checkpoints`, because `remove_last` depends on this order.
   subroutine copy_checkpoints(file, source)
     type(hdf5_file_t), intent(inout) :: file
     type(hdf5_file_t), intent(inout) :: source
@@ -207,7 +209,8 @@ contains
     call file%link(slots(1), kept)
   end subroutine copy_checkpoints
 
-  !> Writes a checkpoint to the slot that is not valid. After the data have been stored on the disk, this slot is marked as valid.
+  !> Writes a checkpoint to the slot that is not valid. After the checkpoint has been stored on the disk, the slot that contains the
+  !> new checkpoint is marked as valid.
   subroutine put_checkpoint(file, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim      !! unchanged on return
@@ -242,7 +245,8 @@ contains
     call file%put(current, scalar, [int(none, int64)])
   end subroutine mark_as_broken
 
-  !> Number of the valid slot, or `none`; -1 if the file does not contain this number.
+  !> Number of the slot that contains the valid checkpoint. The result is `none` if no slot is valid, and -1 if the file does not
+  !> contain the number of the valid slot.
   function checkpoint_number(file) result(number)
     type(hdf5_file_t), intent(inout) :: file
     integer :: number
@@ -310,7 +314,7 @@ contains
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(inout) :: sim    !! in: simulation with the box, contact law and species of the input
     type(progress_t), intent(out) :: progress
-    logical, intent(out) :: finished            !! the run had finished
+    logical, intent(out) :: finished            !! .true. if the run had already finished
     type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
     character(len=:), allocatable :: source
@@ -345,7 +349,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(record_t) :: record
     type(simulation_t) :: blank
-    character(len=:), allocatable :: failure      ! failure of reading the valid checkpoint
+    character(len=:), allocatable :: failure      ! why the valid checkpoint could not be read
     integer(int64) :: words
     integer :: number, trial
 
@@ -411,7 +415,7 @@ contains
   !> Counts, writes or reads the numbers of a checkpoint. Before a checkpoint is read, the box and the species of the simulation
   !> must be set.
   subroutine exchange_all(file, record, sim, progress)
-    type(hdf5_file_t), intent(inout) :: file      !! not used when the numbers are counted
+    type(hdf5_file_t), intent(inout) :: file      !! the file is not accessed if the numbers are only counted
     type(record_t), intent(inout) :: record
     type(simulation_t), intent(inout), target :: sim
     type(progress_t), intent(inout) :: progress
@@ -495,12 +499,13 @@ contains
         call exchange_short(tag%id)
         call record%exchange(file, tag%collisions)
         call exchange_short(tag%last_partner)
-        ! If the radii are not individual, the input contains the radii.
+        ! If disks have no individual masses and radii, the radii are not stored, because the input contains the radius of each
+        ! species.
         if (sim%features%own_sizes) call record%exchange(file, disk%radius)
       end associate
       settled = merge(1, 0, sim%events_done)
       do k = 1, merge(1, 0, sim%features%rotation) + merge(2, 0, sim%features%orientation)
-        ! These additional numbers make the length of the record depend on whether the run has rotation and orientation.
+        ! Additional copies of `settled` make the length of the record depend on whether the run has rotation and orientation.
         call record%exchange(file, settled)
       end do
       if (allocated(sim%extra)) call record%pass(file, c_loc(sim%extra(1)), size(sim%extra)*storage_size(sim%extra)/64)

@@ -3,8 +3,8 @@
 !> a finished run.
 !>
 !> The layout of an output file never changes after its creation. If the number of samples is known at the start, the file is
-!> created with space for exactly these samples. If the number is unknown, a larger file replaces the file by an atomic renaming
-!> whenever the space is used up. At the end of the run, a file without unused space replaces the file.
+!> created with space for exactly these samples. If the number of samples is unknown, the output file is replaced by a larger file,
+!> with an atomic renaming, whenever its space is used up. At the end of the run, a file without unused space replaces the file.
 module output
   use kinds, only: int64, real64
   use sampling_schedule, only: frames, progress_t, values
@@ -72,7 +72,7 @@ contains
     character(len=:), allocatable :: problem
     logical :: made
 
-    call record_signals()                         ! from this point on a sudden end could lose data
+    call record_signals()                         ! from this call on, a sudden end of the program could lose data
     self%file = hdf5_file_t()
     self%path = path
     self%opened = seconds()
@@ -86,7 +86,7 @@ contains
       if (problem /= "") call fail(error, exit_files, path//": "//problem)
     end if
     if (.not. allocated(error)) call check_places(path, error)
-    ! A file with this name is the incomplete file of a run that was killed.
+    ! If a file with the ending `unfinished_new` exists, the file is incomplete, because its run was killed.
     if (.not. allocated(error)) call remove_file(path//unfinished_new)
     self%replaced = identity_of(path)
     if (is_file(path) .and. all(self%replaced == 0) .and. .not. allocated(error)) &
@@ -295,7 +295,7 @@ contains
     log%n = 0
   end subroutine take_events
 
-  !> Adds samples to a track. If the file has too little space, a larger file first replaces the file.
+  !> Adds samples to a track. If the present file has no space for the samples, the present file is first replaced by a larger file.
   subroutine add(self, track, samples, sim)
     class(output_t), intent(inout) :: self
     integer, intent(in) :: track
@@ -350,7 +350,7 @@ contains
     if (checkpoints == anew) call make_checkpoints(new, self%input%groups, sim, self%progress)
     if (checkpoints == dropped) call mark_as_broken(new)
     call new%flush()
-    if (allocated(self%file%failure)) then        ! the old file could not be read
+    if (allocated(self%file%failure)) then        ! reading from the old file has failed
       call new%discard()
       return
     end if
@@ -420,8 +420,8 @@ contains
     if (.not. broken) call put_last_checkpoint(self%file, sim, before)
   end subroutine write_end
 
-  !> Completes the output of a run that broke off, including the last state of the run. The file keeps the name of an unfinished
-  !> output.
+  !> Completes the output of a run that broke off, including the last state of the run. The name of the file remains the name of an
+  !> unfinished output, OUT.h5.part.
   subroutine break_off(self, sim, cost, note)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -61,7 +61,8 @@ contains
     call self%show(trim(line))
   end subroutine report
 
-  !> Records the present counts and times. The rates shown later are averages since an earlier record.
+  !> Records the present counts and times. A later report shows rates averaged over the time since an earlier record of counts and
+  !> times.
   subroutine remember(self, sim, stop_rule)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

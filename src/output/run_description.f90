@@ -99,7 +99,7 @@ contains
 
       do g = 1, size(input%groups)
         associate (own => input%groups(g))
-          if (any(obstacle_groups == own%name)) cycle     ! `describe_table` writes a table of these groups
+          if (any(obstacle_groups == own%name)) cycle     ! `describe_table` writes a table of all obstacles and walls
           group = parameters_group//trim(own%name)
           if (is_repeated(own%name)) group = group//"/"//trim(own%instance)
           call file%make_group(group)
@@ -155,10 +155,10 @@ contains
     if (name == "") name = "unknown"
   end function author
 
-  !> Whether the results of a run are independent of a variable. The only such variable is `run.threads`, which is therefore not
-  !> stored among the parameters.
+  !> Whether the results of a run are independent of a variable. Results are independent only of `run.threads`; the parameters in
+  !> the output file therefore do not contain `run.threads`.
   pure function changes_nothing(variable) result(yes)
-    character(len=*), intent(in) :: variable      !! name of the variable, which may be followed by its value
+    character(len=*), intent(in) :: variable      !! name of the variable, or a text that begins with this name
     logical :: yes
 
     yes = index(variable, "run.threads") == 1
@@ -219,8 +219,8 @@ contains
     end select
   end subroutine describe_value
 
-  !> Writes all groups of one name as a table, with a dataset for each variable. If a variable has two choices, a flag is stored
-  !> under the name of the second choice; the flag is 1 for the second choice.
+  !> Writes all groups of one name as a table, with a dataset for each variable. If a variable has two choices, the dataset has the
+  !> name of the second choice, and contains 1 for groups with the second choice and 0 for groups with the first choice.
   subroutine describe_table(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -245,8 +245,8 @@ contains
           if (second /= "") call file%put(path//second, [n], merge(1_int32, 0_int32, texts == second))
         else
           if (.not. any([(groups(g)%values(k)%is_set(), g=1, n)])) cycle
-          if (row%size == 0) cycle                          ! `describe_rows` stores lists of points as obstacles
-          values = spread(ieee_value(0.0_real64, ieee_quiet_nan), 1, row%size*n)     ! NaN for groups without a value
+          if (row%size == 0) cycle                          ! `describe_rows` stores the obstacles that follow from lists of points
+          values = spread(ieee_value(0.0_real64, ieee_quiet_nan), 1, row%size*n)     ! NaN if a group has no value
           do g = 1, n
             if (size(groups(g)%reals_of(trim(row%name))) /= row%size) cycle
             values(row%size*(g - 1) + 1:row%size*g) = groups(g)%values(k)%reals
@@ -274,7 +274,7 @@ contains
     allocate (values(0))
     do k = 1, size(groups(1)%values)
       associate (row => table(groups(1)%values(k)%row))
-        if (row%status /= "example") cycle            ! `describe_table` stores all other variables
+        if (row%status /= "example") cycle            ! `describe_table` stores variables with another status
         values = [(groups(g)%reals_of(trim(row%name)), g=1, size(groups))]
         n = [(size(groups(g)%reals_of(trim(row%name)))/row%size, g=1, size(groups))]
         if (row%size == 1) call file%put(path//trim(row%name), [size(values)], values)

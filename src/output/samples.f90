@@ -18,7 +18,7 @@ contains
   pure function frame_series(list, n, single) result(series)
     type(frame_column_t), intent(in) :: list(:)   !! columns of the frames
     integer, intent(in) :: n                      !! number of disks
-    logical, intent(in) :: single                 !! reals are stored in single precision
+    logical, intent(in) :: single                 !! .true. to store reals in single precision
     type(series_t) :: series(2 + size(list))
     integer :: k
 

@@ -33,7 +33,8 @@ module sampling_schedule
     procedure, private :: next_time, number_within
   end type schedule_t
 
-  !> Progress of the output. A run can be resumed from the progress of the output and the state of the simulation.
+  !> Progress of the output: the numbers of samples and of logged events that have been written. A run can be resumed from the
+  !> progress of the output and the state of the simulation.
   type :: progress_t
     type(schedule_t) :: schedule(2)               !! schedules of frames and of observables
     integer(int64) :: events = 0                  !! number of events written to the event log
@@ -46,7 +47,7 @@ module sampling_schedule
 
 contains
 
-  !> Progress of the output at the start of a run.
+  !> Progress of the output at the start of a run, when no sample has been written.
   pure function new_progress(settings) result(progress)
     type(settings_t), intent(in) :: settings
     type(progress_t) :: progress
@@ -58,8 +59,8 @@ contains
     end do
   contains
 
-    !> Converts the intervals in the input, of which one may be given per disk, to intervals of the time, of collisions and of
-    !> events.
+    !> Converts the intervals in the input to intervals of the time, of the number of collisions and of the number of events. An
+    !> interval in collisions per disk is converted to an interval of the number of collisions.
     pure function intervals(every)
       real(real64), intent(in) :: every(:)        !! see `settings: sampled_by`
       real(real64) :: intervals(3)
@@ -87,7 +88,7 @@ contains
     yes = self%count == 0 .or. sim%time() > self%last_time .or. sim%tally%events + sim%kicks /= self%last_events
   end function is_new
 
-  !> Registers a sample of the present state.
+  !> Records that the present state has been sampled, and determines when the next samples are due.
   pure subroutine take(self, sim)
     class(schedule_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -98,13 +99,13 @@ contains
     call self%look_ahead(sim)
   end subroutine take
 
-  !> Finds the time and the counts at which the next samples are due, which are the next multiples of the intervals. The result
-  !> depends only on the present state and not on the time of the last sample. There is one exception: a sample that is due at the
-  !> present time is still to be taken if further events may occur at this time.
+  !> Finds the time and the counts at which the next samples are due, which are the next multiples of the intervals. The result does
+  !> not depend on the time of the last sample, except in one case: if further events may occur at the present time, and no sample
+  !> has been taken at the present time, a sample may still be due at the present time.
   elemental subroutine look_ahead(self, sim)
     class(schedule_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    logical :: over                               ! no further sample can be due at the present time
+    logical :: over                               ! .true. if no further sample can be due at the present time
 
     over = sim%events_done .or. self%last_time >= sim%time()
     self%next(by_time) = self%next_time(sim%time(), merge(sim%time(), self%last_time, over))
@@ -122,10 +123,10 @@ contains
     limits%sampled = max(limits%sampled, self%last_time)
   end subroutine tighten
 
-  !> Time of the next sample: the first sampling time that is not before `time` and is later than `past`. Sampling times are the
-  !> multiples of the interval, the logarithmic sampling times, and the given times. Multiples are calculated as products, because
-  !> sums would accumulate rounding errors. If several sampling times differ only by rounding errors, a single sample is taken, at
-  !> the last of these times.
+  !> Time of the next sample: the first sampling time t with t >= `time` and t > `past`. Sampling times are the multiples of the
+  !> interval, the logarithmic sampling times, and the given times. Multiples are calculated as products, because sums would
+  !> accumulate rounding errors. If several sampling times differ only by rounding errors, a single sample is taken, at the last of
+  !> these times.
   pure function next_time(self, time, past) result(next)
     class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: time, past        !! [time]
@@ -157,7 +158,7 @@ contains
     end do
   contains
 
-    !> Whether the time t is not before `time` and is later than `past`.
+    !> Whether t >= `time` and, with a tolerance for rounding errors, t > `past`.
     pure logical function is_ahead(t)
       real(real64), intent(in) :: t
 
@@ -166,7 +167,7 @@ contains
 
     !> The first of the given times for which `is_ahead` is .true.
     pure real(real64) function first_ahead(times)
-      real(real64), intent(in) :: times(:)        !! in ascending order [time]
+      real(real64), intent(in) :: times(:)        !! sampling times in ascending order [time]
       integer :: behind, ahead, middle
 
       behind = 0
@@ -184,8 +185,8 @@ contains
     end function first_ahead
   end function next_time
 
-  !> The first number of collisions or events larger than n at which a multiple of an interval is reached. A run whose stop rule is
-  !> equal to this multiple ends at the same number.
+  !> The smallest number of collisions (or events) above n at which a multiple of the interval `every` is reached. If the stop rule
+  !> of a run is a number of collisions (or events) equal to this multiple, the run ends at the number that is returned.
   elemental function next_number(n, every) result(next)
     integer(int64), intent(in) :: n
     real(real64), intent(in) :: every
@@ -201,9 +202,9 @@ contains
     next = whole_collisions(multiple*every)
   end function next_number
 
-  !> Number of samples of a run if this number is known at the start, otherwise 0. Two conditions must be met: the schedule has at
-  !> most one interval, and the run has only one stop rule, which limits the quantity in which the interval is measured. If the
-  !> schedule contains sampling times, this quantity is the time.
+  !> Number of samples of a run if this number is known at the start, otherwise 0. The number is known if the schedule has at most
+  !> one interval and the run has only one stop rule, which limits the quantity (time, collisions or events) in which the interval
+  !> is measured. If the schedule contains given or logarithmic sampling times, the stop rule must limit the time.
   elemental function planned(self, limits) result(n)
     class(schedule_t), intent(in) :: self
     type(limits_t), intent(in) :: limits          !! limits of the run
@@ -223,8 +224,8 @@ contains
     if (given(by_events)) n = numbers_within(limits%events, self%every(by_events))
   end function planned
 
-  !> Number of times from 0 to t at which samples are due, including 0 and t. The result is 0 if the number is too large for an
-  !> output with space for all samples.
+  !> Number of times from 0 to t at which samples are due, including 0 and t. The result is 0 if there are more than `too_many` such
+  !> times, because the output then does not reserve space for all samples.
   pure function number_within(self, t) result(n)
     class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: t                 !! [time]
@@ -242,8 +243,8 @@ contains
     if (n > too_many) n = 0
   end function number_within
 
-  !> Number of multiples of dt from 0 to t, including 0 and t. The result is 0 if the number is too large for an output with space
-  !> for all samples.
+  !> Number of multiples of dt from 0 to t, including 0 and t. The result is 0 if there are more than `too_many` multiples, because
+  !> the output then does not reserve space for all samples.
   pure function multiples_within(t, dt) result(n)
     real(real64), intent(in) :: t, dt
     integer(int64) :: n
