@@ -33,8 +33,8 @@ module dense_growth
   integer, parameter :: approaches = 6
   integer, parameter :: run_length = 2                  !! number of collisions per disk between two growth steps
   integer, parameter :: mixing_length = 10              !! number of collisions per disk after the growth
-  !> Number of growth steps in which the difference between the sizes and the full sizes must decrease by at least a tenth;
-  !> otherwise the growth has failed.
+  !> Number of growth steps between two checks of the growth. The growth has failed if the difference between the sizes and the full
+  !> sizes has decreased by less than a tenth since the previous check.
   integer, parameter :: jumps_per_check = 50
 
 contains
@@ -135,7 +135,7 @@ contains
       wanted = 0
       do k = 1, size(species)
         associate (own => full(disks_before(species, k) + 1:disks_before(species, k + 1)))
-          ! With equal radii this sum is free of rounding errors.
+          ! If all radii are equal, every term of this sum is 1, and the sum is free of rounding errors.
           wanted = wanted + own(1)**2*sum((own/own(1))**2)
         end associate
       end do
@@ -191,13 +191,14 @@ contains
       call evolution%start(sim)
       to_come = int(length, int64)*sim%n_disks()
       limits%collisions = sim%tally%collisions + (to_come + 1)/2
-      limits%events = sim%tally%events + 4*to_come            ! ends the run if a disk is trapped between obstacles
-      limits%time = sim%time() + maxval(sim%box%edges())      ! ends the run if the disks never collide
+      limits%events = sim%tally%events + 4*to_come            ! this limit ends the run if a disk is trapped between obstacles
+      limits%time = sim%time() + maxval(sim%box%edges())      ! this limit ends the run if the disks never collide
       call advance(evolution, sim, limits, error)
       do i = 1, sim%n_disks()
         sim%disk(i)%x = sim%position(i)
         sim%disk(i)%clock = sim%now
-        sim%tag(i)%last_partner = 0  ! allows a new collision with the last partner, because growth may close the gap to it
+        ! Growth may close the gap between a disk and its last partner; the two disks may then collide again
+        sim%tag(i)%last_partner = 0
       end do
     end subroutine move
 

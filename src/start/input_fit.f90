@@ -46,7 +46,7 @@ contains
       call read_missing_values(settings%species, k, settings%box, groups(s(1) + k - 1), problems)
     end do
     call settings%choose_features()
-    if (settings%n_disks() > most_disks) return               ! another procedure reports this problem
+    if (settings%n_disks() > most_disks) return               ! another procedure reports that there are too many disks
     before = problems%count
     call check_memory(settings, problems)
     if (problems%count > before) return
@@ -70,7 +70,7 @@ contains
     s = range_of(groups, ["species"])
     associate (box => settings%box, species => settings%species)
       beyond = box%side_excursion()                           ! distance by which moving sides extend beyond the box
-      do k = 1, box%n_obstacles()                             ! the module of each shape checks the positions
+      do k = 1, box%n_obstacles()                             ! `misfit` of each shape checks the position
         misfit = box%obstacle(k)%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
         if (misfit /= "") call report_obstacle_problem(box, k, groups(o(1) + box%obstacle(k)%surface - n_sides - 1), misfit, &
           problems)
@@ -136,8 +136,8 @@ contains
   end subroutine check_strokes
 
   !> Reads from a starting file the number and the radii of the disks of a species, unless the input contains these values, and
-  !> determines whether the disks rotate. If neither the number nor the radii are needed, an unreadable file is not reported here
-  !> but when the disks are placed, because a resumed run does not need the file.
+  !> determines whether the disks rotate. If neither the number nor the radii must be read, an unreadable file is reported only when
+  !> the disks are placed, because a resumed run, which places no disks, does not need the file.
   subroutine read_missing_values(species, k, box, group, problems)
     type(species_settings_t), intent(inout) :: species(:)
     integer, intent(in) :: k                                  !! index of the species
@@ -202,7 +202,8 @@ contains
     type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
     type(box_t), intent(in) :: box
-    logical, intent(in) :: alone                              !! the run has only one disk, which belongs to this species
+    !> .true. if the run has only one disk, which belongs to this species
+    logical, intent(in) :: alone
     type(problem_list_t), intent(inout) :: problems
     logical :: sound
     integer :: axis, k
@@ -233,7 +234,7 @@ contains
       endless = spans(s%region, box)
       lower = s%region(2*axis - 1)
       upper = s%region(2*axis)
-      room = min(upper, high(axis)) - max(lower, low(axis))   ! without the part of the region beyond displaced sides
+      room = min(upper, high(axis)) - max(lower, low(axis))   ! width of the region between the displaced sides
       farthest = max(abs(box%lower(axis)), abs(box%upper(axis)))
       least = merge(2*s%radius, 4*s%radius + rounding*farthest, alone)
       if (lower >= upper) then

@@ -1,6 +1,6 @@
 !> Checks whether a run fits into the memory that is available on the machine or granted by a batch system. A run that needs more
 !> memory is refused before it starts. If the memory is sufficient for a run without domains but not for a run with domains, the run
-!> uses the serial engine. The available memory is known only on Linux. On other systems no run is refused.
+!> uses the serial engine. The available memory is known only on Linux; on other operating systems every run is accepted.
 module memory
   use kinds, only: int64, never, pi, real64
   use input_problems, only: problem_list_t
@@ -13,24 +13,28 @@ module memory
   private
   public :: check_memory, free_memory, memory_needed, peak, room_for_domains
 
-  !> Memory in bytes per disk, per obstacle and per process. The values are contributions to the peak of the resident memory;
-  !> `runs/memory.sh` measures them with an accuracy of 5 %. For time-stepped dynamics the values are upper bounds, because the
-  !> length of the Verlet lists depends on the time step.
+  !> Memory in bytes per disk, per obstacle and per process. Each value is a contribution to the peak of the resident memory; the
+  !> script `runs/memory.sh` measures the contributions with an accuracy of 5 %. For time-stepped dynamics the contributions are
+  !> upper bounds, because the length of the Verlet lists depends on the time step.
   integer(int64), parameter :: per_process = 10000000, per_obstacle = 580
-  real(real64), parameter :: record = 110, cell = 32         !! `record`: state and event of a disk; `cell`: one cell of the search
-  real(real64), parameter :: extra = 40, own_size = 8  !! image indices, contact time and rotation; individual mass
-  real(real64), parameter :: sampled = 8.8_real64            !! one value of a disk in a frame
-  real(real64), parameter :: listed = 264                    !! neighbour list
-  !> The first constant is for the random numbers of the driving, the second constant for the Verlet lists of time-stepped dynamics.
+  !> `record`: state and next event of a disk; `cell`: a cell of the neighbour search
+  real(real64), parameter :: record = 110, cell = 32
+  !> `extra`: image indices, contact time and rotation of a disk; `own_size`: individual mass of a disk
+  real(real64), parameter :: extra = 40, own_size = 8
+  real(real64), parameter :: sampled = 8.8_real64            !! memory for each value of a disk in a frame
+  real(real64), parameter :: listed = 264                    !! neighbour list of a disk
+  !> `kicked`: random numbers of the driving; `stepped`: Verlet lists of time-stepped dynamics.
   real(real64), parameter :: kicked = 16, stepped = 100
-  !> Additional memory per disk if the box is divided into domains. The first value is for a box with walls, the second value for a
-  !> periodic box.
+  !> Additional memory per disk if the box is divided into domains: the first number applies to a box with walls, the second number
+  !> to a periodic box.
   real(real64), parameter :: divided(2) = [143, 205]
-  real(real64), parameter :: listed_twice = 80               !! additional memory with both domains and neighbour lists
+  !> Additional memory per disk if a run uses both domains and neighbour lists
+  real(real64), parameter :: listed_twice = 80
   ! Total memory per disk during the placement of disks, for four methods in this order: given positions, random positions,
   ! positions from a file, compression.
   real(real64), parameter :: placed = 150, inserted = 166, read_in = 226, grown = 310
-  real(real64), parameter :: cells_per_disk = 1.67_real64    !! upper bound, from `cell_layout`
+  !> Upper bound of the number of cells per disk that `cell_layout` chooses
+  real(real64), parameter :: cells_per_disk = 1.67_real64
 
 contains
 
@@ -154,8 +158,8 @@ contains
     yes = candidates > candidates_that_pay - 27*packing
   end function are_listed
 
-  !> Packing fraction that the system would have if all disks had the radius that determines the width of the cells. This radius is
-  !> the largest radius of all species that contain at least a twentieth of the disks.
+  !> Packing fraction that the system would have if all disks had the radius that determines the width of the cells. The width of
+  !> the cells is determined by the largest radius of those species that contain at least a twentieth of all disks.
   pure function crowding(settings) result(fraction)
     type(settings_t), intent(in) :: settings
     real(real64) :: fraction, radius
@@ -170,8 +174,8 @@ contains
   end function crowding
 
   !> The available memory: the smaller of the free memory of the computer and the memory limit of the control group of the process.
-  !> The operating system kills a batch job that exceeds the limit of its control group without a message. The result is huge if
-  !> neither the free memory nor the limit is known. [bytes]
+  !> If a batch job exceeds the memory limit of its control group, the operating system kills the job without a message. The result
+  !> is huge if neither the free memory nor the limit is known. [bytes]
   function free_memory(root) result(bytes)
     character(len=*), intent(in) :: root                  !! root folder of the file system; empty except in tests
     integer(int64) :: bytes

@@ -1,5 +1,5 @@
-!> Checks the positions of disks that a user has moved in a running simulation. The rules are the same as for the initial positions
-!> of a run.
+!> Checks the positions of disks that a user has moved in a running simulation. The new positions must obey the same rules as the
+!> initial positions of a run.
 module moved_disks
   use box_sides, only: bounds
   use errors, only: error_t, exit_usage, fail

@@ -180,9 +180,9 @@ contains
     end associate
   end subroutine load_disks
 
-  !> Finds a disk of species s that excludes the centres of disks of the given radius from the whole rectangle p +- half. The result
-  !> is 0 if no such disk exists. The cell that contains the point p is searched first, because a disk in this cell is most likely
-  !> to exclude the rectangle.
+  !> Finds a disk of species s that excludes the centres of disks of the given radius from the whole rectangle p +- half. If no disk
+  !> of the species excludes the whole rectangle, `blocker` is set to 0. The cell that contains the point p is searched first,
+  !> because a disk in this cell is most likely to exclude the rectangle.
   pure subroutine search_layer(packing, s, p, half, radius, blocker)
     type(packing_t), intent(in) :: packing
     integer, intent(in) :: s
@@ -198,7 +198,7 @@ contains
       middle = cell(layer, p)
       blocker = blocker_in(packing, layer%head(middle(1), middle(2)), p, half, radius)
       if (blocker > 0) return
-      if (rho <= layer%width) then                  ! usually true: the neighbouring cells are then sufficient
+      if (rho <= layer%width) then                  ! a search in the neighbouring cells is usually sufficient
         low = max(middle - 1, 1)
         high = min(middle + 1, layer%n)
       else

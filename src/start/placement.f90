@@ -33,19 +33,21 @@ module placement
   public :: place_disks
 
   integer, parameter :: stream_number = 1                   !! number that identifies the random streams of this module
-  !> Upper limit of the number of attempts to place a 'random' species multiplied by the number of disks of the species.
+  !> Upper limit of a product of two numbers: the number of attempts to place a species with placement 'random', and the number of
+  !> disks of this species.
   integer(int32), parameter :: many_trials = 500000
-  !> Number of disks that a new attempt can place in addition to `nearly` times the number in the previous attempt (an estimate).
+  !> If an attempt has placed n disks, a new attempt is estimated to place at most nearly*n + few disks.
   integer(int32), parameter :: few = 5
-  real(real64), parameter :: nearly = 1.25_real64  !! estimated upper limit of the ratio of placed disks in two attempts
-  real(real64), parameter :: denser = 1.5_real64  !! ratio of packing fractions that 'dense' always reaches relative to 'random'
+  real(real64), parameter :: nearly = 1.25_real64  !! factor in the estimate that the comment of `few` explains
+  !> 'dense' reaches at least this multiple of the packing fraction that 'random' reaches
+  real(real64), parameter :: denser = 1.5_real64
   integer, parameter :: most_reports = 5                    !! largest number of problems of one kind reported for one species
 
 contains
 
   !> Sets the positions and radii of all disks, and the velocities of disks that are read from a file with velocities.
   subroutine place_disks(species, groups, seed, line, sim, problems)
-    !> Settings of the species. The procedure deallocates their tables of disks that were read from files.
+    !> Settings of the species. The procedure deallocates the tables of disks that these settings contain.
     type(species_settings_t), intent(inout) :: species(:)
     type(group_t), intent(in) :: groups(:)                  !! groups of the species
     integer(int64), intent(in) :: seed
@@ -98,8 +100,8 @@ contains
   contains
 
     !> Determines the positions of a species that is placed at explicit positions, on a grid or lattice, or at positions from a
-    !> file. For positions from a file, masses, orientations and, if requested, velocities are copied from the file to the
-    !> simulation.
+    !> file. If the positions are read from a file, masses, orientations and, if requested, velocities are also copied from the file
+    !> to the simulation.
     subroutine find_positions(s)
       integer, intent(in) :: s
       integer :: first, last, k
@@ -183,7 +185,7 @@ contains
     subroutine report(s, k, p, count, what)
       integer, intent(in) :: s, k
       real(real64), intent(in) :: p(2)                      !! [length]
-      integer, intent(inout) :: count                       !! number of problems of this kind reported so far
+      integer, intent(inout) :: count                       !! number of reported problems of the kind `what`
       character(len=*), intent(in) :: what
       character(len=:), allocatable :: variable, from
 
@@ -209,8 +211,8 @@ contains
       associate (me => species(s))
         call stream%seed(seed, [s, stream_number])
         call centre_range(me%region, packing%box, me%radius, lower, upper)
-        ! The number of disks that fit varies between attempts. The relative variation is larger if the species has few disks, and
-        ! more attempts are therefore made.
+        ! The number of disks that fit varies between attempts. The smaller the species, the larger is the relative variation of
+        ! this number; more attempts are therefore made if a species has few disks.
         do trial = 1, merge(1, max(1, many_trials/me%count), me%polydispersity > 0)
           call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
           call insert_at_random(packing, int(s, int32), 1 + disks_before(species, s), radius, stream, line, placed)
@@ -297,7 +299,7 @@ contains
         end do
       end do
       if (pass == 1) call box%add_obstacles(["obstacles", "disks    "], &
-        [packing%box%n_obstacles(), n - packing%box%n_obstacles()])                  ! collisions with these obstacles are elastic
+        [packing%box%n_obstacles(), n - packing%box%n_obstacles()])                  ! all obstacles of the new box are elastic
     end do
     do k = 1, packing%box%n_obstacles()
       allocate (box%obstacle(k)%shape, source=packing%box%obstacle(k)%shape)

@@ -12,8 +12,8 @@ module position_file
   private
   public :: angle_row, column_names, mass_row, radius_row, read_positions, spin_row
 
-  !> Names of the columns of a file; the rows of a table of disks have the same order. Radius and mass are the last two names, so
-  !> that a single loop can check both.
+  !> Names of the columns of a file of disks. Row k of the table of disks that is read from the file contains the quantity
+  !> `column_names(k)`. Radius and mass are the last two names, so that a single loop can check both.
   character(len=*), parameter :: column_names(*) = [character(len=7) :: "x", "y", "vx", "vy", "omega", "angle", "radius", "mass"]
   integer, parameter :: spin_row = 5, angle_row = 6, radius_row = 7, mass_row = 8
   character(len=*), parameter :: known_names(*) = [character(len=7) :: column_names, "species"]

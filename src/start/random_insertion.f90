@@ -3,8 +3,9 @@
 !> the centre of a new disk from the whole voxel, and points are drawn only from the remaining voxels. All voxels are halved along
 !> both axes when attempts fail too often. Attempts in eliminated voxels would always fail; the method therefore generates the same
 !> distribution as simple insertion, but can reach saturation (Zhang and Torquato, 2013, doi:10.1103/PhysRevE.88.053312). If the
-!> disks have different radii, the largest disks are inserted first. No voxels are then eliminated, because a voxel without space
-!> for one disk may have space for a smaller disk, and the insertion ends when many attempts to insert a disk have failed.
+!> disks have different radii, the largest disks are inserted first, and no voxels are eliminated, because a voxel without space for
+!> one disk may have space for a smaller disk. The insertion of disks with different radii ends when many attempts to insert a disk
+!> have failed.
 module random_insertion
   use kinds, only: int32, real64
   use memory_hints, only: prefetch
@@ -45,7 +46,7 @@ contains
     integer(int32), intent(in) :: first
     real(real64), intent(in) :: size_of(:)          !! (count) radii of the disks [length]
     type(random_stream_t), intent(inout) :: stream
-    class(status_line_t), intent(inout) :: line     !! shows the progress
+    class(status_line_t), intent(inout) :: line     !! status line that shows the progress of the insertion
     integer(int32), intent(out) :: placed           !! number of disks inserted
     type(voxels_t) :: voxels
     integer(int32) :: i, j, k, n(2), blocker, failures, count, order(size(size_of))
@@ -147,7 +148,8 @@ contains
     attempt%after = stream
   end subroutine draw_attempt
 
-  !> Index of the voxel that an attempt selects. The index is calculated from the random number as in `draw_index`.
+  !> Index of the voxel that an attempt selects. The index is calculated from the random number of the attempt by the same formula
+  !> as in `draw_index`.
   pure function chosen(voxels, attempt) result(k)
     type(voxels_t), intent(in) :: voxels
     type(attempt_t), intent(in) :: attempt

@@ -14,7 +14,8 @@ module regular_positions
 
 contains
 
-  !> Whether the region extends over the whole period of the box, for each axis. Disks may then extend beyond the region.
+  !> Whether the region extends over the whole period of the box, for each axis. Disks may extend beyond the region along an axis
+  !> for which the result is .true.
   pure function spans(region, box) result(yes)
     real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box
@@ -36,7 +37,7 @@ contains
     call bounds(box, 0.0_real64, low, high)
     inset = merge(0.0_real64, radius, spans(region, box))
     lower = max(region([1, 3]), low) + inset
-    upper = max(min(region([2, 4]), high) - inset, lower)    ! `max` allows for rounding errors if a disk fills its region
+    upper = max(min(region([2, 4]), high) - inset, lower)    ! rounding errors must not make `upper` smaller than `lower`
   end subroutine centre_range
 
   !> Positions on a rectangular grid: the centres of nx*ny equal cells of the region, row by row from the bottom.
@@ -86,7 +87,7 @@ contains
     found = distance
     fits = 0
     more = species%count
-    do while (more - fits > 1)                              ! bisection: the distance decreases with the number of disks
+    do while (more - fits > 1)                              ! bisection: more disks have a smaller distance
       call choose_lattice(fits + (more - fits)/2)
       if (distance < closest) more = fits + (more - fits)/2
       if (distance >= closest) fits = fits + (more - fits)/2
@@ -107,7 +108,7 @@ contains
         ! Alternate rows are shifted; a periodic lattice must therefore have an even number of rows.
         if (periodic(2) .and. modulo(rows, 2) == 1 .and. rows > 1) cycle
         call measure_lattice(1 + (n - 1)/rows, rows, its_step, its_distance)
-        if (rows > 2 .and. 2*its_step(2) <= distance) exit                 ! additional rows can only decrease the distance
+        if (rows > 2 .and. 2*its_step(2) <= distance) exit                 ! more rows can only have a smaller distance
         if (its_distance <= distance) cycle
         distance = its_distance
         columns = 1 + (n - 1)/rows

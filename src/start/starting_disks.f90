@@ -1,5 +1,5 @@
-!> Reads the disks of a species from a starting file, in any of the possible formats. The procedures check each number, and complete
-!> the table of disks with values from the input.
+!> Reads the disks of a species from a starting file, in any of the possible formats. Each number in the file is checked, and
+!> quantities that the file does not contain are set to their values in the input.
 module starting_disks
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds, only: int64, real64
@@ -16,15 +16,15 @@ module starting_disks
   public :: origin, read_disks, resolution
 
   real(real64), parameter :: resolution = 1.0e-10_real64      !! smallest ratio of a radius to the largest coordinate
-  !> Datasets in the output file of a run, in the order of the quantities in `position_file: column_names`. The datasets before the
-  !> radius belong to the frames; radius and mass are constant.
+  !> Datasets in the output file of a run, in the order of the quantities in `position_file: column_names`. Radius and mass are
+  !> constant; all other datasets are parts of the frames.
   character(len=48), parameter :: datasets(*) = [character(len=48) :: position//value_of, position//value_of, &
     velocity//value_of, velocity//value_of, angular_velocity//value_of, orientation//value_of, disk_radius, disk_mass]
 
   interface
-    !> Reads the disks of one species from the last frame of a run. The submodule `last_frame` implements this procedure. The
-    !> submodule `last_frame_without_hdf5` only reports that such files cannot be read. The linker selects one of the two
-    !> submodules.
+    !> Reads the disks of one species from the last frame of a run. The submodule `last_frame` reads the disks from the output file;
+    !> the submodule `last_frame_without_hdf5` only reports that HDF5 files cannot be read. The linker selects either `last_frame`
+    !> or `last_frame_without_hdf5`.
     module subroutine read_last_frame(path, name, disks, box)
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: name                    !! name of the species
@@ -74,7 +74,7 @@ contains
     end associate
   end subroutine read_disks
 
-  !> Records why the disks in a starting file cannot be used. Only the first reason is kept.
+  !> Records why the disks in a starting file cannot be used, unless an earlier reason has already been recorded.
   subroutine refuse(me, why)
     type(species_settings_t), intent(inout) :: me
     character(len=*), intent(in) :: why
@@ -83,8 +83,8 @@ contains
   end subroutine refuse
 
   !> Completes the table of disks with values from the input. The procedure reports each quantity that is missing in both the file
-  !> and the input. It also reports each quantity that both a text file and the input contain. For the output file of a run this is
-  !> no error: the input overrides the file.
+  !> and the input. A quantity that both a text file and the input contain is also reported. If the output file of a run and the
+  !> input contain the same quantity, the value in the input is used, and no error is reported.
   subroutine join(me)
     type(species_settings_t), intent(inout) :: me
     logical :: wanted(radius_row:mass_row)
@@ -119,7 +119,7 @@ contains
     end subroutine refuse_both
   end subroutine join
 
-  !> Reports numbers in the file that would be invalid in the input, too.
+  !> Reports each number in the file that is outside the range of numbers that the input may contain.
   subroutine check_numbers(me, farthest)
     type(species_settings_t), intent(inout) :: me
     real(real64), intent(in) :: farthest                      !! largest coordinate in the box [length]
@@ -129,7 +129,7 @@ contains
     do k = 1, size(me%in_file%rows)
       do row = 1, mass_row
         associate (number => me%in_file%table(row, k))
-          wrong = .not. ieee_is_finite(number)                ! tested first, because debug builds stop at comparisons with NaN
+          wrong = .not. ieee_is_finite(number)                ! NaN is excluded first: debug builds stop if it is compared
           if (.not. wrong) wrong = number > largest .or. number < merge(smallest, -largest, row >= radius_row)
           if (.not. wrong) cycle
         end associate

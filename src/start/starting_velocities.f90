@@ -60,8 +60,8 @@ contains
     end subroutine find_disks
 
     !> Draws the velocities of one species. If the total momentum must be zero, velocities of equal speed are drawn as opposite
-    !> pairs, with three velocities at angles of 120 degrees if the number of disks is odd. All speeds then remain equal. For the
-    !> other methods, `remove_drift` sets the total momentum to zero.
+    !> pairs, with three velocities at angles of 120 degrees if the number of disks is odd. In this way the total momentum is zero
+    !> although all disks have the same speed. For the other methods, `remove_drift` sets the total momentum to zero.
     subroutine draw_velocities()
       associate (species => settings%species(s), disk => sim%disk)
         select case (species%velocities)
@@ -156,7 +156,7 @@ contains
     end subroutine draw_spins
 
     !> Scales the velocities of one species relative to their mean velocity, so that the species has exactly the given temperature.
-    !> The momentum of the species does not change.
+    !> The scaling does not change the total momentum of the species.
     subroutine scale_to_temperature(wanted)
       real(real64), intent(in) :: wanted                    !! intended kT of the translational motion [energy]
       real(real64) :: mean(2), temperature
