@@ -7,7 +7,7 @@ module variable_rows
   integer, parameter, public :: name_length = 37, help_length = 1000
   integer, parameter, public :: most_threads = 1024, most_disks = 100000000
   real(real64), parameter, public :: smallest = 1.0e-100_real64    !! smallest absolute value of a nonzero number in the input
-  real(real64), parameter, public :: largest = 1.0e100_real64  !! largest absolute value; larger products could overflow
+  real(real64), parameter, public :: largest = 1.0e100_real64  !! largest absolute value of a number in the input
 
   !> Occasions on which the value of a variable may change after the start of a run: never, on `--resume`, or in a running
   !> simulation. Variables that do not affect the trajectory may change on `--resume`. Variables that affect the motion of the
@@ -15,7 +15,7 @@ module variable_rows
   character(len=9), parameter, public :: never = "never", on_resume = "on resume", in_motion = "running"
 
   type, public :: range_t
-    real(real64) :: lower, upper             !! limits of the range, which include both ends
+    real(real64) :: lower, upper             !! smallest and largest allowed value
     character(len=24) :: words
   end type range_t
 
@@ -41,7 +41,7 @@ module variable_rows
   type, public :: variable_t
     character(len=8) :: group
     character(len=name_length) :: name
-    character(len=8) :: kind                 !! "integer", "real", "logical" or "text"
+    character(len=8) :: kind                 !! type of the values: "integer", "real", "logical" or "text"
     integer :: size                          !! number of values; 0 if any number is allowed
     character(len=8) :: status               !! see below
     character(len=24) :: value               !! default or example, as written in an input file; see below

@@ -81,8 +81,8 @@ contains
     end do
   end function full_names
 
-  !> Whether two variables of a group must not be given together. This applies also to two variables that set intervals for the same
-  !> samples.
+  !> Whether two variables of a group must not be given together. Two variables that set intervals for the same kind of samples must
+  !> not be given together either.
   pure function excludes(one, other) result(yes)
     integer, intent(in) :: one, other        !! rows
     logical :: yes
@@ -109,8 +109,8 @@ contains
     sentence = help(:index(trim(help)//" ", ". "))
   end function first_sentence
 
-  !> Kind of samples for which a variable sets an interval, such as `frames` for frames_every_time. The result is empty for all
-  !> other variables.
+  !> Kind of samples for which a variable sets an interval, such as `frames` for frames_every_time. The result is empty if the
+  !> variable does not set an interval.
   pure function track_of(name) result(track)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: track
