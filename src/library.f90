@@ -33,7 +33,7 @@ module library
   public :: advance_to, answer, begin, goal_of, renew_changed, session_of, session_t, text_of
 
   integer(c_int), parameter :: going_on = 1          !! result of `advance` if the simulation has not yet reached a limit
-  integer, parameter :: least_logged = 1000000        !! smallest number of latest events that a full log contains
+  integer, parameter :: least_logged = 1000000        !! number of latest events that remain when a full log is shortened
 
   type :: session_t
     type(run_input_t) :: input
@@ -42,7 +42,7 @@ module library
     type(stop_rule_t) :: rule
     integer(int64) :: iterations = 1                  !! number of loop iterations between two readings of the clock
     logical :: logged = .false.                       !! .true. if events are logged
-    type(event_log_t) :: log                          !! the latest events; older events are deleted
+    type(event_log_t) :: log                          !! the latest events; the oldest events are deleted when the log is too long
   end type session_t
 
 contains
@@ -70,7 +70,7 @@ contains
   !> Starts the engine of a new simulation and returns the handle of the simulation. After an error the simulation is deallocated.
   function begin(session, threads, error) result(handle)
     type(session_t), pointer, intent(inout) :: session
-    !> Number of threads; 0 for the value in the input or, if the input contains none, one.
+    !> Number of threads. With 0 the number in the input applies or, if the input contains no number, one thread is used.
     integer(c_int), intent(in) :: threads
     type(error_t), allocatable, intent(in) :: error
     type(c_ptr) :: handle
@@ -119,7 +119,8 @@ contains
     if (allocated(error) .or. code /= going_on) code = answer(error, message, room)
   end function advance
 
-  !> Converts the arguments of `advance` to a stop rule. If no argument is a limit, the stop rule of the input applies.
+  !> Converts the arguments of `advance` to a stop rule. If none of the arguments sets a limit, the result is the stop rule of the
+  !> input.
   pure function goal_of(session, time, collisions, events) result(rule)
     type(session_t), intent(in) :: session
     real(real64), intent(in) :: time                  !! time since the start of the run [time]
@@ -257,7 +258,9 @@ contains
     type(session_t), intent(in) :: session
     type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
     character(len=10), parameter :: of_motion(4) = [character(len=10) :: "motion", "velocity", "start_time", "end_time"]
-    real(real64) :: at(2, 2), x, start, passed        ! position (axis, lower or upper) and position of one side [length]; [time]
+    ! `at`: positions of the sides (axis, lower or upper) [length]; `x`: position of one side [length]; `start`, `passed`: time when
+    ! a motion starts, and time since then [time]
+    real(real64) :: at(2, 2), x, start, passed
     integer :: g, k, old, side, inwards
     logical :: same
 
@@ -469,7 +472,7 @@ contains
           do k = 1, size(groups(g)%values)
             if (.not. groups(g)%values(k)%is_set()) cycle
             most = most_written
-            ! All values are copied, because some describe geometry that was read from a file.
+            ! Obstacles are written with all their values, because some obstacles were read from a file.
             if (any(obstacle_groups == groups(g)%name)) most = huge(most)
             call growing%add(groups(g)%value_line(k, most)//eol)
           end do

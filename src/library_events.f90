@@ -14,7 +14,8 @@ module library_events
   implicit none
   private
 
-  !> Largest number of events, and of kicks of a disk, within which `next_events` searches for future collisions.
+  !> Number of events and kicks after which `next_events` ends its search for future events. Each requested event increases this
+  !> limit by 100.
   integer(int64), parameter :: longest_look = 2000000
 
 contains

@@ -29,7 +29,7 @@ module run
   public :: perform_run
 
   integer, parameter :: most_unwritten = 4096              !! capacity of the event log [collisions]
-  !> Size of the output above which the program prints it at the start [bytes]
+  !> If the output needs more space than this limit, the program prints the size of the output at the start of the run. [bytes]
   integer(int64), parameter :: much = 250000000
 
   type :: run_t
@@ -207,8 +207,8 @@ contains
     call run%line%start(run%sim, run%stop_rule, run%started)
     limits%time = run%sim%time()
     call run%output%tighten(limits)
-    ! If no further event can occur, the run ends with a last sample. If the run was stopped just after that sample, this call
-    ! detects after a resume that no further event can occur.
+    ! If no further event can occur, the run ends with a last sample. If a run is resumed that was stopped just after its last
+    ! sample, the following call detects that no further event can occur.
     if (run%sim%events_done .and. limits%sampled >= run%sim%time()) call advance_once(run%evolution, run%sim, limits, error)
     do while (.not. (run%stop_rule%is_over(run%sim, run%evolution) .or. allocated(error)))
       limits = run%stop_rule%limits
@@ -229,11 +229,11 @@ contains
       if (stopping .or. requests > requests_served .or. now > next_checkpoint) then
         requests_served = requests
         call run%output%save(run%sim, error)
-        if (stop_requested()) stopping = .true.            ! a stop may have been requested during the write
+        if (stop_requested()) stopping = .true.            ! a signal may have requested a stop while `save` was running
         if (stopping .and. .not. allocated(error)) call fail(error, exit_stopped, "stopped at time "// &
           written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to continue")
         if (allocated(error)) exit
-        next_checkpoint = seconds() + run%input%settings%output%checkpoint_every  ! the interval starts after the write
+        next_checkpoint = seconds() + run%input%settings%output%checkpoint_every  ! the time to the next checkpoint starts now
       end if
       call run%line%report(run%sim, run%stop_rule)
     end do
@@ -244,7 +244,7 @@ contains
   function summary(run) result(text)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
-    real(real64) :: energy(3)                         ! translational, rotational, total [energy]
+    real(real64) :: energy(3)                         ! translational, rotational and total energy of the disks [energy]
 
     associate (sim => run%sim)
       energy = energies(sim)
@@ -268,8 +268,8 @@ contains
     if (note(run) /= "") text = text//eol//"note = "//note(run)
   end function summary
 
-  !> A note about inelastic collapses, and about the reason why the run ended if no stop rule was met. The note is empty if neither
-  !> applies.
+  !> A note about inelastic collapses, and about the reason why the run ended if no stop rule was met. The note is empty if no
+  !> collapse occurred and a stop rule was met.
   function note(run) result(text)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
