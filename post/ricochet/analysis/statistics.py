@@ -60,6 +60,7 @@ FINE, COARSE = 64, 16  # number of parts of a series whose means resolve slow mo
 FEWEST = 8  # smallest number of independent samples for an error
 LEAST_WAVES, MOST_WAVES = 2, 8  # number of slow waves from which the error of a series is estimated
 PER_WAVE = 6  # largest number of waves times inefficiency over length
+LEAST_INEFFICIENCY = 0.02  # of a strongly anticorrelated series
 
 
 class SeriesMean(NamedTuple):
@@ -116,16 +117,24 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
     >>> bool(4 < statistical_inefficiency(np.repeat(noise, 5)) < 6)
     True
     """
-    count, rest = len(series), series - np.mean(series, axis=0)
     if np.max(np.ptp(series, axis=0)) <= 1e-12 * np.max(np.abs(series), initial=0):
         return 1.0
+    found, lag = summed_correlation(series)
+    return max(least, found) * (1 + (2 * lag + 1) / len(series))
+
+
+def summed_correlation(series: np.ndarray) -> tuple[float, int]:
+    """Return 1 + 2 tau of a series, uncorrected for the unknown mean, and the window of the sum."""
+    count, rest = len(series), series - np.mean(series, axis=0)
     found, lag = 1.0, 0
+    if not np.any(rest):
+        return found, lag
     for lag in range(1, count // 2):
         found += 2 * np.mean(rest[lag:] * rest[:-lag]) / np.mean(rest**2)
         tau = 1.5 / np.log((found + 1) / (found - 1)) if found > 1 else 1e-9
         if np.exp(-lag / tau) < tau / np.sqrt(lag * count):
             break
-    return max(least, found) * (1 + (2 * lag + 1) / count)
+    return found, lag
 
 
 def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
@@ -180,17 +189,44 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
     of the series are used.  If a is the first coefficient and b the root mean square of the
     following coefficients, -a / b has Student's distribution for a series without a drift.  The
     returned drift is -a / b, converted to a Gaussian variable with variance 1.
+
+    The correlation length is the estimated statistical inefficiency plus the standard deviation of
+    this estimate: Madras and
+    Sokal, Journal of Statistical Physics 50, 109 (1988).  Without this addition,
+    a series whose inefficiency is underestimated by chance would have an error that is too small,
+    and too many degrees of freedom.
     """
     parts = cells(series, FINE)
-    per_sample = max(1e-9, statistical_inefficiency(parts))
+    per_sample = statistical_inefficiency(parts, least=LEAST_INEFFICIENCY)
+    doubt = np.sqrt(2 * (2 * summed_correlation(parts)[1] + 1) / len(parts))
     most = min(MOST_WAVES, len(parts) // 2)
-    waves = int(np.clip(len(parts) / (PER_WAVE * per_sample), LEAST_WAVES, most))
+    waves = int(len(parts) / (PER_WAVE * per_sample * (1 + doubt)))
+    waves = int(np.clip(waves, LEAST_WAVES, most))
     height = scipy.fft.dct(parts, norm="ortho")[1 : waves + 2]
-    error = np.sqrt(np.mean(height[:-1] ** 2) / len(parts))
     others = np.sqrt(np.mean(height[1:] ** 2))
     slope = -height[0] / others if others > 0 else 0.0
     chance = scipy.special.stdtr(waves, -abs(slope))
-    return float(error), waves, float(np.copysign(scipy.special.ndtri(chance), slope))
+    drift = float(np.copysign(scipy.special.ndtri(chance), slope))
+    if per_sample < 1:
+        return *periodic_waves(parts, per_sample), drift
+    return float(np.sqrt(np.mean(height[:-1] ** 2) / len(parts))), waves, drift
+
+
+def periodic_waves(parts: np.ndarray, per_sample: float) -> tuple[float, int]:
+    """Return standard error of the mean and degrees of freedom of an anticorrelated series (T,).
+
+    The sum of such a series contains a bounded part.  For example, the sum of the impulses on
+    opposite walls contains the momentum of the disks between the walls.  The values of the bounded
+    part at both ends of the series contribute to the variance of the mean.  Their contribution to
+    the coefficients of the cosine transform is twice as large, but the contribution to the
+    coefficients of the Fourier transform, averaged over sines and cosines, is equal.  The spectrum
+    of the bounded part increases as the square of the frequency; the number of waves decreases with
+    the inefficiency `per_sample` such that the relative bias is constant.
+    """
+    most = min(MOST_WAVES, len(parts) // 2) // 2
+    pairs = int(np.clip(round(len(parts) * per_sample**0.5 / (2 * PER_WAVE)), 1, max(1, most)))
+    power = np.abs(scipy.fft.rfft(parts)[1 : pairs + 1]) ** 2
+    return float(np.sqrt(np.mean(power)) / len(parts)), 2 * pairs
 
 
 def equilibration(series: np.ndarray) -> int:
