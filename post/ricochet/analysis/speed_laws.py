@@ -3,11 +3,12 @@
 The speeds of each frame are scaled by the energy of the frame, so that conserved and slowly
 fluctuating energies do not influence the test.  Scaled speeds deviate less from the expected
 distribution than independent values would (Lilliefors, Journal of the American Statistical
-Association 62, 399 (1967)).  The p-values are therefore computed from random frames, which have as
-many disks as the measured frames, and whose speeds are scaled by the energy of the frame, too.  The
-velocities in a random frame are uniformly distributed on the sphere of constant energy.  Along the
-axes that the function `equilibrium.comoving` returns, the velocities are relative to the centre of
-mass.  Correlated frames are weighted according to their statistical inefficiency.
+Association 62, 399 (1967)).  The p-values therefore follow from random frames with the numbers of
+disks and the scaling of the measured frames.  The velocities in a random frame are uniformly
+distributed on the sphere of constant energy.  Along `comoving` axes, the velocities are relative to
+the centre of mass.  The statistics of correlated frames are divided by their statistical
+inefficiency.  The statistics of random frames are divided by random estimates of the inefficiency,
+so that the p-values include the noise of the estimate.
 """
 
 from collections.abc import Sequence
@@ -28,13 +29,9 @@ BINS = 30  # of equal probability
 DRAWN = 4000  # drawn samples
 MOST = 1000  # speeds of a drawn sample; more have the same distribution of the scaled statistics
 MANY = 2000  # number of disks above which the motion of the centre of mass is negligible
-#: The statistical error of an estimated statistical inefficiency is proportional to 1 / sqrt(F),
-#: where F is the number of frames. An estimate of the statistical inefficiency is used only if the
-#: estimate exceeds 1 by more than a threshold divided by sqrt(F). For the Kolmogorov-Smirnov test,
-#: the threshold is one standard deviation of an estimate from cumulative counts, about two of which
-#: are independent. For the chi-square test, the threshold is two standard deviations of an estimate
-#: from the counts in all bins.
-LEAST_DISTANCE, LEAST_CHI2 = 1.4, 4 / np.sqrt(BINS - 1)
+NOISES = 400  # random estimates of a statistical inefficiency
+LONG = 200  # number of frames above which the noise of this estimate is negligible
+LEAST = 0.5  # smallest statistical inefficiency of frames, whose correlations are positive
 TAIL = 0.05  # fraction of the samples that an exponential tail replaces
 
 
@@ -125,11 +122,11 @@ def statistics_of(values: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def by_chance(sample: Sample) -> np.ndarray:
-    """Return sorted values of n D^2 and sorted values of chi^2, (2, DRAWN), of random samples."""
+    """Return n D^2 and chi^2 (2, DRAWN) of random samples."""
     rng, law, parts = np.random.default_rng(1), sample.law(), []
     for _ in range(10):
         parts.append(statistics_of(law(np.sqrt(sample.draw(rng, DRAWN // 10)))))
-    return np.sort(np.concatenate(parts, axis=1), axis=1)
+    return np.concatenate(parts, axis=1)
 
 
 def chance(found: float, drawn: np.ndarray) -> float:
@@ -147,15 +144,52 @@ def chance(found: float, drawn: np.ndarray) -> float:
     return TAIL * float(np.exp((drawn[first] - found) / mean))
 
 
-def per_frame(counts: np.ndarray, least: float) -> float:
-    """Return the statistical inefficiency of `counts` (F, B), the counts in B bins in each frame.
+def memory(counts: Sequence[np.ndarray], cumulative: bool) -> float:
+    """Return the statistical inefficiency of counts in bins (F, B), as a mean over runs.
 
-    If the estimate does not exceed 1 by more than `least` / sqrt(F), which is the size of random
-    deviations, the function returns 1.  Without the threshold `least` / sqrt(F), the noise of the
-    estimate would distort the p-value of chi^2 if there are many bins.
+    The Kolmogorov-Smirnov distance follows from the cumulative counts.  The inefficiency of a run
+    with fewer than three frames is 1.
     """
-    found = statistical_inefficiency(counts) if len(counts) > 2 else 1.0
-    return found if found > 1 + least / np.sqrt(len(counts)) else 1.0
+    series = [np.cumsum(own, axis=1)[:, :-1] if cumulative else own for own in counts]
+    found = [statistical_inefficiency(own, LEAST) if len(own) > 2 else 1.0 for own in series]
+    return float(np.average(found, weights=[len(own) for own in counts]))
+
+
+@lru_cache(maxsize=64)
+def noise(sizes: tuple[int, ...], true: float, cumulative: bool) -> np.ndarray:
+    """Return random estimates of `memory` (NOISES,) over its true value.
+
+    For 20 frames the relative noise of the estimate is about a third.  `sizes` contains the numbers
+    of frames of the runs.  The random numbers of disks in bins have a correlation between frames
+    that decays exponentially such that its statistical inefficiency is the true value.
+    """
+    if sum(sizes) > LONG:
+        return np.ones(NOISES)
+    rng, keep = np.random.default_rng(2), (true - 1) / (true + 1)
+    counts = [correlated(rng.normal(size=(size, NOISES, BINS)), keep) for size in sizes]
+    drawn = ([own[:, k] for own in counts] for k in range(NOISES))
+    return np.array([memory(own, cumulative) for own in drawn]) / true
+
+
+def correlated(values: np.ndarray, keep: float) -> np.ndarray:
+    """Turn independent values (F, ..., B) into frames that each keep a part of the last one.
+
+    The sum over the last axis is zero, because the number of all disks in the bins is fixed.
+    """
+    values = values - values.mean(axis=-1, keepdims=True)
+    for k in range(1, len(values)):
+        values[k] = keep * values[k - 1] + (1 - keep**2) ** 0.5 * values[k]
+    return values
+
+
+def p_value(
+    found: float, drawn: np.ndarray, counts: Sequence[np.ndarray], cumulative: bool
+) -> float:
+    """Return the probability of a larger statistic, given statistics (DRAWN,) of free frames."""
+    own = memory(counts, cumulative)
+    sizes, true = tuple(sorted(map(len, counts))), float(f"{max(1, own):.2g}")
+    estimates = np.tile(noise(sizes, true, cumulative), DRAWN // NOISES)
+    return chance(found / own, np.sort(drawn / estimates))
 
 
 def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> SpeedTest:
@@ -192,20 +226,18 @@ def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> Speed
     for one in values:
         bins = np.minimum((one * BINS).astype(int), BINS - 1)
         counts.append(np.stack([np.bincount(row, minlength=BINS) for row in bins]))
-    size = [len(own) for own in counts]
-    slow = [per_frame(np.cumsum(own, axis=1)[:, :-1], LEAST_DISTANCE) for own in counts]
-    memory = float(np.average(slow, weights=size))
-    fast = float(np.average([per_frame(own, LEAST_CHI2) for own in counts], weights=size))
     total = sample.own * sample.frames
+    free = total / max(1.0, memory(counts, cumulative=True))
     if not known:
-        return SpeedTest("none", total / memory, *[np.nan] * 4)
-    square, chi2 = statistics_of(np.concatenate(values).reshape(1, -1))[:, 0]
-    drawn, fixed = by_chance(sample.smaller()), runs[0].nature.keeps_kinetic_energy
+        return SpeedTest("none", free, *[np.nan] * 4)
+    found = statistics_of(np.concatenate(values).reshape(1, -1))[:, 0]
+    drawn = by_chance(sample.smaller())
+    fixed = runs[0].nature.keeps_kinetic_energy
     return SpeedTest(
         "fixed_energy" if fixed else "Maxwell",
-        total / memory,
-        float(np.sqrt(square / total)),
-        chance(square / memory, drawn[0]),
-        chi2 / fast / (BINS - 1),
-        chance(chi2 / fast, drawn[1]),
+        free,
+        float(np.sqrt(found[0] / total)),
+        p_value(found[0], drawn[0], counts, cumulative=True),
+        found[1] / max(1.0, memory(counts, cumulative=False)) / (BINS - 1),
+        p_value(found[1], drawn[1], counts, cumulative=False),
     )
