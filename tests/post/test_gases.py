@@ -817,6 +817,21 @@ def test_fields_of_few_values_have_no_bias_and_their_errors_hold(tmp_path, rng, 
     assert np.mean(held) == pytest.approx(0.68, abs=5 * 0.47 / np.sqrt(np.size(held)))
 
 
+def test_errors_of_a_flow_of_bounded_displacements_are_its_scatter(tmp_path, rng):
+    """A part of each velocity is the change of a bounded displacement between two frames."""
+    place = np.broadcast_to(rng.uniform(0.1, 0.9, (40, 2)), (160, 40, 2))
+    found = []
+    for k in range(60):
+        v = 0.4 * np.diff(rng.normal(size=(161, 40, 2)), axis=0)
+        v += 0.3 * rng.normal(size=place.shape)
+        run = written(tmp_path / f"{k}.h5", place, v, radius=0.1)
+        own = fields.fields([run], None, (2, 2)).found
+        found.append([own["flow_x"], own["flow_y"]])
+    mean, error = np.moveaxis(found, 2, 0)
+    assert np.mean(error) < 1.15 * np.sqrt(np.mean(mean**2))
+    assert np.mean(np.abs(mean) < error) == pytest.approx(0.6827, abs=0.06)
+
+
 def test_cells_in_which_few_disks_were_have_no_error_of_nothing(tmp_path, rng):
     """One disk in each of two blocks determines the flow only; an empty cell has no error of 0."""
     place = np.full((32, 4, 2), 0.1)

@@ -37,6 +37,7 @@ __all__ = [
 MOST_BLOCKS = 16  # largest number of blocks of a run
 FEWEST_BLOCKS = 3  # smallest number of blocks of all runs that is required for an error
 FEWEST_DISKS = 3  # fewest disks in a cell without any one block, for kT, stress, heat
+FLOW_LEAST = -0.5  # smallest correlation of neighbouring blocks of the flow
 LONG = 1.5  # length of a block in units of the statistical inefficiency
 POINTS = 1 << 16  # used with obstacles to find the accessible area
 ACROSS = SIDES[:2], SIDES[2:]  # the two sides perpendicular to each axis
@@ -188,17 +189,19 @@ def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[B
 def kinship(members: Members, blocks: list[Block], most: float) -> np.ndarray:
     """Return, for each of F fields (G, F, C), the correlation (F,) of neighbouring blocks of time.
 
-    If d_k is the deviation of block k from the mean, the correlation is twice the sum of the
-    products d_k d_(k+1), divided by the sum of the squares d_k^2.  The sums of products and of
-    squares include all cells, because a single cell has too few blocks for an estimate.  The
-    correlations are limited to the range from 0 to `most`.
+    A correlation is twice the sum of products of neighbouring deviations, divided by the sum of
+    squared deviations.  Both sums include all cells, because a single cell has too few blocks for
+    an estimate.  The correlations are limited to the range from 0 to `most`.  The lower limit for
+    the flow is `FLOW_LEAST`: the flow is the rate of change of a bounded displacement, so that
+    neighbouring blocks can be anticorrelated.
     """
+    least = np.array([FLOW_LEAST if name.startswith("flow") else 0.0 for name in NAMES])
     size, same = len(blocks), [a.run is b.run for a, b in pairwise(blocks)]
     rest = np.nan_to_num(members.rests())
     square = np.maximum(np.sum(rest**2, axis=(0, 2)), np.finfo(float).tiny)
     product = np.sum((rest[1:] * rest[:-1])[same], axis=(0, 2)) / square
     unbiased = product * (size - 1) / size + sum(same) / size**2  # about their own mean
-    return np.clip(2 * unbiased, 0, most) + 0 * most
+    return np.clip(2 * unbiased, least, most) + 0 * most
 
 
 # --- cells ---
