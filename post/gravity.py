@@ -15,10 +15,10 @@ first order, the excluded area multiplies the density of species i by exp(-sum_j
 This correction is a few per cent near the floor.  If the sum, calculated for point particles,
 exceeds 0.5, no dashed line is drawn for the heights.
 
-The slopes are determined by weighted linear fits to the logarithm of the histograms, for kinetic
-energies from 0 to 5 kT and potential energies m g h from 1 to 5 kT.  Smaller heights are not used
-in the fits, because the finite size of the disks flattens the distribution at these heights.  The
-errors of the slopes are determined from ten blocks of time.
+Slopes are the decay constants of greatest likelihood of exponential distributions that are fitted
+to the values from 0 to 5 kT of the kinetic energy and from 1 to 5 kT of m g h.  The heights below
+1 kT are left out, because the finite size of the disks flattens the distribution there.  The errors
+of the slopes follow from the jackknife over ten blocks of time.
 """
 
 from typing import NamedTuple
@@ -43,6 +43,8 @@ import scipy
 SPEED_RANGE = (0.0, 5.0)  # range of m v^2 / 2 kT
 HEIGHT_RANGE = (1.0, 5.0)  # range of m g h / kT
 BLOCKS = 10  # blocks of time, for errors
+FEWEST_VALUES = 20  # smallest number of values from which a slope is determined
+STEEPEST = 500.0  # largest decay constant times the range of a fit
 CROWDED = 0.5  # excluded fraction of the area at the floor up to which the first order is used
 
 
@@ -63,14 +65,56 @@ def samples(run: Run, kind: Species, frames: list[int]) -> Samples:
     return Samples(kind.mass, kind.radius, squares.sum(axis=2), squares[..., 0], height)
 
 
-def log_slope(values: np.ndarray, limits: tuple[float, float], bins: int = 30) -> float:
-    """Return the decay constant of a histogram, from a weighted linear fit to its logarithm."""
-    counts, edges = np.histogram(values, bins, limits)
-    good = counts >= 5
-    if good.sum() < 3:
+def log_slope(values: np.ndarray, limits: tuple[float, float]) -> float:
+    """Return the decay constant of values with an exponential distribution between two limits.
+
+    The decay constant is that of greatest likelihood, for which the mean of the values between the
+    limits is the mean of the truncated distribution.  A line fitted to the logarithm of a histogram
+    would depend on its bins: nearly empty bins would make the scatter larger by a third.
+    """
+    inside = values[(values >= limits[0]) & (values <= limits[1])]
+    reach = limits[1] - limits[0]
+    if len(inside) < FEWEST_VALUES:
         return float("nan")
-    middle = (edges[1:] + edges[:-1]) / 2
-    return -float(np.polyfit(middle[good], np.log(counts[good]), 1, w=np.sqrt(counts[good]))[0])
+
+    def excess(decay: float) -> float:
+        mean = 0.5 - decay / 12 if abs(decay) < 1e-4 else 1 / decay - 1 / np.expm1(decay)
+        return mean - (np.mean(inside) - limits[0]) / reach
+
+    return float(scipy.optimize.brentq(excess, -STEEPEST, STEEPEST) / reach)
+
+
+def slope_of(values: np.ndarray, reach: tuple[float, float], laws: np.ndarray) -> Estimate:
+    """Return `log_slope` of values (F, n) over the slope of the law, with its error.
+
+    `reach` is the range of the fit in units of kT.  The error follows from the jackknife: `laws`
+    (BLOCKS + 1,) contains the slope of the law for kT of all frames, and for kT without the frames
+    of each block.
+    """
+
+    def over(law: float, own: np.ndarray) -> float:
+        return log_slope(own, (reach[0] / law, reach[1] / law)) / law
+
+    whole = over(laws[0], values)
+    if len(values) < BLOCKS:
+        return Estimate(whole, np.nan)
+    rests = (np.delete(values, own, axis=0) for own in blocks_of(len(values)))
+    slopes = np.array([over(*one) for one in zip(laws[1:], rests, strict=True)])
+    return Estimate(whole, estimate(BLOCKS * whole - (BLOCKS - 1) * slopes).error)
+
+
+def blocks_of(frames: int) -> list[np.ndarray]:
+    """Return the frames of each block of time."""
+    return np.array_split(np.arange(frames), BLOCKS)
+
+
+def warmth(species: list[Samples]) -> np.ndarray:
+    """Return 1, and the kinetic energy (BLOCKS + 1,) without each block over that of all frames."""
+    energy = np.sum([0.5 * s.mass * s.square.sum(axis=1) for s in species], axis=0)
+    rests = [np.delete(energy, own) for own in blocks_of(len(energy))]
+    return np.array([1.0, *(np.mean(rest if len(rest) else energy) for rest in rests)]) / np.append(
+        1.0, np.full(BLOCKS, energy.mean())
+    )
 
 
 def sharers(run: Run) -> float:
@@ -141,7 +185,7 @@ def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[d
     """Return the ratios of the fitted slopes to the slopes of the solid and dashed lines."""
     temperature = kt[0]
     grid, crowded = heights(run, species, temperature)
-    rows = []
+    rows, warm = [], warmth(species)
     for name, s, density in zip(run.names, species, crowded, strict=True):
         v_law, h_law = s.mass / (2 * temperature), s.mass * np.abs(run.gravity[1]) / temperature
         squares = np.linspace(0, 20 / v_law, 4001)
@@ -154,9 +198,7 @@ def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[d
             ("height", "crowded", h_law, s.height, HEIGHT_RANGE, grid, density),
         ):
             limits = tuple(np.array(reach) / law)
-            error = estimate([log_slope(part, limits) for part in np.array_split(values, BLOCKS)])
-            slope = Estimate(log_slope(values, limits) / law, error.error / law)
-            row |= measured(f"{kind}_slope", slope)
+            row |= measured(f"{kind}_slope", slope_of(values, reach, law / warm))
             row[f"{kind}_{other}"] = law_slope(x, weight, limits, values.size) / law
         rows.append(row)
     return rows
@@ -219,9 +261,9 @@ def draw(run: Run, species: list[Samples], result: list[dict], began: tuple) -> 
         run.units.label("height h of the centre above its lowest position", "length"),
     )
     for row, title, name, known in zip(panels, titles, names, (1, lawful[0]), strict=True):
-        row[0].set(ylabel="probability density", xlim=(0, None))
-        row[0].legend(loc="upper right", title=title)
         top = row[0].get_ylim()[1]
+        row[0].set(ylabel="probability density", xlim=(0, None), ylim=(0, top))
+        row[0].legend(loc="upper right", title=title)
         row[1].set(yscale="log", ylim=(1e-4 * top, 1.5 * top))
         for axes in row:
             axes.set_xlabel(name)

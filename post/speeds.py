@@ -113,7 +113,9 @@ def pooled(
 ) -> tuple[Estimate, dict]:
     """Return the speed density (B,) of a species in late frames, and results of the tests."""
     own, each = zip(runs, picked, strict=True), state not in (EQUILIBRIUM, STEADY)
-    u = np.concatenate([reduced_speeds(*one, each=each, species=name) for one in own])
+    members = [reduced_speeds(*one, each=each, species=name) for one in own]
+    members = [u.reshape(len(frames), -1) for u, frames in zip(members, picked, strict=True)]
+    u = np.concatenate([one.ravel() for one in members])
     test, several = speed_test(runs, picked, name), len(runs[0].names) > 1
     kt, ends, _ = temperature(runs, picked, name)
     parts = {} if state == COOLING else measured("kT", kt)
@@ -130,8 +132,8 @@ def pooled(
         **parts,
         "kT_first": ends[0],
         "kT_last": ends[1],
-        **measured("mean_u", moment(u, 1, test.independent)),
-        **measured("kurtosis", moment(u, 4, test.independent)),
+        **measured("mean_u", moment(members, 1, test.independent)),
+        **measured("kurtosis", moment(members, 4, test.independent)),
         "law": test.law,
         "KS_D": test.ks,
         "KS_p": test.ks_p,

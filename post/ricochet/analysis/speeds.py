@@ -7,8 +7,8 @@ import numpy as np
 from ..reading.arrays import Index, chosen
 from ..reading.nature import Refused
 from ..reading.reader import Run
-from .estimates import Estimate, estimate, excess_kurtosis
-from .statistics import correlated_mean
+from .estimates import Estimate, excess_kurtosis
+from .statistics import combine_runs, correlated_mean
 from .equilibrium import comoving, thermal_energy
 
 __all__ = [
@@ -102,11 +102,20 @@ def reduced_speeds(
     return np.sqrt(energy[:, slice(None) if species is None else run.of_species(species)]).ravel()
 
 
-def moment(u: np.ndarray, power: int, independent: float) -> Estimate:
-    """Return the mean of u^power for speeds u that are first scaled to a mean square of 1."""
+def moment(members: Sequence[np.ndarray], power: int, independent: float) -> Estimate:
+    """Return the mean of u^power for speeds u that are first scaled to a mean square of 1.
+
+    `members` contains the speeds (F, n) of n disks in F frames of each run.  The error follows from
+    the series of the means over the disks of a frame.  For a single run with too few frames the
+    error treats the frames as `independent` speeds.
+    """
+    u = np.concatenate([one.ravel() for one in members])
     mean = np.mean(u**power)
-    rest = u**power - power / 2 * mean * u**2
-    return Estimate(mean, np.std(rest) / np.sqrt(independent))
+    rests = [one**power - power / 2 * mean * one**2 for one in members]
+    error = combine_runs([correlated_mean(rest.mean(axis=1)) for rest in rests]).error
+    if not np.isfinite(error):
+        error = np.std(np.concatenate([rest.ravel() for rest in rests])) / np.sqrt(independent)
+    return Estimate(mean, error)
 
 
 def all_move(run: Run, frame: int) -> bool:
@@ -164,8 +173,8 @@ def means(runs: Sequence[Run], frames: Sequence[Index], name: str) -> tuple[Esti
     Returns
     -------
     tuple of Estimate
-        mean speed and mean energy; the errors follow from the scatter of the runs or, for a single
-        run, from the scatter of its frames
+        mean speed and mean energy; the errors follow from the series of the frames or, if the runs
+        scatter more than these errors explain or have few frames, from the scatter of the runs
 
     Examples
     --------
@@ -183,9 +192,6 @@ def means(runs: Sequence[Run], frames: Sequence[Index], name: str) -> tuple[Esti
         )
         for run, own in zip(runs, frames, strict=True)
     ]
-    if len(members) > 1:
-        whole = estimate([one.mean(axis=0) for one in members])
-        (v, k), (dv, dk) = whole.mean, whole.error
-        return Estimate(v, dv), Estimate(k, dk)
-    speed, energy = (correlated_mean(column) for column in members[0].T)
+    series = [[correlated_mean(column) for column in one.T] for one in members]
+    speed, energy = (combine_runs(own) for own in zip(*series, strict=True))
     return Estimate(speed.mean, speed.error), Estimate(energy.mean, energy.error)
