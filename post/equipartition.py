@@ -5,14 +5,16 @@
 Runs with the same width v0 of the initial velocity distribution are combined.  Energies are
 averaged over the runs, and over windows of time of the length --window.  The thermalisation time
 T_therm is the time at which the relative difference of the two energies falls below --within and
-stays below this value for three windows.  The error limits of T_therm are the times for the
-difference minus its error, and for the difference plus its error.  For a single run, the error is
-the fluctuation of the ratio of the energies in the second half of the run.  With 30 + 30 disks this
-error is 26 %, which is too large to determine T_therm: use many runs or many disks.  In the table,
+stays below this value for three windows.  The error of T_therm is that of the jackknife: T_therm is
+determined again without each of the runs.  For a single run, the difference has an error, which is
+the fluctuation of the ratio of the energies in the second half of the run, and the limits of
+T_therm are the times for the difference minus and plus this error.  With 30 + 30 disks this error
+is 26 %, which is too large to determine T_therm: use many runs or many disks.  In the table,
 K_light and K_heavy are mean energies in equilibrium, which begins after --equilibration or, without
 that option, when no observable drifts any longer.
 """
 
+from collections.abc import Callable
 from functools import reduce
 from typing import NamedTuple
 
@@ -69,10 +71,25 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
     gap = Estimate(difference.mean / light.mean, difference.error / light.mean)
     if len(runs) == 1:
         gap = Estimate(gap.mean, np.full_like(gap.mean, np.std(gap.mean[len(time) // 2 :])))
-    agreed = propagate_error(
-        lambda curve: entry(time, curve, within), gap._replace(mean=np.abs(gap.mean))
-    )
+        agreed = propagate_error(
+            lambda curve: entry(time, curve, within), gap._replace(mean=np.abs(gap.mean))
+        )
+    else:
+        agreed = over_runs(lambda own: entry(time, np.abs(own[1] / own[0] - 1), within), both)
     return Approach(time, light, heavy, gap, agreed)
+
+
+def over_runs(of: Callable[[np.ndarray], float], both: list[np.ndarray]) -> Estimate:
+    """Return a function of the mean energies (2, W) of R runs, with its error by the jackknife.
+
+    `both` contains the energies (R, W) of the two species.  The result is NaN if the function is
+    NaN for all runs, or without one of them.
+    """
+    tracks, count = np.array(both), len(both[0])
+    whole = of(tracks.mean(axis=1))
+    rests = [of(np.delete(tracks, run, axis=1).mean(axis=1)) for run in range(count)]
+    error = estimate(count * whole - (count - 1) * np.array(rests)).error
+    return Estimate(whole + 0 * error, error)
 
 
 def late(runs: list[Run], name: str, skip: float | None) -> Estimate:
