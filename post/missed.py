@@ -127,7 +127,15 @@ def draw(runs: list[Run], rows: list[dict]) -> plt.Figure:
     axes.plot(curve, expected, color="black", lw=1.2, label=label)
     label = f"measured, {size} pair{'s' * (size > 1)} of runs"
     style = {"ls": "", "marker": "o", "color": COLOURS[0], "capsize": 3, "label": label}
-    axes.errorbar(dt, share, error, **style)
+    seen = share > 0
+    if seen.any():
+        axes.errorbar(dt[seen], share[seen], error[seen], **style)
+    above = ~seen & (share + error > 0)
+    if above.any():
+        style |= {"marker": "v", "label": "upper limit: mean, not above 0, plus its error"}
+        axes.plot(
+            dt[above], (share + error)[above], **{k: style[k] for k in style if k != "capsize"}
+        )
     axes.set(xscale="log", yscale="log", title=caption(runs))
     axes.set(xlabel=runs[0].units.label("Δt", "time"), ylabel="pair collisions missed [%]")
     axes.set_xticks(dt, [f"{step:g}" for step in dt], minor=False)
@@ -142,6 +150,11 @@ def main() -> None:
     seeds = {run.seed for run in args.runs if run.time_step == 0}
     alone = ", ".join(str(run.path) for run in args.runs if run.seed not in seeds)
     notes = [f"left out, because no event-driven run has the same seed: {alone}"] if alone else []
+    notes += [
+        f"dt = {row['dt']:g}: the measured fraction is not above 0, and the axis is logarithmic"
+        for row in rows[1:]
+        if row["missed_percent"] <= 0
+    ]
     report(args, draw(args.runs, rows), rows, notes=notes)
 
 
