@@ -150,19 +150,23 @@ def outcome(cases: list[dict], seconds: float) -> str:
 BARS = """
 ## Error bars and p-values
 
-Written by `python tests/coverage_tables.py`, whose lists of systems and quantities were made before
-the first run. *Held* is how many of 100 error bars of single runs hold the true value, which is
-exact or the mean over all runs: 68 are expected, 61 to 75 allowed (of n runs chance makes it
-scatter by 47 / √n). *Error / scatter* is the mean
-error over the standard deviation of the means; Student's t makes it larger than 1. *Three* is the
-same share for means over three runs with Student's t.
+The tables are written by `python tests/coverage_tables.py`.  The lists of systems and quantities
+were made before the first run, and the seeds of the tables were not used to improve the estimators.
+An error bar belongs to a single run, or to a group of runs if the name of the system states a
+number of runs; *bars* is the number of runs or groups.  *Held* is the percentage of the error bars
+that contain the true value, which is exact or the mean over all bars.  The expected percentage is
+68, and 61 to 75 are allowed; the percentage of n bars has a standard deviation of 47 / √n by
+chance.  *Error / scatter* is the mean error divided by the standard deviation of the measured
+values; Student's t makes this ratio larger than 1.  *Three* is the percentage for means over three
+bars, whose errors follow from their scatter.
 
-| system | quantity | runs | held | error / scatter | three |
+| system | quantity | bars | held | error / scatter | three |
 |---|---|---|---|---|---|
 """
 P_VALUES = """
-p-values of `speeds.py` for valid runs. Of 100 of them 5 should be below .05 and 32 below .32;
-*uniform* is the p-value of their own Kolmogorov-Smirnov test against the uniform distribution.
+The second table contains p-values of `speeds.py` for valid runs.  Of 100 p-values 5 should be below
+0.05 and 32 below 0.32.  *Uniform* is the p-value of a Kolmogorov-Smirnov test of these p-values
+against the uniform distribution.
 
 | system | species | runs | KS: < .05 | < .32 | uniform | χ²: < .05 | < .32 | uniform |
 |---|---|---|---|---|---|---|---|---|
