@@ -191,10 +191,10 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
     returned drift is -a / b, converted to a Gaussian variable with variance 1.
 
     The correlation length is the estimated statistical inefficiency plus the standard deviation of
-    this estimate: Madras and
-    Sokal, Journal of Statistical Physics 50, 109 (1988).  Without this addition,
-    a series whose inefficiency is underestimated by chance would have an error that is too small,
-    and too many degrees of freedom.
+    this estimate (Madras and Sokal, Journal of Statistical Physics 50, 109 (1988)).  Without this
+    addition, the error would be too small, and the degrees of freedom too many, for a series whose
+    inefficiency is underestimated by chance.  The error of an anticorrelated series is that of the
+    function `periodic_waves`.
     """
     parts = cells(series, FINE)
     per_sample = statistical_inefficiency(parts, least=LEAST_INEFFICIENCY)
