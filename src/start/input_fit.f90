@@ -46,6 +46,7 @@ contains
       call read_missing_values(settings%species, k, settings%box, groups(s(1) + k - 1), problems)
     end do
     call settings%choose_features()
+    call check_columns(settings, groups(place_of("output", groups%name)), problems)
     if (settings%n_disks() > most_disks) return               ! another procedure reports that there are too many disks
     before = problems%count
     call check_memory(settings, problems)
@@ -55,6 +56,30 @@ contains
     end do
     complete = .true.
   end subroutine complete_settings
+
+  !> Reports columns of frames that the disks of this run do not have. Whether disks rotate can follow from a starting file.
+  subroutine check_columns(settings, group, problems)
+    type(settings_t), intent(in) :: settings
+    type(group_t), intent(in) :: group                        !! the group `output`
+    type(problem_list_t), intent(inout) :: problems
+
+    if (.not. allocated(settings%output%frame_columns)) return
+    call need("image", any(settings%box%periodic), "a periodic axis (box.boundary)")
+    call need("angular_velocity", settings%features%rotation, "disks that rotate, for example by contact.tangential_restitution")
+    call need("orientation", settings%features%orientation, &
+      "disks that rotate, active disks, or a starting file with orientations")
+
+  contains
+
+    !> Reports a column that requires something that this run does not have.
+    subroutine need(column, there, what)
+      character(len=*), intent(in) :: column, what
+      logical, intent(in) :: there                            !! the run has what the column requires
+
+      if (.not. there .and. any(settings%output%frame_columns == column)) &
+        call group%complain("frame_columns", "'"//column//"' needs "//what, problems)
+    end subroutine need
+  end subroutine check_columns
 
   !> Checks completed settings: whether the obstacles fit into the box, and whether the disks of each species fit into their region.
   !> Species without a valid number and size of disks are skipped, because these problems have already been reported.

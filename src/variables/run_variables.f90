@@ -16,8 +16,8 @@ module run_variables
     variable_t("run", "dynamics", "text", 1, "default", "'events'", &
       "Method by which the simulation advances in time.", choices="events steps"), &
     variable_t("run", "dt", "real", 1, "optional", "0.001", &
-      "Length of a time step in time-stepped dynamics. dt must be given with run.dynamics = 'steps', and has no effect with " &
-      //"'events'. Choose dt so small that no disk moves by more than half of the smallest radius in one step.", &
+      "Length of a time step in time-stepped dynamics. dt must be given with run.dynamics = 'steps', and must not be given " &
+      //"with 'events'. Choose dt so small that no disk moves by more than half of the smallest radius in one step.", &
       positive, "time", &
       otherwise="none; needed with run.dynamics = 'steps'"), &
     variable_t("run", "search", "text", 1, "default", "'cells'", &
@@ -79,7 +79,8 @@ module run_variables
       otherwise="frames of the initial and the final state only"), &
     variable_t("output", "frames_at", "real", 0, "optional", "0.1, 1, 10", &
       "Times of single frames, in increasing order. These frames are written in addition to the frames that frames_every_... " &
-      //"and frames_per_decade define.", not_negative, "time", may_change=on_resume, otherwise="no such frames"), &
+      //"and frames_per_decade define. Times after the end of the run are allowed, because --resume with a later stop " &
+      //"reaches them.", not_negative, "time", may_change=on_resume, otherwise="no such frames"), &
     variable_t("output", "frames_per_decade", "integer", 1, "optional", "10", &
       "Number of frames per decade (power of ten) of the time. The times of the frames are equally spaced on a logarithmic " &
       //"scale and start at decades_from, which must be given. These frames are written in addition to the frames that " &
@@ -105,7 +106,8 @@ module run_variables
       otherwise="samples of the initial and the final state only"), &
     variable_t("output", "observables_at", "real", 0, "optional", "0.1, 1, 10", &
       "Times of single samples of the observables, in increasing order. These samples are taken in addition to the samples " &
-      //"that observables_every_... and observables_per_decade define.", not_negative, "time", may_change=on_resume, &
+      //"that observables_every_... and observables_per_decade define. Times after the end of the run are allowed, because " &
+      //"--resume with a later stop reaches them.", not_negative, "time", may_change=on_resume, &
       otherwise="no such samples"), &
     variable_t("output", "observables_per_decade", "integer", 1, "optional", "10", &
       "Number of samples of the observables per decade (power of ten) of the time. The times of the samples are equally " &
@@ -113,8 +115,9 @@ module run_variables
       //"the samples that observables_every_... and observables_at define.", per_decade, &
       may_change=on_resume, otherwise="no such samples"), &
     variable_t("output", "frame_columns", "text", 0, "optional", "'position', 'velocity'", &
-      "Quantities that frames contain. Positions are always written. Scripts that need a quantity that the file does not " &
-      //"contain report an error.", choices="position velocity event_count image angular_velocity orientation", &
+      "Quantities that frames contain. Positions are always written. A quantity that the disks of the run do not have is " &
+      //"refused. Scripts that need a quantity that the file does not contain report an error.", &
+      choices="position velocity event_count image angular_velocity orientation", &
       otherwise="all quantities that the run has"), &
     variable_t("output", "precision", "text", 1, "default", "'double'", &
       "Precision of positions and velocities in frames. Checkpoints are always in double precision.", &

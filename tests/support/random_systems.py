@@ -72,6 +72,7 @@ class Draw:
         self.packing = rng.choice([0.01, 0.1, 0.2, 0.3, 0.4, 0.5])
         self.least = 0.6 if self.chance(0.2) else 0  # restitution; of the viscoelastic law
         self.turns = self.chance(0.3)
+        self.rotates = False
         self.driven = self.chance(0.3)
         self.falls = self.chance(0.3) and not all(self.periodic)
         self.sheared = all(self.periodic) and not self.steps and self.chance(0.5)
@@ -379,7 +380,9 @@ class Draw:
         if self.turns or self.chance(0.5):
             words += " wall_rule = 'normal'"
         if self.turns:
-            words += self.grip() + rng.choice(["", self.grip("wall_")])
+            grip = self.grip()
+            self.rotates = " = -1" not in grip
+            words += grip + rng.choice(["", self.grip("wall_")])
             words += self.maybe(0.4, f"inertia = {rng.choice([1, 0.01, rng.uniform(0.1, 1)])}")
         if self.chance(0.6 if restitution < 1 else 0.1):
             size = math.sqrt(math.prod(self.edges) / self.disks)
@@ -442,8 +445,13 @@ class Draw:
             words += self.maybe(0.3, f"{track}_per_decade = {rng.randint(1, 9)}")
         if "per_decade" in words:
             words += f" decades_from = {self.cadence('time') / 100!r}"
-        words += self.maybe(0.2, "frame_columns = 'velocity', 'image', 'orientation'")
+        words += self.maybe(0.2, "frame_columns = 'velocity'" + self.own_columns())
         return words + " /"
+
+    def own_columns(self) -> str:
+        """Return the columns of frames that exist in some systems only, among them in this one."""
+        image = ", 'image'" if any(self.periodic) else ""
+        return image + (", 'orientation'" if self.rotates else "")
 
     def cadence(self, kind: str) -> float:
         """Draw the sampling interval of frames or observables."""
