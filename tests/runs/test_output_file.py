@@ -220,6 +220,16 @@ def test_the_summary_says_what_the_file_says(ricochet, tmp_path, turn):
     assert float(said["collisions_per_second"]) == pytest.approx(rate, rel=1e-6)
 
 
+def test_the_file_of_a_small_run_is_small(ran, tmp_path):
+    """A sweep of 10^5 small runs fits on a disk: tables of groups are not larger than the data."""
+    ran(
+        """&species count = 100 packing_fraction = 0.1 speed = 1 /
+        &stop collisions_per_disk = 10 /
+        &output frames_every_collisions = 500 observables_every_collisions = 50 /"""
+    )
+    assert (tmp_path / "gas.h5").stat().st_size < 75_000
+
+
 def test_folders_are_made_and_nothing_is_left_beside_the_result(ricochet, tmp_path):
     input_file = write_input(tmp_path)
     run = ricochet(input_file, "-o", "some/where/gas.h5")
