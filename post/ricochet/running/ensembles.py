@@ -29,10 +29,11 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+import h5py
 import numpy as np
 
 from ..reading.files import RunError, open_file, plain
-from ..reading.layout import committed, series_in
+from ..reading.layout import committed
 from .inputs import read_input
 from .program import STOPPED, ProgramError, find_program, flat, tied, value_text
 from .simulation import Simulation
@@ -511,13 +512,28 @@ def typed(value: str) -> object:
 
 
 def last_values(path: Path) -> dict[str, Any]:
-    """Return seed, wall time and the last value of each scalar observable of a run."""
+    """Return seed, wall time and the last value of each scalar observable of a run.
+
+    A sweep can have 10^5 files.  Therefore functions of HDF5 are called directly, which takes half
+    of the time that the groups and datasets of h5py take.
+    """
     with open_file(path) as file:
         row = {"seed": plain(file["parameters/run"].attrs["seed"])}
         row["wall_time"] = plain(file["provenance"].attrs.get("wall_time", np.nan))
         count = committed(file, "observables")
-        for name in series_in(file["observables"]) if count else ():
-            data = file[f"observables/{name}/value"]
-            if data.ndim == 1:
-                row[name] = plain(data[count - 1])
+        paths: list[bytes] = []
+        observables = h5py.h5g.open(file.id, b"observables")
+        if count:
+            observables.links.visit(paths.append)
+        one = h5py.h5s.create_simple((1,))
+        for name in paths:
+            if not name.endswith(b"/value"):
+                continue
+            data = h5py.h5d.open(observables, name)
+            space = data.get_space()
+            if space.get_simple_extent_ndims() == 1:
+                space.select_hyperslab((count - 1,), (1,))
+                value = np.empty(1, data.dtype)
+                data.read(one, space, value)
+                row[name.removesuffix(b"/value").decode()] = plain(value[0])
     return row
