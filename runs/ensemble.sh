@@ -257,8 +257,13 @@ remember() {
   [[ -z $changed ]] ||
     for name in "${!before[@]}"; do printf '%s\t%s\n' "${name#x}" "${before[$name]}"; done | sort |
     put "$folder/manifest.txt" || exit 3
-  for name in "${found[@]}"; do [[ ! -e $folder/$name.h5 ]] || touch -- "$folder/$name.h5"; done
-  for name in "${extended[@]}"; do [[ ! -e $folder/$name.h5 ]] || touch -d @1 -- "$folder/$name.h5"; done
+  for name in "${found[@]}"; do
+    [[ ! -e $folder/$name.h5 || -e $folder/$name.h5.part ]] || touch -- "$folder/$name.h5"
+  done
+  # The file of a member that is being extended already is left as it is, because the program identifies it by its time.
+  for name in "${extended[@]}"; do
+    [[ ! -e $folder/$name.h5 || -e $folder/$name.h5.part ]] || touch -d @1 -- "$folder/$name.h5"
+  done
   [[ -z $door ]] || exec {door}<&-
 }
 
@@ -535,7 +540,8 @@ wait_for_locks() {
 }
 
 # Submits a job array to Slurm. Each task of the array forwards the signal TERM to its member runs. If a task reaches its time limit
-# and was not cancelled, it is added to the queue again.
+# and was not cancelled, it is added to the queue again. The task names itself by the numbers of array and task, because the job
+# number of the last task (SLURM_JOB_ID) is that of the whole array.
 submit_to_slurm() {
   local id='' here text site
   command -v sbatch >/dev/null || die "--engine slurm needs Slurm (no sbatch here)"
@@ -563,8 +569,9 @@ $(printf '%q ' "${share_command[@]}")\$SLURM_ARRAY_TASK_ID/$shares & child=\$!
 [[ -z \$stopped ]] || kill -TERM \$child
 status=143
 while kill -0 \$child 2>/dev/null; do status=0; wait \$child || status=\$?; done
-if [[ \$status == 75 || -n \$stopped && \$status != 0 ]] && [[ \$(squeue --noheader --format=%T --jobs=\$SLURM_JOB_ID) == RUNNING ]]; then
-  scontrol requeue \$SLURM_JOB_ID
+own=\${SLURM_ARRAY_JOB_ID}_\$SLURM_ARRAY_TASK_ID
+if [[ \$status == 75 || -n \$stopped && \$status != 0 ]] && [[ \$(squeue --noheader --format=%T --jobs=\$own) == RUNNING ]]; then
+  scontrol requeue \$own
 fi
 exit \$status"
   id=$(sbatch --parsable --array="1-$shares%$jobs" --requeue --signal=B:TERM@60 --open-mode=append \

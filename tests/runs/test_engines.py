@@ -276,3 +276,20 @@ def test_a_member_that_is_put_back_goes_on(ensemble, cluster, tmp_path, how):
     wait_for(lambda: "stopped" in (folder / "seed_1.log").read_text())
     assert not list(folder.glob("seed_?.h5"))
     wait_for(lambda: list(folder.glob("seed_1.h5")))
+
+
+def test_a_time_limit_puts_every_task_back(ensemble, cluster, tmp_path, monkeypatch):
+    """The last task of the array, too: two tasks of one member each stay in the queue."""
+    monkeypatch.setenv("SBATCH_TIMELIMIT", "00:02:00")
+    endless = ("--set", "stop.collisions_per_disk=1e9", "--set", "output.frames_every_collisions=")
+    ensemble("--engine", "slurm", "-j", 2, "--seeds", "1-2", *endless)
+    logs = [tmp_path / f"members/seed_{k}.log" for k in (1, 2)]
+    wait_for(lambda: all(log.exists() and "stopped" in log.read_text() for log in logs))
+    waiting = "squeue", "--noheader", "--array", "--format=%K %r"
+    wait_for(lambda: len(cluster(*waiting).splitlines()) == 2)
+    job = (tmp_path / "members/slurm.job").read_text().strip()
+
+    def shown(k):
+        return cluster("scontrol", "show", "job", f"{job}_{k}")
+
+    wait_for(lambda: "Restarts=1" in shown(1) and "Restarts=1" in shown(2))

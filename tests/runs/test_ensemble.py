@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from slurm_substitute import slurm_surroundings
 from whole_runs import MIXTURE, PATIENCE
 from whole_runs import differences, environment, executable, is_asleep, occupy, ran, wait_for
 from whole_runs import within, write_input
@@ -215,39 +216,13 @@ def test_a_signal_reaches_each_member_once_and_the_command_goes_on(lab, how):
     )
 
 
-# This script replaces Slurm; it starts all tasks of an array at once, but at most two tasks.
-SLURM = {
-    "sbatch": """echo 1 >>"$LAB/jobs"
-for word; do
-  case $word in
-  --array=*) range=${word#*=1-} && range=${range%%%*} ;;
-  --output=*) output=${word#*=} ;;
-  esac
-done
-cat >"$LAB/task"
-echo "$range" >"$LAB/array"
-for ((k = 1; k <= range; k++)); do
-  SLURM_ARRAY_JOB_ID=7 SLURM_ARRAY_TASK_ID=$k SLURM_JOB_ID=7 bash "$LAB/task" >>"$output" 2>&1
-  echo "$?" >>"$LAB/codes"
-done
-echo 7
-""",
-    "scontrol": """echo "MaxArraySize            = 3"
-""",
-    "squeue": "",
-}
-
-
 @pytest.fixture
 def slurm(lab):
     """Return a function that runs a sweep on the simulated cluster and returns the messages."""
-    (lab / "bin").mkdir()
-    for name, text in SLURM.items():
-        executable(lab / "bin" / name, text, "bash")
-    path = f"{lab}/bin:{os.environ['PATH']}"
+    cluster = slurm_surroundings(lab)
 
     def run(*options):
-        return ensemble(lab, "--engine", "slurm", *options, PATH=path, LAB=lab)
+        return ensemble(lab, "--engine", "slurm", *options, **cluster)
 
     return run
 
@@ -280,6 +255,18 @@ def test_slurm_gives_up_what_failed_and_says_who_when_and_where(lab, slurm):
     assert said and all(map(line.fullmatch, said)), said
     manifest.write_text("b\t--set run.seed=1\n")
     assert slurm(*members).returncode == 75 and slurm(*members).returncode == 0
+
+
+def test_every_task_of_an_array_is_requeued_when_its_time_is_over(lab, slurm):
+    """Each one under its own number, and no task whose members are finished."""
+    manifest = lab / "members.txt"
+    manifest.write_text("a\t--set outcome.exit=75\nb\t--set outcome.exit=75\n")
+    assert slurm("--manifest", str(manifest)).returncode == 75
+    assert lines_of(lab / "requeued") == ["7_1", "7_2"]
+    (lab / "requeued").unlink()
+    manifest.write_text("c\nd\n")
+    assert slurm("--manifest", str(manifest)).returncode == 75
+    assert lines_of(lab / "requeued") == []
 
 
 def test_nothing_is_submitted_with_a_member_whose_input_is_bad(lab, slurm):

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,7 +15,8 @@ import pytest
 
 from ricochet import ProgramError, RunError, ensemble, read_run, sweep
 from ricochet.running.ensembles import typed
-from whole_runs import executable, ran
+from slurm_substitute import slurm_surroundings
+from whole_runs import environment, executable, ran
 
 ROOT = Path(__file__).resolve().parents[2]
 GAS = """&box boundary = 'wall', 'wall' /
@@ -102,6 +104,43 @@ def test_the_script_extends_finished_members_with_the_same_bits(tmp_path):
     assert run("set", "--set", "species.a.count=31").returncode == 2
     (tmp_path / "gas.nml").write_text(GAS.replace("count = 30", "count = 31"))
     assert run("input").returncode == 2
+
+
+@pytest.mark.parametrize("engine", ["pool", "parallel", "slurm"])
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_every_engine_extends_finished_members(program, tmp_path, engine, interrupted):
+    """The bits are those of one long run, also after the extension has been interrupted."""
+    if engine == "parallel" and not shutil.which("parallel"):
+        pytest.skip("GNU parallel is not installed")
+    own = slurm_surroundings(tmp_path) if engine == "slurm" else {}
+    (tmp_path / "gas.nml").write_text(GAS)
+    last = ["--set", "stop.collisions_per_disk=9"]
+
+    def command(folder, *words):
+        script = [ROOT / "runs/ensemble.sh", tmp_path / "gas.nml", "-d", tmp_path / folder]
+        return list(map(str, [*script, "--seeds", "1-3", *words]))
+
+    def once(*words):
+        return ran(*command(*words), env=environment(RICOCHET=program, **own))
+
+    def run(*words):
+        """Repeat a command that has submitted its members until it reports their results."""
+        done = once(*words)
+        return run(*words) if "submitted" in done.stderr else done
+
+    assert run("whole", *last).returncode == run("grown").returncode == 0
+    chosen = [*last, "--engine", engine]
+    if interrupted:
+        stop = ["--set", "stop.wall_clock=1e-9", "--set", "output.observables_every_events=1"]
+        assert once("grown", *chosen, *stop).returncode == 75
+        assert len([*(tmp_path / "grown").glob("seed_?.h5.part")]) == 3
+    told = run("grown", *chosen)
+    assert told.returncode == 0 and "3 of 3 members finished" in told.stderr, told.stderr
+    for name in ("seed_1", "seed_2", "seed_3"):
+        runs = [read_run(tmp_path / place / f"{name}.h5") for place in ("whole", "grown")]
+        assert np.array_equal(*(one.position[-1] for one in runs))
+        assert np.array_equal(*(one.velocity[-1] for one in runs))
+    assert "3 of them before" in run("grown", *chosen).stderr
 
 
 @pytest.mark.usefixtures("_tools")
