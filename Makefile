@@ -2,7 +2,8 @@
 #
 #   BUILD=folder      where everything built goes; other flags need another folder
 #   DEBUG=1, V=1      all checks, no optimisation, in build/debug; shows commands
-#   ARCH=x86-64-v3    code for other machines, as a cluster; default: this one
+#   ARCH=x86-64-v3    code for other machines, as a cluster; default: this one;
+#                     ARCH= for any processor of this kind
 #   FFLAGS, LDFLAGS   replaced as a whole; HINTS= without hints about memory
 #   PFUNIT_DIR=folder an installed pFUnit; default: found, or a substitute
 #
@@ -15,7 +16,9 @@ BUILD ?= build$(if $(DEBUG),/debug)
 $(if $(word 2,$(BUILD)),$(error BUILD=$(BUILD): the folder name may not contain spaces))
 
 # HDF5's own wrapper knows the compiler, the folders and the libraries.
-H5FC ?= h5fc
+ifndef H5FC
+export H5FC := $(shell src/find_h5fc.sh)
+endif
 hdf5 := $(shell $(H5FC) -show 2>/dev/null)
 ifeq ($(origin FC),default)
 FC = $(or $(firstword $(hdf5)),$(error No $(H5FC): gfortran or HDF5 for Fortran is missing; `make set-up` installs them on Debian and Ubuntu))
@@ -26,7 +29,9 @@ hdf5_libs := $(filter-out -I%,$(wordlist 2,$(words $(hdf5)),$(hdf5)))
 # Most flags are gfortran's; another compiler gets plain optimisation, and FFLAGS.
 gnu = $(eval gnu := $(findstring GNU Fortran,$(shell $(FC) --version 2>/dev/null)))$(gnu)
 ARCH ?= native
-OPT ?= $(if $(DEBUG),-O0 $(if $(gnu),-Wno-maybe-uninitialized),-O2 $(if $(gnu),-march=$(ARCH) $(hot) -fno-backtrace))
+OPT ?= $(if $(DEBUG),-O0 $(if $(gnu),-Wno-maybe-uninitialized),-O2 $(if $(gnu),$(if $(ARCH),-march=$(ARCH)) $(hot) -fno-backtrace $(quiet)))
+# These warnings of gfortran 13 and later are false alarms about array descriptors. `make lint` has them on.
+quiet := -Wno-maybe-uninitialized -Wno-uninitialized
 # For the innermost loops: inlining across modules, and a version of the kernel for each of its cases.
 hot := -flto=auto -finline-limit=1000 -fipa-cp-clone --param=ipa-cp-eval-threshold=1 \
   --param=ipa-cp-unit-growth=200 --param=inline-unit-growth=200 -fno-trapping-math -fno-tree-vectorize
@@ -87,7 +92,8 @@ $(BUILD)/ricochet: $(BUILD)/main.o $(objects)
 	$(call link,$(LDFLAGS),$^)
 
 # The program calls none of it, and nothing else is to be seen: then the compiler may inline as it does in the program.
-as_library = -shared -Wl,--version-script=src/library.map -Wl,-z,defs
+library_flags := -Wl,--version-script=src/library.map -Wl,-z,defs
+as_library = -shared $(if $(EXPORTS),$(library_flags))
 $(BUILD)/libricochet.so: hdf5_libs :=
 $(BUILD)/libricochet.so: $(filter-out $(BUILD)/main.o,$(without_hdf5)) $(filter %_c.o,$(objects))
 	$(call link,$(as_library),$(filter %.o,$^))
@@ -124,11 +130,13 @@ $(BUILD)/build_info.f90: FORCE
 $(BUILD)/deps.mk: FORCE
 	@awk -v build='$(BUILD)' -v tests='$(T)' -f src/modules.awk $(sources) $(tests) $(shared) /dev/null | sort | { $(keep); }
 
-# Whether compiler, linker and system know what the hints are made of.
-$(BUILD)/hints.mk: src/base/memory_hints.c
+# Whether compiler, linker and system know what the hints are made of, and whether the linker knows the flags of the library.
+$(BUILD)/hints.mk: src/base/memory_hints.c Makefile
 	@echo 'int main(void) { return 0; }' > $@.c; \
 	  if $(c_compiler) -DMEMORY_HINTS -include $< $@.c $(wrapped) -o $@.out 2>/dev/null; \
-	  then echo 'HINTS ?= 1'; else echo 'HINTS ?='; fi > $@; rm -f $@.c $@.out
+	  then echo 'HINTS ?= 1'; else echo 'HINTS ?='; fi > $@.new; \
+	  if $(c_compiler) -fPIC -shared $(library_flags) $@.c -o $@.out 2>/dev/null; \
+	  then echo 'EXPORTS ?= 1'; else echo 'EXPORTS ?='; fi >> $@.new; rm -f $@.c $@.out; mv $@.new $@
 
 $(BUILD)/unit_tests: $(driver) $(T)/tests.inc $(test_objects) $(shared_objects) $(objects) $(BUILD)/runner
 	$(call link,$(test_flags),$< $(filter %.o,$^) $(PFUNIT_LIBRARIES))
@@ -176,7 +184,7 @@ library:
 # build/wheels/*.whl: all of it with its libraries inside, for pip on machines without a compiler. For any processor
 # since 2013 or so, but for GLIBC as old as here: its name says which.
 wheel: export BUILD := $(BUILD)/portable
-wheel: export ARCH := x86-64-v3
+wheel: export ARCH := $(if $(filter x86_64,$(shell uname -m)),x86-64-v3)
 wheel:
 	@.ci/set-up demo wheel
 	@rm -rf '$(BUILD)/bare' && $(venv) -m pip wheel --quiet --no-deps -w '$(BUILD)/bare' .
@@ -295,6 +303,7 @@ lint-python:
 	@$(venv) -m ruff check --quiet --output-format concise post tests docs
 	@$(venv) tests/support/check_style.py
 	@$(venv) tests/support/check_docstrings.py
+	@$(venv) tests/mutants.py --check
 	@$(venv) tests/support/check_examples.py $(BUILD)/examples
 	@$(venv) -m mypy --no-error-summary --cache-dir $(BUILD)/mypy --scripts-are-modules post/ricochet $(BUILD)/examples
 lint-shell:
@@ -333,6 +342,9 @@ nearest = import difflib, sys; near = difflib.get_close_matches(sys.argv[1], sys
 	@echo "There is no target and no file $@$$(python3 -c '$(nearest)' '$@' $(targets) 2>/dev/null)" >&2; \
 	  echo '`make help` lists the targets.' >&2; exit 2
 
+# The targets that match, or do not match, the four that beginners need.
+described = awk -F ':.*  \#\# ' '/^[a-z-]+:.*  \#\# / && $$1 $1 /^(demo|lab|film|test)$$/ { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
+
 help:
-	@awk -F ':.*  ## ' '/^[a-z-]+:.*  ## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile; echo; \
+	@echo 'To begin with:'; $(call described,~) ; echo; echo 'All others:'; $(call described,!~); echo; \
 	sed -n 's/^#   /  /p' Makefile

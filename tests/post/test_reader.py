@@ -505,7 +505,13 @@ def test_a_script_works_from_any_folder_and_without_a_display(small, tmp_path):
 def test_after_set_up_python_finds_the_package_from_any_folder(tmp_path):
     """The test uses a copy of the files that set-up reads and a complete `.venv`."""
     package = "post/ricochet/__init__.py"
-    for name in (".ci/set-up", "requirements.txt", "tests/readers.txt", package):
+    for name in (
+        ".ci/set-up",
+        "src/find_h5fc.sh",
+        "requirements.txt",
+        "tests/readers.txt",
+        package,
+    ):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
     own = tmp_path / ".venv"

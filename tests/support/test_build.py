@@ -320,6 +320,45 @@ def test_scripts_that_need_a_later_bash_say_so(tmp_path, script):
     assert "bash 4.4 or newer is needed" in done.stderr
 
 
+def test_the_first_h5fc_that_compiles_is_taken(tmp_path):
+    """The h5fc of conda can name a compiler that is not installed."""
+    system = shutil.which("h5fc", path="/usr/bin")
+    if not system:
+        pytest.skip("the system has no h5fc")
+    executable(tmp_path / "h5fc", "echo x86_64-conda-linux-gnu-gfortran; exit 127", "sh")
+    finder, path = ROOT / "src/find_h5fc.sh", os.environ["PATH"]
+    found = ran(finder, env=environment(PATH=f"{tmp_path}:{path}"))
+    assert (found.returncode, found.stdout) == (0, f"{system}\n")
+    executable(tmp_path / "h5fc", f'exec {system} "$@"', "sh")
+    found = ran(finder, env=environment(PATH=f"{tmp_path}:{path}"))
+    assert (found.returncode, found.stdout) == (0, f"{tmp_path}/h5fc\n")
+
+
+def test_an_old_python_is_told_before_anything_is_installed(tmp_path):
+    """Nobody is asked for a password in vain."""
+    (tmp_path / ".ci").mkdir()
+    (tmp_path / "bin").mkdir()
+    shutil.copy(ROOT / ".ci/set-up", tmp_path / ".ci/set-up")
+    old = """case "$*" in --version) echo Python 3.10.12 ;; *) exit 1 ;; esac"""
+    executable(tmp_path / "bin/python3", old, "sh")
+    for name in ("apt-get", "sudo"):
+        executable(tmp_path / "bin" / name, f"touch '{tmp_path}/asked'", "sh")
+    path = f"{tmp_path}/bin:{os.environ['PATH']}"
+    done = ran(tmp_path / ".ci/set-up", "demo", env=environment(PATH=path))
+    assert done.returncode == 1 and "Python 3.11 or newer is needed" in done.stderr
+    assert "3.10.12" in done.stderr and not (tmp_path / "asked").exists()
+
+
+def test_a_linker_without_version_scripts_makes_the_library(tmp_path):
+    """Its flags are left out; the names of the C interface remain visible."""
+    refusing = 'case "$*" in *version-script*) exit 1 ;; esac; exec gfortran "$@"'
+    fc, build = executable(tmp_path / "fc", refusing, "bash"), tmp_path / "build"
+    make(f"FC={fc}", f"BUILD={build}", f"{build}/hints.mk")
+    assert "EXPORTS ?=\n" in (build / "hints.mk").read_text()
+    make(f"BUILD={tmp_path / 'gnu'}", f"{tmp_path / 'gnu'}/hints.mk")
+    assert "EXPORTS ?= 1\n" in (tmp_path / "gnu/hints.mk").read_text()
+
+
 @pytest.mark.check
 def test_a_release_builds_and_runs_without_git_and_names_its_commit(tmp_path):
     clone, commit = tmp_path / "clone", ran("git", "rev-parse", "HEAD", cwd=ROOT)
