@@ -177,8 +177,21 @@ put() {
   fi
 }
 
-# Prints the last line of the log file of the member run NAME.
-last_words() { ! may_be_ours "$folder/$1.log" || tail -n 1 -- "$folder/$1.log" 2>/dev/null || true; }
+# Sets `last_line` to the last line of the log of member NAME. No process is started, because there can be 100 000 members.
+read_last_line() {
+  local lines=()
+  last_line=''
+  [[ -s $folder/$1.log ]] && may_be_ours "$folder/$1.log" || return 0
+  { mapfile -t lines <"$folder/$1.log"; } 2>/dev/null || return 0
+  ((${#lines[@]} == 0)) || last_line=${lines[-1]}
+}
+
+# Prints the last line of the log of member NAME.
+last_words() {
+  local last_line
+  read_last_line "$1"
+  printf '%s\n' "$last_line"
+}
 
 is_finished=': is a finished run, ' # the answer to --resume if a stop rule is met already
 goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line in the log of a member that has not failed
@@ -198,7 +211,12 @@ may_continue() {
   said=$("$program" "${arguments[@]}" 2>&1 </dev/null) || [[ $said == *"$is_finished"* ]]
 }
 
-has_failed() { [[ ! -e $folder/$1.h5 && ! $(last_words "$1") =~ $goes_on ]]; }
+has_failed() {
+  local last_line
+  [[ ! -e $folder/$1.h5 ]] || return
+  read_last_line "$1"
+  [[ ! $last_line =~ $goes_on ]]
+}
 
 # Appends an empty line to the log file of the member run NAME. Otherwise the last line of the log file could be attributed to the
 # next attempt.
@@ -488,10 +506,11 @@ prepare_shares() {
 
 # Determines which member runs have failed from their output and log files.
 judge_by_files() {
-  local name said=''
+  local name last_line
   for name in "${names[@]}"; do
-    is_done "$name" || said=$(last_words "$name")
-    is_done "$name" || [[ $said =~ $goes_on && $said != killed* ]] || failure "$name" '' "$said"
+    ! is_done "$name" || continue
+    read_last_line "$name"
+    [[ $last_line =~ $goes_on && $last_line != killed* ]] || failure "$name" '' "$last_line"
   done
 }
 
