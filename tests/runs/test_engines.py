@@ -281,7 +281,7 @@ def test_a_member_that_is_put_back_goes_on(ensemble, cluster, tmp_path, how):
 def test_a_time_limit_puts_every_task_back(ensemble, cluster, tmp_path, monkeypatch):
     """The last task of the array, too: two tasks of one member each stay in the queue."""
     monkeypatch.setenv("SBATCH_TIMELIMIT", "00:02:00")
-    endless = ("--set", "stop.collisions_per_disk=1e9", "--set", "output.frames_every_collisions=")
+    endless = (*LONG, "--set", "stop.collisions_per_disk=", "--set", "stop.time=1e9")
     ensemble("--engine", "slurm", "-j", 2, "--seeds", "1-2", *endless)
     logs = [tmp_path / f"members/seed_{k}.log" for k in (1, 2)]
     wait_for(lambda: all(log.exists() and "stopped" in log.read_text() for log in logs))
