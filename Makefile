@@ -2,8 +2,7 @@
 #
 #   BUILD=folder      where everything built goes; other flags need another folder
 #   DEBUG=1, V=1      all checks, no optimisation, in build/debug; shows commands
-#   ARCH=x86-64-v3    code for other machines, as a cluster; default: this one;
-#                     ARCH= for any processor of this kind
+#   ARCH=x86-64-v3    code for other machines, as a cluster; default: this one
 #   FFLAGS, LDFLAGS   replaced as a whole; HINTS= without hints about memory
 #   PFUNIT_DIR=folder an installed pFUnit; default: found, or a substitute
 #
@@ -285,7 +284,7 @@ sanitize:  ## searches faults of memory, and races, with sanitizers (long)
 	@$(MAKE) $(jobs) DEBUG=1 OPT='-O1 -fsanitize=thread' BUILD=$(raced) tests=tests/unit/test_parallel_events.pf $(raced)/unit_tests $(raced)/ricochet
 	@tests/support/find_races.sh $(raced)
 
-lint:  ## warnings, style, and the rules of the design
+lint:  ## style and rules of the design; coverage: lines that tests reach
 	@.ci/set-up lint
 	@$(MAKE) $(jobs) --keep-going --output-sync $(lints)
 
@@ -309,7 +308,7 @@ lint-python:
 lint-shell:
 	@shellcheck --format gcc $(wildcard .ci/* src/*.sh runs/*.sh tests/*.sh tests/support/*.sh docs/*.bash)
 
-coverage:  ## which lines of src/ the tests reach
+coverage:
 	@.ci/set-up demo test coverage
 	@$(MAKE) $(jobs) BUILD=$(BUILD)/coverage OPT='-O0 --coverage -Wno-maybe-uninitialized' unit-tests all
 	@RICOCHET="$$(realpath '$(BUILD)')/coverage/ricochet" $(venv) -m pytest -q tests
@@ -346,5 +345,5 @@ nearest = import difflib, sys; near = difflib.get_close_matches(sys.argv[1], sys
 described = awk -F ':.*  \#\# ' '/^[a-z-]+:.*  \#\# / && $$1 $1 /^(demo|lab|film|test)$$/ { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
 
 help:
-	@echo 'To begin with:'; $(call described,~) ; echo; echo 'All others:'; $(call described,!~); echo; \
+	@$(call described,~); echo; $(call described,!~); echo; \
 	sed -n 's/^#   /  /p' Makefile
