@@ -284,7 +284,7 @@ sanitize:  ## searches faults of memory, and races, with sanitizers (long)
 	@$(MAKE) $(jobs) DEBUG=1 OPT='-O1 -fsanitize=thread' BUILD=$(raced) tests=tests/unit/test_parallel_events.pf $(raced)/unit_tests $(raced)/ricochet
 	@tests/support/find_races.sh $(raced)
 
-lint:  ## style and rules of the design; coverage: lines that tests reach
+lint:  ## style, rules of the design; coverage: lines that tests reach
 	@.ci/set-up lint
 	@$(MAKE) $(jobs) --keep-going --output-sync $(lints)
 
