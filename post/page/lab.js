@@ -343,7 +343,7 @@ function tellShelf() {
 function arrangeAll() {
   const boxes = shownBoxes(), many = boxes.length > 1, { clientWidth, clientHeight } = $('runs');
   const upright = clientWidth < 560, count = many ? boxes.length : 1, width = Math.floor(clientWidth / count);
-  const shapes = films().map(one => one.inside().film?.edges).filter(Boolean).map(([x, y]) => y / x), highest = clientHeight * (upright ? 0.36 : 0.46) - 26;
+  const shapes = films().map(one => one.inside().film?.edges).filter(Boolean).map(([x, y]) => y / x), highest = clientHeight * (upright ? 0.36 : 0.42) - 26;
   const size = many ? { width: width - 12, height: Math.floor(Math.min(highest, (width - 12) * Math.max(0.5, ...shapes))) } : null;
   $('runs').classList.toggle('many', many);
   $('runs').style.gridTemplateColumns = `repeat(${count}, minmax(0, 1fr))`;
@@ -364,8 +364,12 @@ function overlayAll() {
   const box = current();
   if (!box || !isThere(box)) return;
   const others = shownBoxes().filter(one => one !== box && isThere(one) && one.run);
-  filmOf(box).overlay(others.map(one => ({ letter: one.letter, curves: filmOf(one).inside().stream.curves, kinds: filmOf(one).inside().kinds })));
+  filmOf(box).overlay(others.map(({ letter, frame }) => {
+    const { stream, kinds, numbersNow, speedsOfFilm } = frame.contentWindow.inside();
+    return { letter, kinds, curves: stream.curves, numbers: numbersNow, speeds: speedsOfFilm };
+  }));
 }
+function letterOf(source) { return state.boxes.find(box => filmOf(box) === source)?.letter; }
 setInterval(() => { if (shownBoxes().length > 1) overlayAll(); }, 1000);
 
 // Applies an action of the user on one film to all other films.

@@ -178,11 +178,12 @@ function speedsNow() {
 function drawHistogram() {
   if (!counted.length) return;
   const { edges, rest } = film.speeds, { counts, samples } = speedsNow(), plot = prepare($('histogram')), { pen } = plot;
+  const others = overlaid.map(one => ({ letter: one.letter, ...one.speeds() })).filter(one => one.rest === rest);
   if (rest) {
-    drawSpeedsAndRest(plot, counts);
+    drawSpeedsAndRest(plot, counts, others);
     return;
   }
-  const top = edges.at(-1), width = edges[1], energy = s => film.settles ? film.curves?.mean?.[s] ?? moment.kinetic[s] : moment.kinetic[s];
+  const top = Math.max(edges.at(-1), ...others.map(one => one.edges.at(-1))), width = edges[1], energy = s => film.settles ? film.curves?.mean?.[s] ?? moment.kinetic[s] : moment.kinetic[s];
   const peak = Math.max(...counted.map(s => Math.sqrt(kinds[s].mass / (energy(s) || Infinity)) * Math.exp(-0.5)));
   const { x, y } = axes(plot, [0, top], [0, peak > 0 ? 1.6 * peak : 4 / top], 'speed');
   pen.save();
@@ -210,11 +211,35 @@ function drawHistogram() {
     }
     pen.stroke();
   }
+  const density = (n, bin, one, s) => y(n / (one.kinds[s].count * one.samples * (one.edges[bin + 1] - one.edges[bin])));
+  others.forEach(one => drawOutline(pen, one, x, density, 0));
   pen.restore();
 }
 
-// If many disks are at rest, both axes are logarithmic, and the Maxwell distribution is not drawn.
-function drawSpeedsAndRest(plot, counts) {
+// What another film needs to draw the histogram of this film.
+const speedsOfFilm = () => ({ kinds, ...film.speeds, ...speedsNow() });
+
+// Draws the histogram of a compared run as a line above the bars, with the letter of the run at the
+// highest bar.
+function drawOutline(pen, one, x, height, from) {
+  one.kinds.forEach((kind, s) => {
+    let best = [0, Infinity];
+    Object.assign(pen, { lineWidth: 1.2, strokeStyle: css(speciesColour(kinds[s % kinds.length])), fillStyle: ink.ink });
+    pen.setLineDash([]);
+    pen.beginPath();
+    one.counts[s].slice(from, from + one.edges.length - 1).forEach((n, bin) => {
+      const top = height(n, bin, one, s);
+      pen.lineTo(x(one.edges[bin]), top);
+      pen.lineTo(x(one.edges[bin + 1]), top);
+      if (top < best[1]) best = [x(one.edges[bin]), top];
+    });
+    pen.stroke();
+    pen.fillText(one.letter, best[0], Math.max(best[1] - 13, 4));
+  });
+}
+
+// If many disks are at rest, both axes are logarithmic and no Maxwell curve is drawn.
+function drawSpeedsAndRest(plot, counts, others) {
   const edges = film.speeds.edges.map(Math.log10), most = Math.log10(1.5 * Math.max(10, ...kinds.map(kind => kind.count)));
   const { pen } = plot, power = value => short(+(10 ** value).toPrecision(1));
   const { x, y } = axes(plot, [edges[0], edges.at(-1)], [-0.3, most], 'speed', value => Number.isInteger(value) ? power(value) : '');
@@ -224,6 +249,7 @@ function drawSpeedsAndRest(plot, counts) {
     counts[s].slice(1, edges.length).forEach((n, bin) => n && pen.fillRect(x(edges[bin]), y(Math.log10(n)), x(edges[bin + 1]) - x(edges[bin]) - 0.5, plot.bottom - y(Math.log10(n))));
   }
   pen.globalAlpha = 1;
+  others.forEach(one => drawOutline(pen, one, speed => x(Math.log10(speed)), n => y(n ? Math.log10(n) : -0.3), 1));
   $('bars').textContent = `At rest: ${counted.map(s => `${counts[s][0]} of ${kinds[s].count} ${kinds[s].name}`).join(', ')}. `
     + 'Bars: the number of disks at each speed; both axes grow by factors of ten.';
 }
@@ -232,7 +258,7 @@ function drawSpeedsAndRest(plot, counts) {
 
 const ENERGIES = { kinetic: [], potential: [5, 3], rotational: [1.5, 2.5] }, DASHES = [[], [7, 2], [2, 2], [7, 2, 2, 2]];
 let cursorAt;      // the map from times to pixels
-let overlaid = [];  // kept runs in the same plots: { letter, curves, kinds }
+let overlaid = [];  // compared runs in the same plots: letter, curves, kinds, and functions for speeds and numbers at the moment shown
 
 const share = s => state.total ? kinds[s].count : 1;
 const there = () => Object.keys(ENERGIES).filter(kind => source.curves()[kind]);
@@ -285,13 +311,44 @@ function withError({ value, error }) {  // rounded to two digits of the error
   return value === null ? '' : !error ? short(value) : [value, error].map(Math.abs(last) > 7 ? short : rounded).join(' ± ');
 }
 
+// Returns the temperature and the mean speed of each species of the disks shown.
+function speedsAndTemperature() {
+  let mass = 0, px = 0, py = 0, energy = 0;
+  const speeds = kinds.map(() => 0);
+  for (let i = 0; i < disks; i++) {
+    mass += masses[i];
+    px += masses[i] * VX[i];
+    py += masses[i] * VY[i];
+    energy += 0.5 * masses[i] * (VX[i] * VX[i] + VY[i] * VY[i]);
+    speeds[speciesOf[i]] += Math.sqrt(VX[i] * VX[i] + VY[i] * VY[i]);
+  }
+  const thermal = energy - 0.5 * (px * px + py * py) / mass;  // relative to the mean motion
+  return [Math.max(0, thermal) / disks, ...speeds.map((sum, s) => sum / kinds[s].count)];
+}
+
+// Returns name, present value, mean with error, and theoretical value of each quantity at the moment shown.
+function numbersNow() {
+  const means = source.means?.() ?? [];
+  if (!means.length || disks < FEWEST) return [];
+  const now = [...speedsAndTemperature(), lastOf('pressure')];
+  return means.map((one, k) => ({ ...one, now: now[k] ?? null }));
+}
+
+// One run: its present values, means and theory. Several runs: one value and theory of each.
 function tellNumbers() {
-  const { temperature, mean_speed: speed, mean_pressure: pressure } = source.numbers?.() ?? {};
-  $('measured').hidden = !temperature || disks < FEWEST;
-  if ($('measured').hidden) return;
-  const row = ([name, one]) => `<tr><td>${name}</td><td>${withError(one)}</td><td>${one.theory === null ? '' : short(one.theory)}</td></tr>`;
-  $('numbers').innerHTML = '<tr><th></th><th>measured</th><th>theory</th></tr>'
-    + Object.entries({ temperature, 'mean speed': speed, pressure }).filter(([, one]) => one && one.value !== null).map(row).join('');
+  const own = numbersNow(), seen = value => value === null ? '' : short(value), some = (rows, what) => rows.some(one => one[what] !== null);
+  $('measured').hidden = !own.length;
+  if (!own.length) return;
+  const runs = overlaid.map(({ letter, numbers }) => [letter, numbers()]), texts = { now: one => seen(one.now), mean: withError, theory: one => seen(one.theory) };
+  runs.push([parent.letterOf?.(window), own]);
+  const columns = runs.length === 1
+    ? Object.entries(texts).filter(([name]) => some(own, name === 'mean' ? 'value' : name)).map(([name, text]) => [name, own, text])
+    : runs.flatMap(([letter, rows]) => [[letter, rows, one => one.value === null ? seen(one.now) : withError(one)],
+      ...(some(rows, 'theory') ? [['theory', rows, texts.theory]] : [])]);
+  const cells = (row, tag) => `<tr>${row.map(one => `<${tag}>${one}</${tag}>`).join('')}</tr>`;
+  $('numbers').innerHTML = cells(['', ...columns.map(([name]) => name)], 'th') + own.map(({ name }) => [safe(name),
+    ...columns.map(([, rows, text]) => text(rows.find(one => one.name === name) ?? { now: null, value: null, theory: null }))])
+    .filter(row => row.slice(1).some(Boolean)).map(row => cells(row, 'td')).join('');
 }
 
 // ---------- list of the next events in a simulation of few disks ----------

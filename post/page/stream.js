@@ -3,7 +3,7 @@
 // The page draws the newest frame of the simulation. It keeps earlier frames up to a limit of memory, because the user can go back
 // in time. After the user has gone back, the film first plays the stored frames; then the worker process continues the simulation.
 const PAST_ROOM = 6e7, HEAD = 6, MOST_CURVE = 3000;  // memory for frames [bytes]; numbers before the positions of a message; samples of a plot
-const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, numbers: {}, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
+const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
 
 function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSON.stringify(wish)); }
 
@@ -51,9 +51,12 @@ const hear = {
   },
   numbers(news) {
     const { curves } = stream, { time } = news;
-    stream.numbers = news;
-    if (time <= curves.time.at(-1)) return;
+    if (time <= curves.time.at(-1)) {  // a change at this time
+      curves.news[curves.news.length - 1] = news;
+      return;
+    }
     curves.time.push(time);
+    curves.news.push(news);
     for (const name of Object.keys(ENERGIES)) curves[name]?.forEach((values, s) => values.push(news[name]?.[s] ?? null));
     curves.pressure.push(news.pressure);
     if (curves.time.length > MOST_CURVE) {
@@ -61,7 +64,7 @@ const hear = {
       for (const name of Object.keys(curves)) curves[name] = thin(curves[name]);
     }
     film.settles = news.settles;
-    fitScales(news.mean_speed.value);
+    fitScales(news.speed);
   },
   events(news) {
     const own = ([time, i, j]) => [time, i - 1, j - 1];
@@ -81,8 +84,8 @@ function open({ facts, blocks, run }) {
   setScene(facts, blocks);
   angles = facts.turning ? new Float32Array(disks) : null;
   const each = there => there ? kinds.map(() => []) : null;
-  const curves = { time: [], kinetic: each(true), potential: each(facts.gravity.some(Boolean)), rotational: each(facts.turning), pressure: [] };
-  Object.assign(stream, { live: true, ended: false, curves, run, events: { next: [], happened: null }, numbers: {} });
+  const curves = { time: [], kinetic: each(true), potential: each(facts.gravity.some(Boolean)), rotational: each(facts.turning), pressure: [], news: [] };
+  Object.assign(stream, { live: true, ended: false, curves, run, events: { next: [], happened: null } });
   source = fromWorker;
 }
 
@@ -135,7 +138,7 @@ const fromWorker = {
   grows: true,
   counted: () => moment.time === last() ? 'now' : 'gone back',
   curves: () => stream.curves,
-  numbers: () => stream.numbers,
+  means: () => stream.curves.news[Math.max(0, upTo(stream.curves.time, moment.time) - 1)]?.means,
   coming: () => stream.live ? stream.events : { next: [], happened: null },
   hasEvents: () => !film.stepped,
   goesOn: () => isStarting() || !stream.ended || !stream.live,
@@ -175,8 +178,8 @@ const fromWorker = {
 
 // ---------- film as a part of the laboratory ----------
 
-// The page of the laboratory calls these functions for each of its films.
-function inside() { return { film, source, state, moment, kinds, stream, overlaid }; }
+// These functions are called by the laboratory for each of its films.
+function inside() { return { film, source, state, moment, kinds, stream, overlaid, numbersNow, speedsOfFilm }; }
 
 function overlay(list) {
   overlaid = list;

@@ -67,9 +67,11 @@ if TYPE_CHECKING:  # imports for type checkers of the modules that `__getattr__`
     from .figures import film as film
     from .pages import lab as lab
     from .pages import live as live
+    from .pages import numbers as numbers
     from .pages import worker as worker
     from .predictions import hard_disks as hard_disks
     from .predictions import theory as theory
+    from .predictions import walls as walls
     from .reading import arrays as arrays
     from .reading import box as box
     from .reading import bridges as bridges

@@ -19,7 +19,15 @@ import numpy as np
 import pytest
 
 from ricochet import Simulation, lab as module
-from ricochet.pages.worker import FRAMES_AHEAD, pressure_between, sampled
+from ricochet.pages.numbers import (
+    means,
+    observed,
+    pressure_between,
+    sample_of,
+    sampled,
+    snapshot_run,
+)
+from ricochet.pages.worker import FRAMES_AHEAD
 from synthetic_run import ROOT, run_script
 from whole_runs import PATIENCE, wait_for
 
@@ -293,6 +301,58 @@ def test_the_pressure_beside_a_moving_side_is_that_of_the_area_of_each_moment():
     parts = [np.array(samples[k : k + 101]).T for k in (0, 100, 200)]
     means = [pressure_between(part, count).mean for part in parts]
     assert pressure_between(np.array(samples).T, count).mean == pytest.approx(np.mean(means))
+
+
+THEORIES = {  # systems in equilibrium, and the number of their theoretical values
+    "a gas between walls": ("&species count = 200 radius = 0.01 speed = 1 /", 4),
+    "a mixture between walls": (
+        "&species name = 'a' count = 100 radius = 0.006 speed = 1 /\n"
+        "&species name = 'b' count = 100 radius = 0.012 mass = 4 speed = 1 /",
+        5,
+    ),
+    "one pair of walls": (
+        "&box boundary = 'wall', 'periodic' /\n&species count = 200 radius = 0.015 speed = 1 /",
+        4,
+    ),
+    "a flow in a periodic box": (
+        "&box boundary = 2*'periodic' /\n"
+        "&species name = 'a' count = 150 radius = 0.01 velocity = 3, 0 /\n"
+        "&species name = 'b' count = 50 radius = 0.01 velocity = -1, 1 /",
+        5,
+    ),
+    "thermal walls": (
+        "&side name = 'left' temperature = 2 /\n&species count = 200 radius = 0.01 speed = 1 /",
+        4,
+    ),
+    "perfectly rough disks": (
+        "&contact tangential_restitution = 1 /\n&species count = 200 radius = 0.01 speed = 1 /",
+        4,
+    ),
+    "gravity": ("&box gravity = 0, -1 /\n&species count = 200 radius = 0.01 speed = 1 /", 1),
+    "grains": ("&contact restitution = 0.9 /\n&species count = 200 radius = 0.01 speed = 1 /", 0),
+}
+
+
+@pytest.mark.parametrize("case", THEORIES)
+def test_theory_is_what_is_measured_in_equilibrium(case):
+    """Theoretical values are absent where no theory applies."""
+    text, known = THEORIES[case]
+    samples = []
+    with Simulation(text) as simulation:
+        run = snapshot_run(simulation)
+        simulation.advance(collisions=30 * simulation.n_disks)
+        for _ in range(400):
+            simulation.advance_by(collisions=simulation.n_disks)
+            value = observed(simulation)
+            samples.append(sample_of(run, value))
+        energy = value["all/kinetic_energy"] + value.get("all/rotational_energy", 0)
+        found = means(run, samples, energy * simulation.n_disks)
+    assert sum(one["theory"] is not None for one in found) == known
+    assert all((one["value"] is None) == (case == "grains") for one in found[:-1])
+    for one in found[:-1]:
+        if one["theory"] is not None:
+            allowed = 5 * one["error"] + 0.005 * one["value"]
+            assert one["theory"] == pytest.approx(one["value"], abs=allowed), one
 
 
 def test_no_file_is_read_by_another_door(address):

@@ -258,6 +258,55 @@ def test_kept_runs_stand_beside_the_next_in_equal_boxes_and_plots(opened):
     assert opened.run("return state.boxes.map(box => box.letter)") == ["B"]
 
 
+def test_the_table_shows_the_moment_that_is_shown(opened):
+    """The values are those of the disks shown; kT never exceeds the kinetic energy of a disk."""
+    before = opened.run("return current().run")
+    opened.run("choose('mixture')")
+    moving(opened, before)
+    opened.run("set('contact.restitution', '0.9')")
+    wait_for(lambda: inside(opened, "moment.collisions") > 3)
+    opened.press("p")
+    wait_for(lambda: not inside(opened, "state.playing"))
+    titles = ["temperature", "mean speed of light", "mean speed of heavy"]
+    for key in ("\ue011", "\ue014", "\ue014", "\ue010", "\ue012"):  # Home, right, right, End, left
+        opened.press(key)
+        rows = inside(opened, "numbersNow()")
+        assert [row["name"] for row in rows][:3] == titles
+        table = opened.run("""return [...filmOf(current()).document.getElementById('numbers').rows]
+            .map(row => [...row.cells].map(cell => cell.textContent))""")
+        assert table[0][:2] == ["", "now"] and [row[0] for row in table[1:4]] == titles
+        kinetic = sum(inside(opened, "moment.kinetic")) / 2
+        assert 0.97 * kinetic < rows[0]["now"] <= kinetic
+        assert float(table[1][1]) == pytest.approx(rows[0]["now"], rel=1e-3)
+        if key == "\ue011":
+            assert [float(row[1]) for row in table[2:4]] == [1, 1]
+
+
+def test_compared_runs_have_numbers_and_histograms_side_by_side(opened):
+    opened.press("k")
+    moving(opened, 1)
+    opened.run("set('species.gas.speed', '2')")
+    wait_for(lambda: "speed" in opened.run("return current().words"))
+    moving(opened, 2)
+    table = """const { rows } = filmOf(current()).document.getElementById('numbers');
+        const texts = [...rows].map(row => [...row.cells].map(cell => cell.textContent));
+        return Object.fromEntries(texts.map(([name, ...rest]) => [name, rest]));"""
+
+    def is_complete(found):
+        heads = found.get("", []) == ["A", "theory", "B", "theory"]
+        return heads and float(found["temperature"][3]) > 1
+
+    wait_for(lambda: is_complete(opened.run(table)))
+    found = opened.run(table)
+    for name, power in (("temperature", 4), ("mean speed", 2), ("pressure of an ideal gas", 4)):
+        slow, fast = (float(found[name][k]) for k in (1, 3))
+        assert fast == pytest.approx(power * slow, rel=1e-3), name
+    assert float(found["temperature"][1]) == pytest.approx(0.5 * (1 - 1 / 1000))
+    seen = "overlaid.map(one => [one.letter, one.speeds().counts[0].reduce((a, b) => a + b)])"
+    own = inside(opened, seen)
+    assert own == [["A", 1000]]
+
+
 def test_another_input_removes_the_kept_runs_and_the_same_input_keeps_them(opened):
     """Plots never contain curves of different inputs."""
     opened.press("k")

@@ -30,20 +30,24 @@ import tempfile
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from ..analysis.statistics import SeriesMean, equilibration, correlated_mean
-from ..predictions import hard_disks
-from ..reading.nature import Nature
-from ..reading.box import obstacles_of, walls_of
-from ..reading.frames import Series
+from ..analysis.statistics import correlated_mean
 from ..reading.reader import Run
 from ..running.program import ProgramError
 from ..running.simulation import NEVER, Simulation
+from .numbers import (
+    FEW_DISKS,
+    TURNS,
+    means,
+    observed,
+    pressure_between,
+    sample_of,
+    sampled,
+    snapshot_run,
+)
 
 DISKS = 20000  # largest number of disks
 MEMORY = 2 << 30  # largest memory of a process [bytes]
@@ -51,16 +55,12 @@ INTERVAL = 1 / 60  # interval of frames [s]
 SLICE = 0.012  # longest time of a call of the engine between requests [s]
 FRAMES_AHEAD = 2  # largest number of frames that the page has not yet drawn
 NUMBERS_INTERVAL = 0.1  # interval of messages with numbers [s]
-FEW_DISKS = 20  # largest number of disks whose next events are sent
 EVENTS_SENT = 6  # number of next events that are shown
-PISTON_MARGIN = 0.2  # region beyond a piston that is shown [largest edge of the box]
-FEWEST = 40  # smallest number of samples of a mean with an error
 MOST_SAMPLES = 4000  # largest number of samples that are kept
 SCAN_SAMPLES = 160  # samples of a value in a scan
 SCAN_EVENTS = 1000  # smallest number of events in four intervals of samples
 SCAN_SECONDS = 4.0  # s that a value in a scan may take
 COUNTED = ("collisions", "dissipated_energy")  # observables that are counts since the start
-TURNS = "angular_velocity"
 ENDINGS = {"input": ".nml", "script": ".py", "output": ".h5.part"}
 UNREAD = bytearray()  # incomplete line at the end of the data received
 PR_SET_PDEATHSIG = 1  # option PR_SET_PDEATHSIG of prctl
@@ -105,7 +105,6 @@ class Session:
     def send_scene(self, changed: bool) -> None:
         """Send the constant part of the picture after a start or a change of the simulation."""
         run = self.run = snapshot_run(self.simulation)
-        self.settles = run.nature.in_equilibrium
         self.samples.clear()
         facts, blocks = self.describe_scene(run)
         letters = {name: base64.b64encode(block).decode() for name, block in blocks.items()}
@@ -292,141 +291,19 @@ class Session:
             energies["potential"] = None
         if TURNS not in run.disk_data:
             energies["rotational"] = None
-        own = value["all/temperature"], value["all/mean_speed"]
-        sample = (*sampled(run.n_disks, value), *own)
         if not self.samples or now > self.samples[-1][0]:
-            self.samples.append(sample)
-        hit = value["collisions"] > 0
-        pressure = value["virial_pressure"] if hit else None
-        send_json(
-            {"is": "numbers", "time": now, "pressure": pressure, "settles": self.settles}
-            | energies
-            | means(run, np.array(self.samples).T, value, self.settles)
-        )
-
-
-# --- numbers ---
-
-
-@dataclass(frozen=True)
-class SnapshotRun(Run):
-    """A run that consists of the present state of a simulation: one frame and its observables."""
-
-    simulation: Simulation
-
-    def observable(self, name: str) -> Series:
-        value = np.asarray(self.simulation.observable(name))
-        return Series(np.array([self.simulation.time]), value[None])
-
-    piston_positions = property(Run.piston_positions.func)  # not cached, because pistons move
-
-    @cached_property
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Corners of the box, with a margin outside each piston."""
-        way = np.zeros(4)
-        way[[*self.piston_positions]] = PISTON_MARGIN * self.edges.max()
-        lower, upper = Run.bounds.func(self)
-        return lower - way[::2], upper + way[1::2]
-
-    @cached_property
-    def nature(self) -> Nature:
-        return self.simulation.nature
-
-
-def snapshot_run(simulation: Simulation) -> SnapshotRun:
-    """Return a run with one frame that contains the present state of a simulation."""
-    parameters = simulation.parameters
-    box, kinds = parameters["box"], parameters["species"]
-    lower, upper = (np.asarray(box[name], dtype=float) for name in ("lower", "upper"))
-    elements = {}
-    if "all/rotational_energy" in simulation.observables:
-        elements[TURNS] = simulation.angular_velocity[None]
-    return SnapshotRun(
-        simulation=simulation,
-        path=Path(parameters.get("run", {}).get("title") or "simulation"),
-        time=np.array([simulation.time]),
-        position=simulation.position[None],
-        velocity=simulation.velocity[None],
-        image=None,
-        event_count=None,
-        disk_data=elements,
-        mass=simulation.mass,
-        radius=simulation.radius,
-        species=simulation.species,
-        names=tuple(kinds),
-        lower=lower,
-        edges=upper - lower,
-        periodic=np.array([kind == "periodic" for kind in box["boundary"]]),
-        obstacles=obstacles_of(parameters),
-        walls=walls_of(parameters),
-        parameters=parameters,
-        provenance={},
-    )
-
-
-def observed(simulation: Simulation) -> dict[str, float]:
-    """Return the time and the observables; of a vector, only the first component."""
-    seen = simulation._observed().items()
-    return {name: part[0].item() for name, part in seen} | {"time": simulation.time}
-
-
-def sampled(count: int, value: dict) -> tuple[float, ...]:
-    """Return the present time, kinetic energy per disk, virial and accessible area.
-
-    The mean pressure between two times is calculated from these four quantities.
-    """
-    time, kinetic, virial = (value[name] for name in ("time", "all/kinetic_energy", "virial"))
-    whole = count * kinetic + (virial / (2 * time) if time else 0.0)
-    return time, kinetic, virial, whole / (value["virial_pressure"] or 1.0)
-
-
-def pressure_between(samples: np.ndarray, count: int) -> SeriesMean:
-    """Return the mean pressure between the first and last sample, also if sides move."""
-    (kinetic, virial, area), apart = samples[1:4], np.diff(samples[0])
-    gain = count * kinetic[1:] * apart + np.diff(virial) / 2
-    return correlated_mean(gain / area[1:], apart)
-
-
-def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
-    """Return temperature, mean speed and pressure with errors and theoretical values.
-
-    If the run relaxes to equilibrium, the values are means over all samples in equilibrium.  The
-    errors of these means account for the autocorrelation of the samples.  For all other runs,
-    temperature and mean speed are present values without errors, and no pressure is returned.
-    """
-    time, kt, speed = samples[[0, 4, 5]]
-    found = {
-        "temperature": (value["all/temperature"], None),
-        "mean_speed": (value["all/mean_speed"], None),
-        "mean_pressure": (None, None),
-    }
-    if settles and len(time) >= FEWEST:
-        first = max(equilibration(kt), equilibration(speed))
-        if len(time) - first > FEWEST // 2:
-            late = samples[:, first:]
-            for name, one in (
-                ("temperature", correlated_mean(kt[first:])),
-                ("mean_speed", correlated_mean(speed[first:])),
-                ("mean_pressure", pressure_between(late, run.n_disks)),
-            ):
-                known = one.mean, one.error
-                found[name] = tuple(float(x) if np.isfinite(x) else None for x in known)
-    theory = dict.fromkeys(found)
-    if settles and len(run.by_species) == 1 and run.by_species[0].alike:
-        now, mass = found["temperature"][0], run.mass[0]
-        theory["mean_speed"] = float(np.sqrt(np.pi * now / (2 * mass)))
-        if (
-            run.periodic.all()
-            and not run.nature & {"obstacles", "time_stepped"}
-            and run.n_disks > FEW_DISKS
-        ):
-            area = float(np.prod(run.edges))
-            eta = float(np.pi * np.sum(run.radius**2)) / area
-            theory["mean_pressure"] = float(hard_disks.henderson(eta)) * run.n_disks * now / area
-    return {
-        name: {"value": mean, "error": error, "theory": theory[name]}
-        for name, (mean, error) in found.items()
-    }
+            self.samples.append(sample_of(run, value))
+        energy = run.n_disks * value["all/kinetic_energy"]
+        if "rough" in run.nature:
+            energy += run.n_disks * value["all/rotational_energy"]
+        facts = {
+            "time": now,
+            "settles": run.nature.in_equilibrium,
+            "speed": value["all/mean_speed"],
+            "pressure": value["virial_pressure"] if value["collisions"] > 0 else None,
+            "means": means(run, self.samples, energy),
+        }
+        send_json({"is": "numbers"} | facts | energies)
 
 
 # --- messages ---

@@ -1,0 +1,201 @@
+"""Numbers that the laboratory shows: the state of a simulation, means with errors, theory."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import scipy
+
+from ..analysis.statistics import SeriesMean, correlated_mean, equilibration
+from ..predictions.walls import virial_pressure
+from ..reading.nature import Nature, known, rows_of
+from ..reading.reader import Run, Series, obstacles_of, walls_of
+from ..running.simulation import Simulation
+
+FEW_DISKS = 20  # largest number of disks whose next events are sent
+PISTON_MARGIN = 0.2  # region beyond a piston that is shown [largest edge of the box]
+FEWEST = 40  # smallest number of samples of a mean with an error
+TURNS = "angular_velocity"
+KEPT = 4  # quantities at the start of a sample from which pressures follow
+
+
+@dataclass(frozen=True)
+class SnapshotRun(Run):
+    """The present state of a simulation as a run with one frame and the present observables."""
+
+    simulation: Simulation
+
+    def observable(self, name: str) -> Series:
+        value = np.asarray(self.simulation.observable(name))
+        return Series(np.array([self.simulation.time]), value[None])
+
+    piston_positions = property(Run.piston_positions.func)  # not cached, because pistons move
+
+    @cached_property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """The corners of the box with a margin beyond pistons."""
+        way = np.zeros(4)
+        way[[*self.piston_positions]] = PISTON_MARGIN * self.edges.max()
+        lower, upper = Run.bounds.func(self)
+        return lower - way[::2], upper + way[1::2]
+
+    @cached_property
+    def nature(self) -> Nature:
+        return self.simulation.nature
+
+
+def snapshot_run(simulation: Simulation) -> SnapshotRun:
+    """Return the present state of a simulation as a run."""
+    parameters = simulation.parameters
+    box, kinds = parameters["box"], parameters["species"]
+    lower, upper = (np.asarray(box[name], dtype=float) for name in ("lower", "upper"))
+    elements = {}
+    if "all/rotational_energy" in simulation.observables:
+        elements[TURNS] = simulation.angular_velocity[None]
+    return SnapshotRun(
+        simulation=simulation,
+        path=Path(parameters.get("run", {}).get("title") or "simulation"),
+        time=np.array([simulation.time]),
+        position=simulation.position[None],
+        velocity=simulation.velocity[None],
+        image=None,
+        event_count=None,
+        disk_data=elements,
+        mass=simulation.mass,
+        radius=simulation.radius,
+        species=simulation.species,
+        names=tuple(kinds),
+        lower=lower,
+        edges=upper - lower,
+        periodic=np.array([kind == "periodic" for kind in box["boundary"]]),
+        obstacles=obstacles_of(parameters),
+        walls=walls_of(parameters),
+        parameters=parameters,
+        provenance={},
+    )
+
+
+def observed(simulation: Simulation) -> dict[str, float]:
+    """Return the time and the present observables; vectors are represented by one component."""
+    seen = simulation._observed().items()
+    return {name: part[0].item() for name, part in seen} | {"time": simulation.time}
+
+
+def sampled(count: int, value: dict) -> tuple[float, ...]:
+    """Return the quantities from which means are computed: time, energy, virial, area.
+
+    The observable `virial_pressure` follows from these quantities.
+    """
+    time, kinetic, virial = (value[name] for name in ("time", "all/kinetic_energy", "virial"))
+    whole = count * kinetic + (virial / (2 * time) if time else 0.0)
+    return time, kinetic, virial, whole / (value["virial_pressure"] or 1.0)
+
+
+def pressure_between(samples: np.ndarray, count: int) -> SeriesMean:
+    """Return the mean pressure between the first and the last sample; sides may move."""
+    (kinetic, virial, area), apart = samples[1:4], np.diff(samples[0])
+    gain = count * kinetic[1:] * apart + np.diff(virial) / 2
+    return correlated_mean(gain / area[1:], apart)
+
+
+def sample_of(run: Run, value: dict) -> tuple[float, ...]:
+    """Return a sample: the quantities of `sampled`, the temperature, and the mean speeds."""
+    speeds = [value[f"{name}/mean_speed"] for name in run.names]
+    return (*sampled(run.n_disks, value), value["all/temperature"], *speeds)
+
+
+def means(run: Run, samples: Sequence[tuple[float, ...]], energy: float) -> list[dict]:
+    """Return mean, error and theory of the temperature, the mean speeds and the pressure.
+
+    The means are over the samples in equilibrium, and their errors include the autocorrelation.
+    There are no means of a run that does not relax to equilibrium, or as long as there are too few
+    samples; there is no theory where none is known.  `energy` is the present energy of all disks.
+    """
+    titles = ["temperature"]
+    titles += [f"mean speed of {name}" for name in run.names] if run.names[1:] else ["mean speed"]
+    found: list[SeriesMean | None] = [None] * (len(titles) + 1)
+    columns = np.array(samples).T
+    if run.nature.in_equilibrium and len(samples) >= FEWEST:
+        first = max(map(equilibration, columns[KEPT:]))
+        if len(samples) - first > FEWEST // 2:
+            late = columns[:, first:]
+            found = [*map(correlated_mean, late[KEPT:]), pressure_between(late, run.n_disks)]
+    expected = theory(run, energy, found[0].mean if found[0] else None)
+    return [
+        {
+            "name": title,
+            "value": mean.mean if mean else None,
+            "error": mean.error if mean else None,
+            "theory": law,
+        }
+        for title, mean, law in zip(
+            [*titles, "pressure", "pressure of an ideal gas"],
+            [*found, None],
+            expected,
+            strict=True,
+        )
+    ]
+
+
+def theory(run: Run, energy: float, measured: float | None) -> list[float | None]:
+    """Return theoretical values of the quantities of `means` and of the pressure of an ideal gas.
+
+    The observable `temperature` is kT (1 - 1/n), because it is relative to the mean motion.
+    Without a theoretical value of kT the other values follow from the measured temperature.
+    """
+    count, alike = run.n_disks, [kind.alike for kind in run.by_species]
+    law: list[float | None] = [None] * (len(alike) + 3)
+    if not run.nature.in_equilibrium or count < 2:
+        return law
+    expected = equilibrium_temperature(run, energy)
+    if expected:
+        law[0] = expected * (1 - 1 / count)
+    elif measured is None:
+        return law
+    kt = expected or measured / (1 - 1 / count)
+    drift, axes = conserved_drift(run)
+    for k, kind in enumerate(run.by_species):
+        if kind.alike:
+            law[1 + k] = mean_speed(kt / kind.mass, 2 * drift / np.sum(run.mass))
+    if not all(alike) or count <= FEW_DISKS:
+        return law
+    if run.nature & {"obstacles", "time_stepped", "gravity", "piston"}:
+        return law
+    sizes = [(kind.disks.sum(), kind.radii.mean()) for kind in run.by_species]
+    area = float(np.prod(run.edges))
+    rest = (drift - axes / 2 * kt) / area  # the observable contains the kinetic energy, not n kT
+    pressure = kt * virial_pressure(*zip(*sizes, strict=True), run.edges, ~run.periodic)
+    return [*law[:-2], pressure + rest, count * kt / area + rest]
+
+
+def equilibrium_temperature(run: Run, energy: float) -> float | None:
+    """Return kT of a run in equilibrium from its heat bath or from its conserved energy."""
+    nature, parameters = run.nature, run.parameters
+    if "thermostatted" in nature:
+        return float(parameters["drive"]["temperature"])
+    surfaces = [*parameters.get("side", {}).values()]
+    surfaces += [row for name in ("obstacle", "wall") for row in rows_of(parameters.get(name, {}))]
+    for one in surfaces:
+        if known(one.get("temperature")):
+            return float(one["temperature"])
+    if not nature.keeps_energy or "gravity" in nature:
+        return None
+    drift, axes = conserved_drift(run)
+    freedoms = 2 * run.n_disks - axes + ("rough" in nature) * run.n_disks
+    return 2 * (energy - drift) / freedoms
+
+
+def conserved_drift(run: Run) -> tuple[float, int]:
+    """Return the energy of the conserved momentum, and the number of axes that conserve it."""
+    free = run.periodic & (not run.nature & {"obstacles", "thermostatted"})
+    momentum = np.sum(run.mass[:, None] * run.velocity[0], axis=0)
+    return float(np.sum(momentum[free] ** 2) / 2 / np.sum(run.mass)), int(np.sum(free))
+
+
+def mean_speed(thermal: float, drift: float) -> float:
+    """Return the mean speed for kT/m and the square of the velocity of a common drift."""
+    x = drift / 4 / thermal
+    bessel = (1 + 2 * x) * scipy.special.ive(0, x) + 2 * x * scipy.special.ive(1, x)
+    return float(np.sqrt(np.pi * thermal / 2) * bessel)

@@ -1,0 +1,82 @@
+"""Pressure of a fluid of hard disks in a box with walls, from scaled particle theory."""
+
+import math
+
+import numpy as np
+
+from .hard_disks import henderson, of_sizes
+
+__all__ = ["virial_pressure"]
+
+ROUNDS = 100  # of the iteration for the densities far from the walls
+
+
+def virial_pressure(
+    count: np.ndarray, radius: np.ndarray, edges: np.ndarray, walls: np.ndarray
+) -> float:
+    """Return the observable `virial_pressure` / kT of a fluid in equilibrium in a rectangular box.
+
+    The observable is the mean of the forces on the sides times the distances of the disks' centres
+    that touch opposite sides, divided by twice the area of the box.  A wall has a tension and a
+    deficit of disks: Helfand, Frisch and Lebowitz, J. Chem. Phys. 34, 1037 (1961), here for
+    mixtures.  The pressure far from the walls follows from Henderson's formula and, for mixtures,
+    from `of_sizes`.
+
+    Parameters
+    ----------
+    count : array_like
+        (S,) number of disks of each species
+    radius : array_like
+        (S,) radius of the disks of each species [length]
+    edges : array_like
+        (2,) width and height of the box [length]
+    walls : array_like of bool
+        (2,) whether the sides across x and those across y are walls; the others are periodic
+
+    Returns
+    -------
+    float
+        P / kT [1/length^2]; NaN if the disks do not fit as a fluid
+
+    Examples
+    --------
+    >>> periodic = walls.virial_pressure([1000], [0.01], [1, 1], [False, False])
+    >>> bool(np.isclose(periodic, 1000 * hard_disks.henderson(1000 * np.pi * 0.01**2)))
+    True
+    """
+    count, radius, edges, walls = (
+        np.asarray(x, dtype=float) for x in (count, radius, edges, walls)
+    )
+    area, length = np.prod(edges), 2 * walls @ edges[::-1]  # of the box, and of all its walls
+    density = count / area
+    for _ in range(ROUNDS if length else 0):
+        if math.pi * density @ radius**2 >= 1:
+            return math.nan
+        density = (count + length * deficit(density, radius)) / area
+    eta, total = math.pi * density @ radius**2, density.sum()
+    if not 0 <= eta < 1:
+        return math.nan
+    mean = density @ radius / total
+    alike = mean**2 * total / (density @ radius**2)
+    pressure = total * of_sizes(henderson(eta), eta, alike)
+    tension = density @ radius / (1 - eta)
+    reach = edges - 2 * walls * (count @ radius) / count.sum()  # between centres at opposite sides
+    force = pressure * edges[::-1] - 2 * tension * walls[::-1]
+    return float(reach @ force / 2 / area)
+
+
+def deficit(density: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Return the disks of each species (S,) that are missing at a wall, per length of the wall.
+
+    By Gibbs' adsorption equation the deficit is the derivative of the tension with respect to the
+    chemical potentials.  Both follow from the free energy of scaled particle theory.
+    """
+    own = math.pi * radius**2
+    free, total, sizes = 1 - density @ own, density.sum(), density @ radius
+    slope = radius / free + sizes * own / free**2
+    lengths = 2 * math.pi * np.outer(radius, radius) / free
+    mixed = np.outer(own, 2 * math.pi * sizes * radius / free**2)
+    areas = np.outer(own, own) * (total / free**2 + 2 * math.pi * sizes**2 / free**3)
+    potentials = np.add.outer(own, own) / free + lengths + mixed + mixed.T + areas
+    # The matrix is multiplied by the densities, so that a species without disks is allowed.
+    return np.linalg.solve(np.eye(len(own)) + density[:, None] * potentials, density * slope)
