@@ -11,11 +11,12 @@ const state = {
   waiting: {},               // variables with a text that was refused: the text and the message
   runs: 0,                   // number of runs so far
   boxes: [],                 // kept runs { figure, frame, letter, words, run, shown }, and the present one at the end
-  paused: false,
+  paused: false, started: false, note: '',   // whether the films are paused, and the input has a run; what is wrong with the address
 };
 // The variables in this list can be changed while a simulation runs. A change of any other variable starts a new run.
 const acts = key => /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|surface_velocity|velocity|mass|force))/.test(key);
 const MEASURED = { 'all/kinetic_energy': 'mean kinetic energy', 'all/mean_speed': 'mean speed', virial_pressure: 'pressure', dissipated_energy: 'energy lost per time', collisions: 'collisions per time' };
+const IMPOSSIBLE = 'One value is not possible: the form says why.';
 const MOST_KEPT = 3, FULL = 0.5;  // number of kept runs; packing fraction that random placement reaches easily
 
 function make(tag, more = {}, ...children) {
@@ -47,6 +48,7 @@ const shownOf = key => state.waiting[key]?.text ?? textOf(key);
 function set(key, text) {
   const old = textOf(key);
   delete state.waiting[key];
+  state.note = '';
   delete state.settings[key];  // so that the newest setting is the last in the list
   if (text !== givenAs(key)) state.settings[key] = text;
   sync();
@@ -56,10 +58,14 @@ function set(key, text) {
 const wish = () => ({ input: state.input.name, added: state.added, settings: { ...state.settings } });
 const differs = key => (state.settings[key] ?? givenAs(key)) !== (state.has[key] ?? givenAs(key));
 
-const changesInWords = () => Object.entries(wish().settings).map(([key, value]) => {
+// Returns a value with the words of its slider, or with the name of the variable if it has no slider.
+function inWords([key, value]) {
   const slider = state.input.sliders.find(one => one.key === key);
   return `${slider ? slider.words.replace(/ \(.*/, '') : key} = ${slider?.at >= 0 ? split(value)[slider.at] : value}`;
-}).join(' · ') || 'as in the file';
+}
+
+const settingsInWords = () => Object.entries(wish().settings).map(inWords).join(' · ') || 'as in the file';
+const changeInWords = ([, key, value]) => key ? inWords([key, value]) : value;  // a change without a variable consists of words
 
 // ---------- sliders ----------
 
@@ -103,7 +109,7 @@ function buildSlider(spec) {
   const { key, at } = spec, id = 'slide.' + key + at;
   const range = make('input', { type: 'range', min: 0, id }), field = make('input', { inputMode: 'text', spellcheck: false });
   const row = make('div', { className: 'slider' }, make('label', { htmlFor: id, textContent: spec.words }),
-    make('small', { textContent: acts(key) ? 'acts at once' : 'starts anew' }), make('div', {}, range, field), make('p', { className: 'problem' }));
+    make('small', { textContent: acts(key) ? 'changes this run' : 'starts a new run' }), make('div', {}, range, field), make('p', { className: 'problem' }));
   field.setAttribute('aria-label', `${spec.words}: value`);
   let values;
   range.addEventListener('input', () => set(key, textWith(spec, String(values[range.value]))));
@@ -176,18 +182,20 @@ function addGroup(kind, name) {
 
 // ---------- choice of an input file ----------
 
-// The run starts before the form is complete, because the user should see the disks as soon as possible. Earlier runs of another
-// input file are removed, because runs of different input files cannot be compared in one plot.
-async function choose(name) {
+// The run starts before the form is complete, so that disks appear early, unless the address contains
+// values. Kept runs of another input are removed, because runs of different inputs cannot be compared
+// in one plot.
+async function choose(name, settings = {}) {
   const input = lab.inputs.find(one => one.name === name);
   if (name !== state.input?.name) {
     state.boxes.slice(0, -1).forEach(remove);
     current().letter = 'A';
   }
-  Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: [], settings: {}, has: {}, waiting: {}, added: [] });
+  Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: [], settings: {}, has: {}, waiting: {}, added: [], note: '', started: false });
   scan = scanner?.leave();
   drawScan();
-  run();
+  const isPlain = !Object.keys(settings).length;
+  if (isPlain) run();
   $('name').textContent = input.title;
   $('own').hidden = !input.picture;
   if (input.picture) $('own').src = input.picture;
@@ -198,11 +206,36 @@ async function choose(name) {
   const form = await answer.json();
   if (state.input.name !== name) return;  // another input has been chosen meanwhile
   state.groups = form.groups;
+  if (!isPlain) begin(settings);
   $('about').replaceChildren(...form.about.split(/\n\n+/).map(text => make('p', { textContent: text })));
   $('sliders').replaceChildren(...state.input.sliders.map(buildSlider));
   $('scanned').replaceChildren(...state.input.sliders.map((slider, k) => new Option(slider.words, k)));
   buildEverything();
   sync();
+}
+
+// Starts the input with the values of an address. A group that the file does not contain is added.
+function begin(settings) {
+  const isKnown = key => key.split('.').length > 1 && lab.table[key.split('.')[0]]?.[nameOf(key)], keys = Object.keys(settings), wrong = keys.find(key => !isKnown(key));
+  state.settings = Object.fromEntries(keys.filter(isKnown).map(key => [key, settings[key]]));
+  const places = [...new Set(Object.keys(state.settings).map(placeOf))].filter(place => place.includes('.') && !state.groups.some(group => group.place === place));
+  state.added = places.map(place => [place.split('.')[0], place.slice(place.indexOf('.') + 1)]);
+  run();
+  if (wrong) state.note = `There is no variable ${wrong}.`;
+}
+
+// ---------- the address: the input, and the values that differ from its file ----------
+
+function toAddress() {
+  const pairs = [['input', state.input.name], ...Object.entries(state.settings)];
+  history.replaceState(null, '', '#' + pairs.map(pair => pair.map(encodeURIComponent).join('=')).join('&').replaceAll('%2C', ','));
+}
+
+function fromAddress() {
+  const { input, ...settings } = Object.fromEntries(new URLSearchParams(location.hash.slice(1))), known = name => lab.inputs.find(one => one.name === name)?.name;
+  if (known(input)) { choose(input, settings); return; }
+  choose(known('gas') ?? lab.inputs[0].name);
+  if (input) state.note = `There is no input ${input}.`;
 }
 
 function buildInputs() {
@@ -244,7 +277,7 @@ function run() {
   const begin = () => {
     if (!box.run) dress();
     if (state.boxes.length > 1 && !box.run) filmOf(box).choices(filmOf(state.boxes.at(-2)).choices());
-    box.wished = { ...wish(), words: changesInWords(), run: ++state.runs };
+    box.wished = { ...wish(), words: settingsInWords(), run: ++state.runs };
     filmOf(box).start(box.wished);
   };
   if (isThere(box)) begin(); else box.frame.addEventListener('load', begin, { once: true });
@@ -264,17 +297,19 @@ function hear(source, news) {
   if (!box) return;
   if (news.is === 'scene' && !news.changed) {
     Object.assign(box, { run: news.run, words: box.wished.words, changes: [] });
-    state.has = { ...box.wished.settings };
+    Object.assign(state, { has: { ...box.wished.settings }, started: true });
+    toAddress();
     ready();
     for (const kept of state.boxes) if (kept !== box && kept.shown && isThere(kept)) filmOf(kept).replay();
-    tell(Object.keys(state.waiting).length ? 'one value waits: see the form' : '');
+    tell(Object.keys(state.waiting).length ? IMPOSSIBLE : state.note, !!state.note);
     arrangeAll();
   } else if (news.is === 'problems') {
     if (!news.change) { showProblems(news.problems); ready(); } else if (!busy) run();  // the variable cannot change in a running simulation
   } else if (news.is === 'state') {
     box.changes = news.changes;
-    if (box === current()) for (const [, key, value] of news.changes) state.has[key] = value;
+    if (box === current()) for (const [, key, value] of news.changes) if (key) state.has[key] = value;
     if (news.reason) tell(news.reason, true);
+    toAddress();
     tellShelf();
   } else if (news.is === 'file') {
     const href = URL.createObjectURL(new Blob([filmOf(box).bytes(news.body)]));
@@ -298,8 +333,9 @@ function showProblems(problems) {
     if (key in state.has) state.settings[key] = state.has[key]; else delete state.settings[key];
   }
   sync();
-  tell(before.length ? 'one value waits: see the form' : problems[0].text, true);
-  again ||= before.length > 0 && changes().length > 0;
+  tell(before.length ? IMPOSSIBLE : problems[0].text, true);
+  toAddress();
+  again ||= before.length > 0 && (changes().length > 0 || !state.started);
 }
 
 // ---------- earlier runs that remain visible for comparison ----------
@@ -318,7 +354,7 @@ function remove(box) {
   arrangeAll();
 }
 
-const whatIs = ({ words: text, changes }) => text + (changes.length ? `, then ${changes.at(-1)[1]} = ${changes.at(-1)[2]}` : '');
+const whatIs = ({ words: text, changes }) => text + (changes.length ? `, then ${changeInWords(changes.at(-1))}` : '');
 
 function tellShelf() {
   $('shelf').replaceChildren(...state.boxes.filter(({ run: number }) => number).map(box => {
@@ -334,7 +370,7 @@ function tellShelf() {
     return make('li', {}, make('p', {}, ...(own ? [] : [seen, ' ']), ...parts), make('p', { className: 'links' }, ...['input', ...(box.changes.length ? ['script'] : []), 'output'].map(file), ...(own ? [] : [away])));
   }));
   const changes = current()?.changes ?? [];
-  $('changes').replaceChildren(...changes.slice(-6).map(([time, name, value]) => make('li', { textContent: `t = ${short(time)}: ${name} = ${value}` })));
+  $('changes').replaceChildren(...changes.slice(-6).map(change => make('li', { textContent: `t = ${short(change[0])}: ${changeInWords(change)}` })));
   state.boxes.forEach(box => { box.figure.firstChild.textContent = `${box.letter}: ${whatIs(box)}`; });
 }
 
@@ -433,6 +469,7 @@ function dress() {
 }
 
 const actions = {
+  film: () => { current().frame.focus(); filmOf(current()).document.getElementById('play').focus(); },
   run, keep, scan: beginScan, choose: () => $('inputs').showModal(),
   pause: () => filmOf(current()).play(state.paused), settings: () => bare(!document.body.classList.contains('bare')),
   larger: () => { $('larger').ariaPressed = document.documentElement.classList.toggle('larger'); dress(); },
@@ -465,4 +502,5 @@ document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark
 buildInputs();
 newBox();
 bare(matchMedia('(max-height: 500px)').matches);
-choose((lab.inputs.find(({ name }) => name === 'gas') ?? lab.inputs[0]).name);
+addEventListener('hashchange', fromAddress);
+fromAddress();

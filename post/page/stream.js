@@ -136,7 +136,7 @@ function drawn() { for (; stream.fresh > 0; stream.fresh--) send({ do: 'got' });
 
 const fromWorker = {
   grows: true,
-  counted: () => moment.time === last() ? 'now' : 'gone back',
+  counted: () => moment.time === last() ? 'now' : 'an earlier moment',
   curves: () => stream.curves,
   means: () => stream.curves.news[Math.max(0, upTo(stream.curves.time, moment.time) - 1)]?.means,
   coming: () => stream.live ? stream.events : { next: [], happened: null },

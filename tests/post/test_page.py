@@ -138,10 +138,11 @@ def test_what_acts_on_the_disks_acts_at_once_and_the_rest_starts_anew(opened):
     assert opened.run("return current().run") == before and inside(opened, "moment.time") >= time
     when, name, value = opened.run("return current().changes.at(-1)")
     assert when >= time and name == "contact.restitution" and float(value) == 0.65
-    assert "contact.restitution = 0.65" in opened.run("return $('changes').textContent")
+    assert "restitution of two disks = 0.65" in opened.run("return $('changes').textContent")
     assert inside(opened, "film.settles") is False, "no Maxwell curve any more"
     opened.run("$('heat').querySelector('button:last-of-type').click()")
     wait_for(lambda: opened.run("return current().changes.length") == 2)
+    assert "all speeds times 1.25" in opened.run("return $('changes').textContent")
     slide(opened, 1, 0.5)  # number of disks
     moving(opened, before)
     assert inside(opened, "kinds[0].count") == int(opened.run("return textOf('species.gas.count')"))
@@ -370,6 +371,83 @@ def test_what_is_clicked_is_downloaded_or_measured(opened, tmp_path):
     for speed, mean, _ in opened.run("return scan.points"):
         assert mean == pytest.approx(speed**2 / 2)
     assert "mean kinetic energy against speed" in opened.run("return $('points').innerText")
+
+
+LINKS = {  # the values of an address, and a property of the film
+    "a number": ("crater", {"species.projectile.mass": "50"}, ("kinds[1].mass", 50)),
+    "a vector": ("gas", {"box.gravity": "0,-2"}, ("film.gravity", [0, -2])),
+    "an added group": (
+        "gas",
+        {"obstacle.post.centre": "0.5,0.5", "obstacle.post.radius": "0.1"},
+        ("film.obstacles[0]", [0.5, 0.5, 0.1, False]),
+    ),
+    "letters": ("gas", {"run.title": "'50 % & more + #1'"}, ("kinds[0].count", 1000)),
+}
+
+
+@pytest.mark.parametrize("case", LINKS)
+def test_the_address_holds_input_and_values_and_brings_them_back(opened, case):
+    """A link, the page of the link loaded again, and values chosen on the page lead to one run."""
+    name, settings, (what, value) = LINKS[case]
+    before = opened.run("return current().run")
+    start = "const [name, settings] = arguments; choose(name, settings)"
+    opened.run(start, name, settings)
+    moving(opened, before)
+    address = opened.run("return location.href")
+    assert f"#input={name}&" in address
+    for _ in range(2):
+        opened.open("about:blank")
+        opened.open(address)
+        moving(opened)
+        assert opened.run("return location.href") == address
+        assert opened.run("return state.has") == settings
+        assert inside(opened, what) == value
+        assert opened.run("return $('status').textContent") == ""
+    opened.run("location.hash = '#input=cooling&contact.restitution=0.5'")
+    moving(opened, 1)
+    assert opened.run("return [state.input.name, state.has]") == [
+        "cooling",
+        {"contact.restitution": "0.5"},
+    ]
+    opened.run("set('contact.restitution', '0.75')")
+    wait_for(lambda: opened.run("return location.hash").endswith("contact.restitution=0.75"))
+
+
+def test_an_address_with_mistakes_shows_a_run_and_the_mistake(opened):
+    for wish, words in (
+        ("input=none", "There is no input none."),
+        ("input=gas&species.gas.size=3", "There is no variable species.gas.size."),
+        ("input=gas&toString=3", "There is no variable toString."),
+        ("input=gas&species.gas.radius=-1", "One value is not possible"),
+        ("input=gas&contact.restitution=%3Cb%3E", "One value is not possible"),
+    ):
+        before = opened.run("return current().run")
+        opened.run("location.hash = arguments[0]", wish)
+        moving(opened, before)
+        assert words in opened.run("return $('status').textContent")
+        assert opened.run("return [state.input.name, location.hash]") == ["gas", "#input=gas"]
+
+
+def test_the_first_key_leads_to_the_film_and_larger_text_stays_in_its_card(opened):
+    opened.resize(1920, 1080)
+    opened.press("\ue004")  # tab
+    assert opened.run("return document.activeElement.id") == "film"
+    opened.press("\ue007")  # enter
+    focus = "filmOf(current()).document"
+    assert opened.run(f"return {focus}.hasFocus() && {focus}.activeElement.id") == "play"
+    opened.press("l")
+    beyond = """const { document } = filmOf(current()), card = document.getElementById('view');
+        const end = card.getBoundingClientRect().right;
+        const wide = part => part.getBoundingClientRect().right > end
+          || part.scrollWidth > part.clientWidth + 1;
+        return [...card.querySelectorAll('.row, label, output')].filter(wide).map(one => one.id)"""
+    for speed in (-2, 1.5):
+        opened.run(
+            """const film = filmOf(current()), pace = film.document.getElementById('pace');
+            pace.value = arguments[0]; film.refresh();""",
+            speed,
+        )
+        assert opened.run(beyond) == []
 
 
 def test_a_scan_beside_a_kept_run_is_seen_and_moves_nothing(opened):

@@ -272,7 +272,7 @@ class Session:
             (when, name, value)
             for when, what, values, _ in self.actions
             for name, value in (
-                values.items() if what == "change" else [("all velocities", f"times {values:g}")]
+                values.items() if what == "change" else [("", f"all speeds times {values:g}")]
             )
         ]
         state = {"playing": self.playing, "ended": self.ended, "reason": self.reason}
