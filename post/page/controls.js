@@ -123,6 +123,7 @@ function go(time) {
   follow(false);
   play(false);
   show(time, true);
+  if (isPart) parent.went(window, moment.time);
   remember();
 }
 

@@ -251,6 +251,7 @@ function buildInputs() {
 const current = () => state.boxes.at(-1), filmOf = box => box.frame.contentWindow, isThere = box => !!filmOf(box)?.start;
 const shownBoxes = () => state.boxes.filter(box => box.shown || box === current()), films = () => shownBoxes().filter(isThere).map(filmOf);
 function isPaused() { return state.paused; }
+function isComparing() { return shownBoxes().length > 1; }
 
 function newBox() {
   const taken = state.boxes.map(({ letter }) => letter), letter = [...'ABCDEFGHIJ'].find(one => !taken.includes(one));
@@ -300,6 +301,7 @@ function hear(source, news) {
     Object.assign(state, { has: { ...box.wished.settings }, started: true });
     toAddress();
     ready();
+    clock.next = null;
     for (const kept of state.boxes) if (kept !== box && kept.shown && isThere(kept)) filmOf(kept).replay();
     tell(Object.keys(state.waiting).length ? IMPOSSIBLE : state.note, !!state.note);
     arrangeAll();
@@ -351,7 +353,14 @@ function keep() {
 function remove(box) {
   box.figure.remove();
   state.boxes.splice(state.boxes.indexOf(box), 1);
+  regroup();
+}
+
+// Arranges the films after one of them has been shown, hidden or removed. They continue at a common time.
+function regroup() {
+  clock.next = null;
   arrangeAll();
+  if (!state.paused) filmOf(current()).resume?.();
 }
 
 const whatIs = ({ words: text, changes }) => text + (changes.length ? `, then ${changeInWords(changes.at(-1))}` : '');
@@ -363,7 +372,7 @@ function tellShelf() {
     seen.addEventListener('change', () => {
       box.shown = seen.checked;
       filmOf(box).play(box.shown && !state.paused);
-      arrangeAll();
+      regroup();
     });
     const away = make('button', { type: 'button', textContent: '×', title: `remove run ${box.letter}`, onclick: () => remove(box) });
     const own = box === current(), parts = [make('b', { textContent: `${box.letter}: ` }), whatIs(box)];
@@ -377,7 +386,7 @@ function tellShelf() {
 // Arranges the films of all runs side by side, with equal sizes. The plots appear beside the newest run and include the curves of
 // the earlier runs.
 function arrangeAll() {
-  const boxes = shownBoxes(), many = boxes.length > 1, { clientWidth, clientHeight } = $('runs');
+  const boxes = shownBoxes(), many = isComparing(), { clientWidth, clientHeight } = $('runs');
   const upright = clientWidth < 560, count = many ? boxes.length : 1, width = Math.floor(clientWidth / count);
   const shapes = films().map(one => one.inside().film?.edges).filter(Boolean).map(([x, y]) => y / x), highest = clientHeight * (upright ? 0.36 : 0.42) - 26;
   const size = many ? { width: width - 12, height: Math.floor(Math.min(highest, (width - 12) * Math.max(0.5, ...shapes))) } : null;
@@ -408,7 +417,40 @@ function overlayAll() {
 function letterOf(source) { return state.boxes.find(box => filmOf(box) === source)?.letter; }
 setInterval(() => { if (shownBoxes().length > 1) overlayAll(); }, 1000);
 
-// Applies an action of the user on one film to all other films.
+// ---------- the time of compared runs ----------
+
+// The newest film sets the time of all films. The next time is requested from all workers, and all
+// films show it when the slowest of them has reached it. As long as a film repeats kept frames, the
+// times are those of its frames.
+const clock = { next: null, shown: 0 };  // the time requested; when the films were last drawn [ms]
+function conducts(source) {
+  if (!isComparing()) return false;
+  if (source !== filmOf(current())) return true;
+  const all = films(), now = performance.now();
+  if (clock.next === null) request(all, 1 / 60);
+  if (clock.next === null || !all.every(one => one.hasReached(clock.next))) return true;
+  for (const one of all) one.show(clock.next);
+  const passed = Math.min(0.1, (now - clock.shown) / 1000);
+  clock.shown = now;
+  request(all, passed);
+  return true;
+}
+
+function request(all, passed) {
+  const film = filmOf(current()), { moment } = film.inside(), { pace, speed } = film.choices(), perSecond = pace * 10 ** speed;
+  const target = moment.time + passed * perSecond, kept = all.find(one => one.inside().past.at(-1)?.time > moment.time), repeated = kept?.frameBefore(target);
+  const isDue = repeated <= Math.max(target, moment.time + (performance.now() - clock.shown) / 1000 * perSecond);
+  clock.next = !kept ? target : isDue ? repeated : null;
+  if (clock.next !== null) for (const one of all) one.reach(clock.next);
+}
+
+// Lets all films show the time to which a paused film has gone.
+function went(source, time) {
+  clock.next = null;
+  if (state.paused) for (const one of films()) if (one !== source) one.join(time);
+}
+
+// Repeats an action on one film in all other films.
 function played(source, on) {
   if (source === filmOf(current())) state.paused = !on;
   for (const one of films()) if (one !== source && one.inside().film) one.play(on);
@@ -477,6 +519,7 @@ const actions = {
   another: () => { if ($('add').value) addGroup(...$('add').value.split(' ')); },
 };
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());
+const MOVES = new Set(['ArrowLeft', 'ArrowRight', 'Home', 'End', 'n', ' ']);  // keys that act on the newest film, which the others follow
 const keys = { r: 'run', p: 'pause', k: 'keep', s: 'settings', l: 'larger' };
 
 // Keyboard shortcuts of the laboratory work whichever element has the keyboard focus. Keyboard shortcuts for films apply to the
@@ -486,7 +529,7 @@ function typed(event) {
   if (target.matches('input:not([type=range]), select') || event.ctrlKey || event.metaKey || event.altKey || $('inputs').open) return;
   if (keys[key]) actions[keys[key]]();
   else if (own && !(target.matches('input') && /^(Arrow|Home|End|Page)/.test(key)) && !(key === ' ' && target.matches('input, button, summary'))) {
-    for (const one of films()) one.pressed(key);
+    for (const one of MOVES.has(key) ? [filmOf(current())] : films()) one.pressed(key);
   }
 }
 

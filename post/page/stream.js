@@ -1,7 +1,8 @@
 // ---------- run of the laboratory: frames that a worker process sends ----------
 
-// The page draws the newest frame of the simulation. It keeps earlier frames up to a limit of memory, because the user can go back
-// in time. After the user has gone back, the film first plays the stored frames; then the worker process continues the simulation.
+// The page draws the newest frame. Earlier frames are kept, so that the user can go back. Above a
+// limit of memory every second frame of the older half is removed. After going back, the film first plays the kept frames; then the worker
+// continues.
 const PAST_ROOM = 6e7, HEAD = 6, MOST_CURVE = 3000;  // memory for frames [bytes]; numbers before the positions of a message; samples of a plot
 const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
 
@@ -21,7 +22,7 @@ const isStarting = () => document.documentElement.classList.contains('starting')
 
 // Starts the run that the user of the laboratory requests. All runs of this film use the same connection to a worker process.
 function start(run) {
-  const same = stream.wish?.input === run.input, wish = { do: 'start', ...run, pace: same ? stream.sent : null, playing: !parent.isPaused() };
+  const same = stream.wish?.input === run.input, wish = { do: 'start', ...run, pace: same ? stream.sent : null, playing: !parent.isPaused() && !parent.isComparing() };
   if (!same) [stream.sent, usual] = [0, usual || !!stream.wish];
   stream.wish = run;
   starts(true);
@@ -74,7 +75,7 @@ const hear = {
   state({ playing, ended }) {
     if (isStarting()) return;  // the message belongs to the previous run
     stream.ended = ended;
-    if (!playing && state.playing && stream.live && past.length) play(false);
+    if (!playing && state.playing && stream.live && past.length && !parent.isComparing()) play(false);
   },
   problems({ change }) { if (!change) starts(false); },  // a refused change belongs to the previous run
   gone: () => starts(false),
@@ -115,7 +116,7 @@ function take(buffer) {
   const isFirst = !past.length, follows = stream.live && moment.time === past.at(-1)?.time;
   if (past.at(-1)?.time === frame.time) past.pop();  // at a start or a change the same time occurs again
   past.push(frame);
-  while (past.length > 2 && past.length * buffer.byteLength > PAST_ROOM) past.shift();
+  if (past.length > 2 && past.length * buffer.byteLength > PAST_ROOM) past = past.filter((_, k) => k % 2 === 0 || 2 * k > past.length);
   stream.fresh++;
   if (isFirst) {
     document.documentElement.classList.remove('empty');
@@ -126,8 +127,11 @@ function take(buffer) {
     begin();
     refresh();
     play(!parent.isPaused());
-  } else if (!state.playing && follows) show(frame.time, true);
-  if (!state.playing) drawn();
+  } else if (!state.playing && follows) {
+    show(frame.time, true);
+    parent.went(window, frame.time);
+  }
+  if (!state.playing || parent.isComparing()) drawn();
 }
 
 // The page confirms each frame after drawing it. The worker process waits for confirmations, and is at most two frames ahead of the
@@ -149,10 +153,10 @@ const fromWorker = {
   },
   begins() {
     stream.live = moment.time === last();
-    if (stream.live) send({ do: 'play' });
+    if (stream.live && !parent.isComparing()) send({ do: 'play' });
   },
-  rest() { send({ do: 'pause' }); if (stream.live) show(last(), true); },  // the newest frame is shown
-  // If the user steps beyond the last stored frame, the worker process calculates the next frame.
+  rest() { send({ do: 'pause' }); if (stream.live && !parent.isComparing()) show(last(), true); },  // the newest frame is shown
+  // A step beyond the last frame is computed by the worker.
   goOn(what) {
     play(false);
     if (what === 'step' && moment.time !== last()) return false;
@@ -162,6 +166,7 @@ const fromWorker = {
     return true;
   },
   newest(next) {
+    if (parent.conducts(window)) return;  // compared runs show the same time
     if (stream.live) {
       if (!stream.fresh) return;
       show(last());
@@ -179,7 +184,29 @@ const fromWorker = {
 // ---------- film as a part of the laboratory ----------
 
 // These functions are called by the laboratory for each of its films.
-function inside() { return { film, source, state, moment, kinds, stream, overlaid, numbersNow, speedsOfFilm }; }
+function inside() { return { film, source, state, moment, kinds, stream, overlaid, past, numbersNow, speedsOfFilm }; }
+
+// Whether the film can show a time; a run that has ended shows its end.
+function hasReached(time) { return past.length > 0 && !isStarting() && (last() >= time || stream.ended); }
+
+// Continues when compared films have become one film, or one film several.
+function resume() { if (state.playing) source.begins(); }
+
+function reach(time) { if (!hasReached(time)) send({ do: 'reach', time }); }
+
+// Shows, while the films are paused, the time that another film shows.
+function join(time) {
+  if (!past.length) return;
+  show(Math.min(time, last()), true);
+  stream.live = moment.time === last();
+  reach(time);
+}
+
+// Returns the latest of the frames up to a time that follow the frame shown, or else the next frame.
+function frameBefore(time) {
+  const k = Math.max(frameAt(time), frameAt(moment.time) + 1);
+  return past[k]?.time ?? null;
+}
 
 function overlay(list) {
   overlaid = list;

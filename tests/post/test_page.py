@@ -283,6 +283,44 @@ def test_the_table_shows_the_moment_that_is_shown(opened):
             assert [float(row[1]) for row in table[2:4]] == [1, 1]
 
 
+def are_at_one_time(times, other_than):
+    """Return whether all times are equal and differ from an earlier time."""
+    return min(times) == max(times) != other_than
+
+
+TIMES = "return films().map(one => one.inside().moment.shown)"
+
+
+def test_compared_runs_show_one_time_and_go_on_alone(opened):
+    """This holds while they play, at each step, and when a paused film goes to another time."""
+    wait_for(lambda: inside(opened, "moment.time") > 0.1)
+    for kept in (1, 2):
+        opened.press("k")
+        moving(opened, kept)
+    opened.run("set('species.gas.count', '3000')")
+    moving(opened, 3)
+    seen = set()
+    while len(seen) < 20 or min(seen) == max(seen):
+        times = opened.run(TIMES)
+        assert len(times) == 3 and min(times) == max(times)
+        seen.add(times[0])
+    wait_for(lambda: opened.run(TIMES)[0] > 0.15)  # beyond the kept frames
+    opened.press("p")
+    wait_for(lambda: opened.run("return films().every(one => !one.inside().state.playing)"))
+    for key in ("\ue012", "\ue011", "\ue014", "\ue010", "\ue014", "n", "n", "\ue012"):
+        before = opened.run(TIMES)[0]
+        opened.press(key)  # left, Home, right, End, ...
+        wait_for(lambda old=before: are_at_one_time(opened.run(TIMES), old))
+    opened.press("p")
+    last = opened.run(TIMES)[0]
+    wait_for(lambda: opened.run(TIMES)[0] > last)
+    for _ in range(2):
+        opened.run("remove(state.boxes[0])")
+    last = opened.run(TIMES)[0]
+    wait_for(lambda: opened.run(TIMES)[0] > last + 0.02)
+    assert len(opened.run(TIMES)) == 1
+
+
 def test_compared_runs_have_numbers_and_histograms_side_by_side(opened):
     opened.press("k")
     moving(opened, 1)

@@ -81,6 +81,7 @@ class Session:
         self.samples: deque[tuple[float, ...]] = deque(maxlen=MOST_SAMPLES)
         self.last_event: tuple | None = None
         self.goal: tuple[float, int, int] | None = None  # end time of a step that is in progress
+        self.led = False  # whether the page sets the time of each frame
 
     # --- requests ---
 
@@ -98,7 +99,7 @@ class Session:
             self.simulation.close()
         self.simulation, self.request, self.initial, self.pace = other, request, other.input, pace
         self.actions, self.ended, self.reason = [], False, ""
-        self.playing, self.goal = bool(request["playing"]), None
+        self.playing, self.goal, self.led = bool(request["playing"]), None, False
         self.unconfirmed = 0
         self.send_scene(changed=False)
 
@@ -149,11 +150,12 @@ class Session:
     def play(self, _: dict) -> None:
         """Continue the simulation."""
         self.playing, self.goal, self.due = True, None, time.perf_counter()
+        self.led = False
         self.send_state()
 
     def pause(self, _: dict) -> None:
         """Pause the simulation."""
-        self.playing, self.goal = False, None
+        self.playing, self.goal, self.led = False, None, False
         self.send_numbers()
         self.send_state()
 
@@ -169,7 +171,12 @@ class Session:
         """Advance the simulation by the requested time, and then pause."""
         if not (more := float(request["time"])) >= 0:
             raise ValueError("a step cannot go back in time")
-        self.playing, self.goal = False, (self.simulation.time + more, NEVER, NEVER)
+        self.playing, self.led = False, False
+        self.goal = self.simulation.time + more, NEVER, NEVER
+
+    def reach(self, request: dict) -> None:
+        """Advance to a time that several runs show together, and wait for the next such time."""
+        self.led, self.goal = True, (float(request["time"]), NEVER, NEVER)
 
     def event(self, request: dict) -> None:
         """Advance the simulation by one event, and then pause."""
@@ -177,7 +184,8 @@ class Session:
         if not coming and not self.run.time_step:
             self.pause(request)  # no further event can occur
             return
-        self.playing, self.goal = False, (np.inf, NEVER, self.simulation.events + 1)
+        self.playing, self.led = False, False
+        self.goal = np.inf, NEVER, self.simulation.events + 1
         self.last_event = coming[0] if coming else None
 
     def keep(self, request: dict) -> None:
@@ -219,16 +227,16 @@ class Session:
     def is_advancing(self) -> bool:
         """Return whether the simulation is to advance at this moment."""
         ready = self.simulation and not self.ended and self.unconfirmed < FRAMES_AHEAD
-        return bool(ready and (self.goal or (self.playing and self.pace > 0)))
+        return bool(ready and (self.goal or (self.playing and self.pace > 0 and not self.led)))
 
     def advance(self) -> None:
         """Advance towards the time of the next frame, for at most `SLICE` seconds of real time."""
         now = time.perf_counter()
         passed, self.due = min(now - self.due, 0.1), now
-        stepping = self.goal
-        limits = stepping or (self.simulation.time + self.pace * passed, NEVER, NEVER)
+        stepping = self.goal and not self.led
+        limits = self.goal or (self.simulation.time + self.pace * passed, NEVER, NEVER)
         try:
-            if self.simulation._go_on(limits, SLICE) and stepping:
+            if self.simulation._go_on(limits, SLICE) and self.goal:
                 return  # a step is shown only when it is complete
         except ProgramError as problem:
             self.ended, self.reason = True, str(problem)
@@ -439,7 +447,7 @@ def work(describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     session = Session(describe_scene)
     handlers = {"start": session.start, "scan": scan, "pace": session.set_pace}
-    own = ("change", "heat", "play", "pause", "got", "step", "event", "keep")
+    own = ("change", "heat", "play", "pause", "got", "step", "reach", "event", "keep")
     handlers |= {name: getattr(session, name) for name in own}
     while True:
         wait = None
