@@ -11,6 +11,7 @@ serves the page until the user presses Ctrl-C, which also ends all simulations.
 """
 
 import asyncio
+import json
 import sys
 import threading
 import webbrowser
@@ -86,7 +87,8 @@ def main() -> None:
         if path.suffix != ".nml" or not path.is_file():
             raise RunError(f"{path}: is not an input file; the name must end in .nml")
     names = {path.stem for path in args.inputs}  # each name is listed once
-    inputs = [path for path in sorted(INPUTS.glob("*.nml")) if path.stem not in names]
+    chosen = json.loads((INPUTS / "chooser.json").read_text(encoding="utf-8"))
+    inputs = [INPUTS / f"{name}.nml" for name in sorted(chosen) if name not in names]
     folders = [INPUTS, *(path.parent for path in args.inputs), *args.files]
     command = [sys.executable, "-c", WORKER.format(str(Path(__file__).parent))]
     asyncio.run(open_lab(Lab(args.inputs + inputs, folders, command), args.port, args.open))

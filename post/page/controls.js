@@ -166,6 +166,41 @@ function zoomBy(factor, px, py) {
   look();
 }
 
+// ---------- in the laboratory: dragging a side while the disks move, or a disk while they stand ----------
+
+let grabbed = null;  // { side } or { disk }, and when the worker was last told [ms]
+const HOLDABLE = [undefined, 'still', 'constant_velocity', 'piston'], TOLD_AGAIN = 100;
+
+// Returns the side or the disk at a point of the canvas that can be dragged.
+function grabAt(px, py) {
+  if (!isPart || !(state.playing ? stream.live : moment.time === last())) return null;
+  if (!state.playing) {
+    const i = diskAt(px, py, 0);
+    return i === null ? null : { disk: i };
+  }
+  const [x0, x1, y0, y1] = sidesAt(moment.shown), reach = 10 * page.dots, gaps = [x0, x1].map(x => Math.abs(across(x) - px)).concat([y0, y1].map(y => Math.abs(up(y) - py)));
+  const side = gaps.findIndex((gap, k) => gap < reach && !film.periodic[k >> 1] && HOLDABLE.includes(film.sides[k].motion));
+  return side < 0 ? null : { side, told: 0 };
+}
+
+function drag(px, py) {
+  const { side, disk, told } = grabbed;
+  if (disk !== undefined) {
+    [X[disk], Y[disk]] = grabbed.to = [backAcross(px), backUp(py)];
+    drawStage();
+  } else if (performance.now() > told + TOLD_AGAIN) {
+    grabbed.told = performance.now();
+    send({ do: 'hold', side, to: side < 2 ? backAcross(px) : backUp(py) });
+  }
+}
+
+function release() {
+  const { side, disk, to } = grabbed;
+  grabbed = null;
+  if (side !== undefined) send({ do: 'hold', side, to: null });
+  else if (to) send({ do: 'place', disk, position: to });
+}
+
 function pointerMoved(event) {
   const before = pointers.get(event.pointerId), here = onStage(event);
   if (!before) return;
@@ -174,6 +209,7 @@ function pointerMoved(event) {
   const dx = here[0] - before[0], dy = here[1] - before[1];
   moved += Math.hypot(dx, dy);
   if (moved < 6 * page.dots) return;
+  if (grabbed) { drag(...here); return; }
   if (others.length) {
     const distance = place => Math.hypot(place[0] - others[0][0], place[1] - others[0][1]);
     zoom(distance(here) / Math.max(1, distance(before)), (here[0] + others[0][0]) / 2, (here[1] + others[0][1]) / 2);
@@ -181,17 +217,23 @@ function pointerMoved(event) {
   look();
 }
 
-// Shows the path of the disk nearest to a point of the canvas, or no path if no disk is near that point.
-function pick(px, py) {
-  let nearest = [], least = 12 * page.dots;
+// Returns the disk nearest to a point of the canvas within a distance in CSS pixels of its rim, or null.
+function diskAt(px, py, distance) {
+  let nearest = null, least = distance * page.dots;
   for (let i = 0; i < disks; i++) {
     const reach = (radii[sizeOf[i]] + least) / view.unit;
     copies([X[i] - reach, X[i] + reach], [Y[i] - reach, Y[i] + reach], (dx, dy) => {
       const gap = Math.hypot(across(X[i] + dx) - px, up(Y[i] + dy) - py) - radii[sizeOf[i]];
-      if (gap < least) [nearest, least] = [[i], gap];
+      if (gap < least) [nearest, least] = [i, gap];
     });
   }
-  trace(nearest);
+  return nearest;
+}
+
+// Shows the trace of the disk nearest to a point of the canvas, or no trace if no disk is near.
+function pick(px, py) {
+  const i = diskAt(px, py, 12);
+  trace(i === null ? [] : [i]);
 }
 
 function trace(some) {
@@ -213,7 +255,7 @@ function on(id, action) { $(id).addEventListener('click', action); }
 const turn = name => () => { state[name] = !state[name]; refresh(); };
 const actions = {
   play: () => play(!state.playing), first: () => step(0), last: () => { if (live.on) follow(true); else go(last()); }, back, next, event: toEvent,
-  clear: () => trace([]), follow: followOrNot, arrows: turn('arrows'), sofar: turn('sofar'), total: turn('total'),
+  clear: () => trace([]), push: () => send({ do: 'push', disk: state.traced[0] }), follow: followOrNot, arrows: turn('arrows'), sofar: turn('sofar'), total: turn('total'),
   nearer: () => zoomBy(1.5), farther: () => zoomBy(1 / 1.5),
   whole: () => { lookAtAll(); look(); }, theme: () => { theme(!dark()); refresh(); },
   full: () => { if (document.fullscreenElement) document.exitFullscreen(); else $('view').requestFullscreen(); },
@@ -237,13 +279,15 @@ function listen() {
   $('colour').addEventListener('change', () => { state.colour = $('colour').value; refresh(); });
   const stage = $('stage');
   stage.addEventListener('pointerdown', event => {
-    if (!pointers.size) moved = 0;
+    if (!pointers.size) [moved, grabbed] = [0, grabAt(...onStage(event))];
     pointers.set(event.pointerId, onStage(event));
     stage.setPointerCapture(event.pointerId);
   });
   stage.addEventListener('pointermove', pointerMoved);
-  stage.addEventListener('pointercancel', event => pointers.delete(event.pointerId));
+  stage.addEventListener('pointercancel', event => { if (pointers.delete(event.pointerId) && grabbed) release(); });
   stage.addEventListener('pointerup', event => {
+    if (grabbed && moved >= 6 * page.dots) release();
+    grabbed = null;
     if (pointers.delete(event.pointerId) && moved < 6 * page.dots) pick(...onStage(event));
   });
   stage.addEventListener('wheel', event => {

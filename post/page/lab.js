@@ -308,8 +308,8 @@ function hear(source, news) {
   } else if (news.is === 'problems') {
     if (!news.change) { showProblems(news.problems); ready(); } else if (!busy) run();  // the variable cannot change in a running simulation
   } else if (news.is === 'state') {
-    box.changes = news.changes;
-    if (box === current()) for (const [, key, value] of news.changes) if (key) state.has[key] = value;
+    box.changes = news.changes ?? box.changes;
+    if (box === current()) for (const [, key, value] of box.changes) if (key) state.has[key] = value;
     if (news.reason) tell(news.reason, true);
     toAddress();
     tellShelf();

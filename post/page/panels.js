@@ -15,6 +15,7 @@ function tell() {
   $('clock').innerHTML = `t = <b>${long(+moment.shown.toPrecision(5))}</b> · ${source.counted()}`
     + (disks > 1 ? ` · ${short(+collisions.toPrecision(3))} collisions per disk` : '');
   $('traced').hidden = !state.traced.length;
+  $('push').hidden = !isPart || state.traced.length !== 1;
   $('disk').innerHTML = state.traced.map(i =>
     `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) at <b>${short(X[i])}, ${short(Y[i])}</b>`).join('<br>');
 }

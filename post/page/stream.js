@@ -72,8 +72,9 @@ const hear = {
     Object.assign(stream.events, { next: news.next.map(own), happened: news.happened && own(news.happened) });
     if (!state.playing && source) show(moment.time, true);
   },
-  state({ playing, ended }) {
+  state({ playing, ended, reason }) {
     if (isStarting()) return;  // the message belongs to the previous run
+    if (reason && past.length && !state.playing) show(moment.time, true);  // a refused disk returns to its place
     stream.ended = ended;
     if (!playing && state.playing && stream.live && past.length && !parent.isComparing()) play(false);
   },
@@ -186,13 +187,20 @@ const fromWorker = {
 // These functions are called by the laboratory for each of its films.
 function inside() { return { film, source, state, moment, kinds, stream, overlaid, past, numbersNow, speedsOfFilm }; }
 
+// Returns where a position of the box is on the stage [CSS pixels].
+function pixelOf(x, y) { return [across(x) / page.dots, up(y) / page.dots]; }
+
 // Whether the film can show a time; a run that has ended shows its end.
 function hasReached(time) { return past.length > 0 && !isStarting() && (last() >= time || stream.ended); }
 
 // Continues when compared films have become one film, or one film several.
 function resume() { if (state.playing) source.begins(); }
 
-function reach(time) { if (!hasReached(time)) send({ do: 'reach', time }); }
+function reach(time) {
+  if (hasReached(time)) return;
+  stream.live = true;
+  send({ do: 'reach', time });
+}
 
 // Shows, while the films are paused, the time that another film shows.
 function join(time) {

@@ -31,7 +31,7 @@ from ricochet.pages.worker import FRAMES_AHEAD
 from synthetic_run import ROOT, run_script
 from whole_runs import PATIENCE, wait_for
 
-INPUTS = sorted(path.stem for path in (ROOT / "input").glob("*.nml"))
+INPUTS = sorted(json.loads((ROOT / "input/chooser.json").read_text()))
 HEAD = 6  # numbers before the positions
 
 

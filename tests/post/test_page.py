@@ -19,7 +19,7 @@ from ricochet.running.program import ProgramError
 from synthetic_run import ROOT
 from whole_runs import PATIENCE, wait_for
 
-INPUTS = sorted((ROOT / "input").glob("*.nml"))
+INPUTS = sorted(set((ROOT / "input").glob("*.nml")) - {ROOT / "input/reference.nml"})
 CHOOSER = json.loads((ROOT / "input/chooser.json").read_text())
 
 
@@ -281,6 +281,104 @@ def test_the_table_shows_the_moment_that_is_shown(opened):
         assert float(table[1][1]) == pytest.approx(rows[0]["now"], rel=1e-3)
         if key == "\ue011":
             assert [float(row[1]) for row in table[2:4]] == [1, 1]
+
+
+def pixel(browser, x, y):
+    """Return the window coordinates of a position in the box of the newest film."""
+    return browser.run(
+        """const film = filmOf(current()), frame = current().frame.getBoundingClientRect();
+        const box = film.document.getElementById('stage').getBoundingClientRect();
+        const [x, y] = film.pixelOf(...arguments);
+        return [frame.x + box.x + x, frame.y + box.y + y].map(Math.round);""",
+        x,
+        y,
+    )
+
+
+def mouse(browser, *moves):
+    """Move the mouse to window coordinates; 'down' and 'up' press and release its button."""
+    made = []
+    for one in moves:
+        if one in ("down", "up"):
+            made.append({"type": f"pointer{one.title()}", "button": 0})
+        else:
+            made.append({"type": "pointerMove", "duration": 40, "x": one[0], "y": one[1]})
+    pointer = {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}}
+    browser.call("POST", "/actions", {"actions": [{**pointer, "actions": made}]})
+
+
+def repeated(browser):
+    """Download the script of the paused newest run; return time and positions after running it."""
+    browser.run("""const old = hear; hear = (source, news) =>
+        news.is === 'file' ? window.kept = atob(news.body) : old(source, news);
+        window.kept = ''; filmOf(current()).send({ do: 'keep', part: 'script' })""")
+    wait_for(lambda: browser.run("return window.kept"))
+    script, space = browser.run("return window.kept"), {}
+    exec(script.replace("    print(", "    end = simulation.time, simulation.position  # ("), space)
+    return space["end"]
+
+
+def test_a_dragged_side_follows_the_mouse_and_then_stays(opened):
+    """The motion is a change of the running simulation, which the script repeats."""
+    run, middle = opened.run("return current().run"), pixel(opened, 1, 0.5)
+    end = pixel(opened, 0.8, 0.5)
+    steps = [[x, end[1]] for x in np.linspace(middle[0], end[0], 12).round().astype(int).tolist()]
+    mouse(opened, middle, "down", *steps)
+    right = "past.at(-1).sides[1]"
+    for _ in range(60):  # the side is not faster than the disks
+        if inside(opened, right) < 0.85:
+            break
+        mouse(opened, [end[0] + 1, end[1]], end)
+    assert 0.75 < inside(opened, right) < 0.85
+    mouse(opened, "up")
+    wait_for(
+        lambda: opened.run("return current().changes.at(-1)[2]") == "the right side is dragged"
+    )
+    opened.press("p")
+    wait_for(lambda: not inside(opened, "state.playing"))
+    place = inside(opened, right)
+    opened.press("\ue014")
+    wait_for(lambda: inside(opened, "moment.time") == inside(opened, "past.at(-1).time"))
+    assert inside(opened, right) == pytest.approx(place)
+    time, position = repeated(opened)
+    assert time == pytest.approx(inside(opened, "moment.time"))
+    assert position[:, 0].max() < place
+    assert opened.run("return [current().run, location.hash]") == [run, "#input=gas"]
+
+
+def test_a_disk_is_dragged_while_the_run_is_paused_and_gets_energy(opened):
+    opened.press("p")
+    wait_for(lambda: not inside(opened, "state.playing"))
+    at = "[inside().past.at(-1).place.slice(0, 2), inside().past.at(-1).velocity.slice(0, 2)]"
+    state = f"return (inside => {at}.map(one => [...one]))(filmOf(current()).inside)"
+    (x, y), before = opened.run(state)
+    others = opened.run("return [...filmOf(current()).inside().past.at(-1).place]")
+    others = np.reshape(others, (-1, 2))[1:]
+    rng = np.random.default_rng(1)
+    free = next(
+        p for p in rng.uniform(0.1, 0.9, (9999, 2)) if np.hypot(*(others - p).T).min() > 0.012
+    )
+    start, end = pixel(opened, x, y), pixel(opened, *free)
+    mouse(opened, start, "down", [start[0] + 9, start[1] + 9], end, "up")
+    wait_for(lambda: opened.run("return current().changes.length") == 1)
+    (x, y), velocity = opened.run(state)
+    assert [x, y] == pytest.approx(free, abs=0.004) and velocity == before
+    mouse(opened, end, "down", "up")
+    assert opened.run("return filmOf(current()).inside().state.traced") == [0]
+    opened.run("filmOf(current()).document.getElementById('push').click()")
+    wait_for(lambda: opened.run("return current().changes.length") == 2)
+    (x, y), velocity = opened.run(state)
+    assert np.sum(np.square(velocity)) == pytest.approx(2 * np.sum(np.square(before)), rel=1e-5)
+    assert opened.run("return current().changes.map(one => one[2])") == [
+        "disk 1 is moved",
+        "disk 1 gets energy",
+    ]
+    taken = pixel(opened, *others[0])
+    mouse(opened, pixel(opened, x, y), "down", [taken[0] + 9, taken[1]], taken, "up")
+    wait_for(lambda: "overlaps" in opened.run("return $('status').textContent"))
+    assert opened.run(state)[0] == [x, y] and opened.run("return current().run") == 1
+    _, position = repeated(opened)
+    assert position[0] == pytest.approx([x, y], abs=1e-6)
 
 
 def are_at_one_time(times, other_than):

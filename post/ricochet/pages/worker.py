@@ -35,8 +35,8 @@ from pathlib import Path
 import numpy as np
 
 from ..analysis.statistics import correlated_mean
-from ..reading.reader import Run
-from ..running.program import ProgramError
+from ..reading.reader import SIDES, Run
+from ..running.program import ProgramError, value_text
 from ..running.simulation import NEVER, Simulation
 from .numbers import (
     FEW_DISKS,
@@ -61,6 +61,10 @@ SCAN_SAMPLES = 160  # samples of a value in a scan
 SCAN_EVENTS = 1000  # smallest number of events in four intervals of samples
 SCAN_SECONDS = 4.0  # s that a value in a scan may take
 COUNTED = ("collisions", "dissipated_energy")  # observables that are counts since the start
+#: Variables of the motion of a side.
+MOTION = ("motion", "velocity", "start_time", "end_time", "amplitude", "period", "phase")
+MOTION += ("mass", "force")
+HOLD = 0.15  # time in which a dragged side reaches the pointer [s]
 ENDINGS = {"input": ".nml", "script": ".py", "output": ".h5.part"}
 UNREAD = bytearray()  # incomplete line at the end of the data received
 PR_SET_PDEATHSIG = 1  # option PR_SET_PDEATHSIG of prctl
@@ -81,6 +85,7 @@ class Session:
         self.samples: deque[tuple[float, ...]] = deque(maxlen=MOST_SAMPLES)
         self.last_event: tuple | None = None
         self.goal: tuple[float, int, int] | None = None  # end time of a step that is in progress
+        self.held: dict[int, dict] = {}  # number of each dragged side, and its earlier motion
         self.led = False  # whether the page sets the time of each frame
 
     # --- requests ---
@@ -98,7 +103,7 @@ class Session:
         if self.simulation:
             self.simulation.close()
         self.simulation, self.request, self.initial, self.pace = other, request, other.input, pace
-        self.actions, self.ended, self.reason = [], False, ""
+        self.actions, self.held, self.ended, self.reason = [], {}, False, ""
         self.playing, self.goal, self.led = bool(request["playing"]), None, False
         self.unconfirmed = 0
         self.send_scene(changed=False)
@@ -123,29 +128,86 @@ class Session:
         self.send_state()
 
     def change(self, request: dict) -> None:
-        """Change input variables of the running simulation."""
-        settings = request["settings"]
-        self.apply("change", settings, lambda: self.simulation._change(setting_lines(settings)))
+        """Change variables of the running simulation."""
+        self.apply("change", request["settings"])
 
     def heat(self, request: dict) -> None:
         """Multiply the velocities of all disks by the requested factor."""
         factor = float(request["factor"])
         self.apply("heat", factor, lambda: scale_velocities(self.simulation, factor))
 
-    def apply(self, what: str, value: object, change: Callable[[], object]) -> None:
-        """Apply a change at a time that a repetition of the run can reach exactly."""
+    def place(self, request: dict) -> None:
+        """Move one disk to a position."""
+        x, y = map(float, request["position"])
+        self.set_disk("position", int(request["disk"]), [x, y])
+
+    def push(self, request: dict) -> None:
+        """Double the kinetic energy of a disk; a disk at rest gets a typical velocity upwards."""
+        disk, velocity = int(request["disk"]), self.simulation.velocity
+        own = np.sqrt(2) * velocity[disk]
+        typical = float(np.sqrt(np.mean(np.sum(velocity**2, axis=1)))) or 1.0
+        self.set_disk("velocity", disk, own.tolist() if own.any() else [0.0, typical])
+
+    def set_disk(self, name: str, disk: int, value: list[float]) -> None:
+        """Set the position or the velocity of one disk."""
+        if not 0 <= disk < self.run.n_disks:
+            raise ValueError("no such disk")
+        self.apply(name, (disk, value), lambda: set_row(self.simulation, name, disk, value))
+
+    def hold(self, request: dict) -> None:
+        """Move a side at constant velocity to a position, or let it move as before.
+
+        The side is not faster than the disks.  If its earlier motion is impossible from the present
+        position, the side stays there.
+        """
+        number, target = int(request["side"]), request["to"]
+        name, inwards = f"side.{SIDES[number]}.", 1 if number % 2 == 0 else -1
+        now, known = self.simulation._settle(), self.simulation._values()
+        rest = dict.fromkeys((name + word for word in MOTION), "")
+        if target is None:
+            before = self.held.pop(number, None)
+            if before and not self.apply("hold", before, refused=False):
+                self.apply("hold", {**rest, name + "motion": "still"})
+            return
+        old = {key: value_text(key, value) for key in rest if (value := known.get(key)) is not None}
+        self.held.setdefault(number, {**rest, name + "motion": "still", **old})
+        way = float(target) - float(self.run.corners_at(now)[number % 2][number // 2])
+        typical = float(np.sqrt(np.mean(np.sum(self.simulation.velocity**2, axis=1)))) or 1.0
+        taken = max(self.pace * HOLD, abs(way) / typical, 1e-9)
+        wish = {"motion": "constant_velocity", "velocity": repr(inwards * way / taken)}
+        wish |= {"start_time": repr(now), "end_time": repr(now + taken)}
+        self.apply("hold", rest | {name + word: value for word, value in wish.items()})
+
+    def apply(
+        self,
+        what: str,
+        value: object,
+        change: Callable[[], object] | None = None,
+        refused: bool = True,
+    ) -> bool:
+        """Apply a change at a time that a repeated run can reach exactly; return whether it acts.
+
+        Without `change` the value contains settings.  With `refused` the page is told of problems.
+        """
         try:
             now = self.simulation._settle()
-            change()
+            if change:
+                change()
+            else:
+                self.simulation._change(setting_lines(value))
         except (ProgramError, ValueError) as problem:
-            refuse(problem, change=True)
-            return
+            if what == "change":
+                refuse(problem, change=True)
+            elif refused:
+                self.send_state(str(problem))
+            return False
         exact = value
-        if what == "change":
+        if change is None:
             known = self.simulation._values()
             exact = {name: known.get(name) for name in value}
         self.actions.append((now, what, value, exact))
         self.send_scene(changed=True)
+        return True
 
     def play(self, _: dict) -> None:
         """Continue the simulation."""
@@ -274,16 +336,20 @@ class Session:
             send_json({"is": "events", "next": coming, "happened": self.last_event})
             self.last_event = None
 
-    def send_state(self) -> None:
-        """Send the state of the simulation, and a list of the changes made by the user."""
+    def send_state(self, problem: str = "") -> None:
+        """Send the state of the simulation, its changes so far, and the reason of a refusal."""
         changes = [
             (when, name, value)
             for when, what, values, _ in self.actions
-            for name, value in (
-                values.items() if what == "change" else [("", f"all speeds times {values:g}")]
-            )
+            for name, value in (values.items() if what == "change" else [("", words(what, values))])
         ]
-        state = {"playing": self.playing, "ended": self.ended, "reason": self.reason}
+        # Of successive changes with the same words, such as those of a dragged side, one is sent.
+        changes = [
+            one
+            for k, one in enumerate(changes)
+            if k == 0 or one[1:] != changes[k - 1][1:] or one[1]
+        ]
+        state = {"playing": self.playing, "ended": self.ended, "reason": problem or self.reason}
         send_json({"is": "state", "changes": changes} | state)
 
     def send_numbers(self) -> None:
@@ -340,6 +406,22 @@ def refuse(reason: Exception, change: bool = False) -> None:
     send_json({"is": "problems", "change": change, "problems": problems(reason)})
 
 
+def words(what: str, value: object) -> str:
+    """Return the description of a change that is not a change of variables in the form."""
+    if what == "heat":
+        return f"all speeds times {value:g}"
+    if what == "hold":
+        return f"the {next(iter(value)).split('.')[1]} side is dragged"
+    return f"disk {value[0] + 1} {'is moved' if what == 'position' else 'gets energy'}"
+
+
+def set_row(simulation: Simulation, name: str, disk: int, value: list[float]) -> None:
+    """Set the position or the velocity of one disk of a simulation."""
+    values = np.array(getattr(simulation, name))
+    values[disk] = value
+    setattr(simulation, name, values)
+
+
 def scale_velocities(simulation: Simulation, factor: float) -> None:
     """Multiply the velocities of all disks of a simulation by a factor."""
     simulation.velocity = factor * simulation.velocity
@@ -355,6 +437,10 @@ def script(name: str, text: str, actions: list[tuple], end: float) -> str:
         lines.append(f"    simulation.advance(time={when!r})")
         if what == "heat":
             lines.append(f"    simulation.velocity = {value!r} * simulation.velocity")
+        elif what in ("position", "velocity"):
+            lines.append(f"    values = simulation.{what}.copy()")
+            lines.append(f"    values[{value[0]}] = {value[1]!r}")
+            lines.append(f"    simulation.{what} = values")
         else:
             lines.append(f"    simulation.change({value!r})")
     lines.append(f"    simulation.advance(time={end!r})")
@@ -447,7 +533,20 @@ def work(describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     session = Session(describe_scene)
     handlers = {"start": session.start, "scan": scan, "pace": session.set_pace}
-    own = ("change", "heat", "play", "pause", "got", "step", "reach", "event", "keep")
+    own = (
+        "change",
+        "heat",
+        "place",
+        "push",
+        "hold",
+        "play",
+        "pause",
+        "got",
+        "step",
+        "reach",
+        "event",
+        "keep",
+    )
     handlers |= {name: getattr(session, name) for name in own}
     while True:
         wait = None
