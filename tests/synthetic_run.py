@@ -153,3 +153,9 @@ def drawn(folder, script, *arguments):
     assert figure.stat().st_size > 10000
     with table.open() as file:
         return list(csv.DictReader(file))
+
+
+def still_run(path, position, **more):
+    """Write a run with disks at rest at the given positions of each frame."""
+    observables = {"collisions": np.zeros(len(position))}
+    return write_run(path, position, np.zeros_like(position), observables=observables, **more)

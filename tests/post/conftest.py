@@ -7,6 +7,7 @@ import pytest
 
 from browser import browsing
 from ricochet import read_run
+from synthetic_run import run_script
 from whole_runs import FINISHED, write_input
 
 
@@ -44,3 +45,16 @@ def browser(chromium):
     chromium.resize(1280, 800)
     chromium.complaints()
     return chromium
+
+
+@pytest.fixture
+def playing(browser, tmp_path):
+    """Return a function that makes the player of a run and opens it in the paused state."""
+
+    def play(path, *options):
+        assert run_script("player", path, "-o", tmp_path / "film.html", *options) == 0
+        browser.open(tmp_path / "film.html")
+        browser.run("go(first())")
+        return browser
+
+    return play

@@ -7,7 +7,7 @@ import player
 from ricochet import read_run
 from ricochet.figures.drawing import draw_box, plt
 from ricochet.reading.reader import SIDES
-from synthetic_run import maxwell_velocities, run_script, write_run, written
+from synthetic_run import maxwell_velocities, still_run, write_run, written
 from whole_runs import wait_for
 
 
@@ -26,12 +26,6 @@ def bouncing_gas(path, rng, frames=40, count=60, **more):
     kinds["observables"] = {"collisions": 30 * np.arange(frames)}
     kinds["parameters"] = {"run": {"title": "A <gas> & more", "seed": 3}}
     return write_run(path, position, velocity, **kinds | more)
-
-
-def still_run(path, position, **more):
-    """Write a run with disks at rest at the given positions of each frame."""
-    observables = {"collisions": np.zeros(len(position))}
-    return write_run(path, position, np.zeros_like(position), observables=observables, **more)
 
 
 def filmed(run, frames, traced=()):
@@ -109,19 +103,6 @@ HOSTILE = (
     "<!--<script>",
     "{{data}}&lt;b onload='x'",
 )
-
-
-@pytest.fixture
-def playing(browser, tmp_path):
-    """Return a function that makes the player of a run and opens it in the paused state."""
-
-    def play(path, *options):
-        assert run_script("player", path, "-o", tmp_path / "film.html", *options) == 0
-        browser.open(tmp_path / "film.html")
-        browser.run("go(first())")
-        return browser
-
-    return play
 
 
 @pytest.mark.parametrize("text", HOSTILE)
@@ -584,57 +565,3 @@ def test_box_and_controls_are_seen_without_scrolling(browser, playing, tmp_path,
     if size == "wide":
         assert boxes["energy"]["right"] > 1860 and boxes["energy"]["bottom"] < 1080
     assert browser.complaints() == []
-
-
-# --- disks that can be seen ---
-
-
-def test_species_are_striped_and_never_look_like_a_hole(playing, tmp_path):
-    """The centre of each disk is coloured; the legend names only visible patterns."""
-    x = np.array([[[0.2, 0.5], [0.5, 0.5], [0.8, 0.5]]] * 2)
-    kinds = {"species": [1, 2, 3], "names": ("a", "b", "c"), "radius": [0.1, 0.1, 0.004]}
-    browser = playing(still_run(tmp_path / "a.h5", x, **kinds))
-    words = browser.run("return kinds.map((_, s) => patternOf(s))")
-    assert words == ["", ", striped", ""]
-    for disk, striped in ((0, False), (1, True)):
-        centre, column = browser.run(
-            """const at = dy => pixels[Math.round(up(Y[arguments[0]] + dy)) * page.width
-                + Math.round(across(X[arguments[0]]))];
-            const heights = Array.from({ length: 91 }, (_, k) => (k - 45) / 500);
-            const own = palette[arguments[0]], between = heights.filter(dy => at(dy) === paper);
-            return [at(0) === own, between.length]""",
-            disk,
-        )
-        assert centre and (column > 5) == striped
-
-
-def test_small_disks_far_apart_are_drawn_large_enough_and_the_page_says_so(playing, tmp_path):
-    x = np.broadcast_to(np.array([[0.2, 0.2], [0.8, 0.8]]), (2, 2, 2))
-    for radius, words in ((1e-4, True), (0.05, False)):
-        browser = playing(still_run(tmp_path / f"{words}.h5", x, radius=radius))
-        least, said = browser.run("return [radii[0] / page.dots, $('between').textContent]")
-        assert least >= 3 and ("drawn larger" in said) == words
-
-
-def test_the_arrows_of_a_film_have_a_scale(playing, tmp_path, rng):
-    """The arrow of a round speed is as long as that of a disk of this speed, at any zoom."""
-    v = rng.normal(size=(2, 12, 2))
-    observables = {"collisions": np.zeros(2)}
-    path = write_run(tmp_path / "a.h5", 0 * v + 0.5, v, observables=observables)
-    browser = playing(path)
-    for zoom in (1, 4):
-        words, key, speed = browser.run(
-            """camera.zoom = arguments[0]; state.arrows = true; refresh();
-            const words = [], { fillText } = marks;
-            marks.fillText = (text, x) => {
-              if (`${text}`.startsWith("speed")) words.push([text, x / page.dots]);
-            };
-            drawMarks();
-            marks.fillText = fillText;
-            return [words, arrowScale() / page.dots, film.scales.speed[1]];""",
-            zoom,
-        )
-        ((text, x),) = words
-        shown = float(text.removeprefix("speed "))
-        assert shown == pytest.approx(speed, rel=0.5)
-        assert x - 18 == pytest.approx(shown * key, rel=1e-3)
