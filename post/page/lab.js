@@ -109,7 +109,7 @@ function buildSlider(spec) {
   const { key, at } = spec, id = 'slide.' + key + at;
   const range = make('input', { type: 'range', min: 0, id }), field = make('input', { inputMode: 'text', spellcheck: false });
   const row = make('div', { className: 'slider' }, make('label', { htmlFor: id, textContent: spec.words }),
-    make('small', { textContent: acts(key) ? 'changes this run' : 'starts a new run' }), make('div', {}, range, field), make('p', { className: 'problem' }));
+    make('small', { textContent: acts(key) ? 'at once' : 'new run' }), make('div', {}, range, field), make('p', { className: 'problem' }));
   field.setAttribute('aria-label', `${spec.words}: value`);
   let values;
   range.addEventListener('input', () => set(key, textWith(spec, String(values[range.value]))));

@@ -86,7 +86,7 @@ function roomOfStage() {
   const height = document.documentElement.clientHeight - (full ? 0 : $('top').offsetHeight) - inner('paddingTop') - inner('paddingBottom') - 2;
   if (cssColour('flat')) return { width: width - Math.max(260, 0.45 * width), height };
   const between = bare ? $('speeds').offsetHeight : 0;
-  return { width, height: Math.max(full ? 100 : isPart ? 200 : 300, height - $('controls').offsetHeight - between - 16) };
+  return { width, height: Math.max(full ? 100 : isPart ? 140 : 300, height - $('controls').offsetHeight - between - 16) };
 }
 
 // Disks that would be too small to be visible are drawn enlarged, and a note on the page tells the user that they are enlarged.

@@ -103,7 +103,7 @@ function fitScales(mean) {
 }
 
 function setTop(top) {
-  film.scales = { speed: ['speed (reduced units)', top], displacement: ['displacement', Math.max(...film.edges) / 4] };
+  film.scales = { speed: ['speed', top], displacement: ['displacement', Math.max(...film.edges) / 4] };
   setBins(1.3 * top, film.rest);
 }
 

@@ -610,6 +610,17 @@ def test_a_scan_beside_a_kept_run_is_seen_and_moves_nothing(opened):
         wait_for(lambda: opened.run("return scan.points.length") == 5)
 
 
+def test_every_title_fits_into_a_telephone_and_the_controls_are_seen(opened):
+    opened.resize(360, 740, True)
+    for one in CHOOSER.values():
+        opened.run("$('name').textContent = arguments[0]", one["title"])
+        wide = opened.run("return [document.documentElement.scrollWidth, innerWidth]")
+        assert wide == [360, 360], one["title"]
+    ends = """const play = filmOf(current()).document.getElementById('play');
+        return [play.getBoundingClientRect().bottom, current().frame.clientHeight]"""
+    wait_for(lambda: opened.run(f"{ends}.reduce((play, frame) => play <= frame)"))
+
+
 SIZES = [(1280, 800, False), (1920, 1080, False), (820, 1180, False), (390, 844, True)]
 
 
