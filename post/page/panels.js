@@ -346,7 +346,8 @@ function tellNumbers() {
     ? Object.entries(texts).filter(([name]) => some(own, name === 'mean' ? 'value' : name)).map(([name, text]) => [name, own, text])
     : runs.flatMap(([letter, rows]) => [[letter, rows, one => one.value === null ? seen(one.now) : withError(one)],
       ...(some(rows, 'theory') ? [['theory', rows, texts.theory]] : [])]);
-  const cells = (row, tag) => `<tr>${row.map(one => `<${tag}>${one}</${tag}>`).join('')}</tr>`;
+  const kind = k => columns[k - 1]?.[0] === 'theory' ? ' class="law"' : '';
+  const cells = (row, tag) => `<tr>${row.map((one, k) => `<${tag}${kind(k)}>${one}</${tag}>`).join('')}</tr>`;
   $('numbers').innerHTML = cells(['', ...columns.map(([name]) => name)], 'th') + own.map(({ name }) => [safe(name),
     ...columns.map(([, rows, text]) => text(rows.find(one => one.name === name) ?? { now: null, value: null, theory: null }))])
     .filter(row => row.slice(1).some(Boolean)).map(row => cells(row, 'td')).join('');
