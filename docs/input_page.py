@@ -64,8 +64,8 @@ def said(program: Path, *words: str) -> str:
 def variables(program: Path) -> dict[str, dict[str, dict]]:
     """Return the input variables of each group of `GROUPS`.
 
-    Variables that are common to all kinds of boundaries form a separate group.  Numbers are texts
-    in the format of the program.
+    Variables that are common to all kinds of boundaries form a separate group.  Numbers in the
+    table of variables are stored as texts in the format of the program.
     """
     table = json.loads(said(program, "--print-variables"), parse_float=str, parse_int=str)
     walls = [table[group] for group in ("side", "obstacle", "wall")]
@@ -93,7 +93,7 @@ def shared(walls: list[dict[str, dict]], name: str) -> bool:
 
 
 def condition(group: str, entry: dict) -> str:
-    """Return the choice that makes a variable apply, or an empty text if it always applies."""
+    """Return the setting that makes a variable apply, or an empty text if none is needed."""
     if not entry["goes_with"]:
         return ""
     [(choice, words)] = entry["goes_with"].items()

@@ -2,7 +2,7 @@
 
 python docs/manual_page.py build/ricochet PREFIX > ricochet.1
 
-The version number is taken from the program `ricochet` in the folder of the command.
+The version number is taken from the program `ricochet` in the folder that contains the command.
 """
 
 import re
