@@ -60,7 +60,7 @@ class Snapshot(np.ndarray):
         return array[()] if return_scalar else np.asarray(array)
 
     def __setitem__(self, index: Any, value: Any) -> None:
-        """Raise an error, because the assignment would not change the simulation."""
+        """Raise an error: an assignment to a read-only copy would not change the simulation."""
         if not self.flags.writeable:
             raise ValueError(
                 "read-only: this array is a copy of the simulation's; change a copy of it, and "

@@ -119,8 +119,8 @@ class BoxResults(Results):
 def outmost(side: Mapping[str, Any]) -> float:
     """Return the largest outward displacement of a side during the run [length].
 
-    The reference is the mean position of an oscillating side, or the initial position of a side
-    that moves at constant velocity.
+    The displacement is measured from the mean position of an oscillating side, or from the initial
+    position of a side that moves at constant velocity.
     """
     if side.get("motion") == "constant_velocity":
         return max(0.0, -float(side["velocity"]) * float(side["end_time"] - side["start_time"]))
@@ -130,8 +130,8 @@ def outmost(side: Mapping[str, Any]) -> float:
 def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
     """Return the inward displacement of a moving side at the given times.
 
-    The reference is the mean position of an oscillating side, or the initial position of a side
-    that moves at constant velocity.  The formulae are in docs/theory.md.
+    The displacement is measured from the mean position of an oscillating side, or from the initial
+    position of a side that moves at constant velocity.  The formulae are in docs/theory.md.
     """
     if side.get("motion") == "constant_velocity":
         start, end = side["start_time"], side["end_time"]

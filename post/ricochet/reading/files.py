@@ -26,7 +26,7 @@ class RunError(Exception):
 class Unsound(Exception):
     """Error for invalid contents of a file.
 
-    `open_file` adds the path of the file to the message.
+    The function `open_file` adds the path of the file to the error message.
     """
 
 
@@ -110,11 +110,11 @@ class TemporaryFolder:
 
     The folder is removed when no object refers to it any longer.  If a worker process returns a run
     to its parent process, the parent process removes the folder.  If a run is sent to worker
-    processes, the folder is removed when the sending process ends.
+    processes, the sending process removes the folder when it ends.
     """
 
     def __init__(self, path: Path | None = None):
-        """Create a folder, or become responsible for the folder of a worker process."""
+        """Create a folder, or take over the folder of a worker process in order to remove it."""
         self.path = Path(tempfile.mkdtemp(prefix="ricochet-")) if path is None else path
         self.removal = Finalize(self, shutil.rmtree, (self.path, True), exitpriority=PRIORITY)
 
@@ -132,7 +132,7 @@ class TemporaryFolder:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the folder, and determine which process will remove the folder."""
+        """Prepare the object for pickling, and determine which process will remove the folder."""
         in_worker = multiprocessing.parent_process() is not None
         self.removal.cancel() if in_worker else self.keep()
         return received, (self.path, in_worker)
@@ -141,7 +141,7 @@ class TemporaryFolder:
 def received(path: Path, sent_by_worker: bool) -> TemporaryFolder | None:
     """Return the folder of a run that a worker process has sent.
 
-    The result is None if the run comes from the parent process, because the parent process will
-    remove the folder.
+    The function returns None if the run was sent by the parent process, because the parent process
+    will remove the folder.
     """
     return TemporaryFolder(path) if sent_by_worker else None

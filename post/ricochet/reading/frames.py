@@ -1,7 +1,7 @@
 """Types for quantities of the disks in all frames, and for time series of observables.
 
-Objects of both types can be used like arrays in expressions and in NumPy functions, for example
-`run.velocity * 2`, `run.observable("all/temperature").mean()`.
+The quantities and the time series can be used like arrays in expressions and in NumPy functions,
+for example `run.velocity * 2`, `run.observable("all/temperature").mean()`.
 """
 
 from collections.abc import Iterator
@@ -37,23 +37,23 @@ class Values(NDArrayOperatorsMixin):
         return getattr(function, method)(*arrays, **options)
 
     def mean(self, axis: Any = None, **options: Any) -> Any:
-        """Return the mean of all values or along an axis; see `numpy.mean`."""
+        """Return the mean of all values, or the means along an axis; see `numpy.mean`."""
         return np.asarray(self).mean(axis, **options)
 
     def std(self, axis: Any = None, **options: Any) -> Any:
-        """Return the standard deviation of all values or along an axis; see `numpy.std`."""
+        """Return the standard deviation, of all values or along an axis; see `numpy.std`."""
         return np.asarray(self).std(axis, **options)
 
     def sum(self, axis: Any = None, **options: Any) -> Any:
-        """Return the sum of all values or along an axis; see `numpy.sum`."""
+        """Return the sum of all values, or the sums along an axis; see `numpy.sum`."""
         return np.asarray(self).sum(axis, **options)
 
     def min(self, axis: Any = None, **options: Any) -> Any:
-        """Return the minimum of all values or along an axis; see `numpy.min`."""
+        """Return the minimum of all values, or the minima along an axis; see `numpy.min`."""
         return np.asarray(self).min(axis, **options)
 
     def max(self, axis: Any = None, **options: Any) -> Any:
-        """Return the maximum of all values or along an axis; see `numpy.max`."""
+        """Return the maximum of all values, or the maxima along an axis; see `numpy.max`."""
         return np.asarray(self).max(axis, **options)
 
 

@@ -69,7 +69,7 @@ SETTLED = TRAITS.keys() - UNSETTLED
 class Refused(RunError):
     """Error for a run to which a theory does not apply.
 
-    The message contains the reason.
+    The error message contains the reason why the theory does not apply.
     """
 
 
@@ -136,7 +136,8 @@ def nature_of(
     beta = float(contact.get("tangential_restitution", -1.0))
     pairs = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
     # If collisions of two disks dissipate energy, the run has the trait "inelastic" from the start.
-    # If only walls dissipate energy, the run has this trait after the first loss of energy.
+    # If only walls dissipate energy, the run has the trait "inelastic" after the first loss of
+    # energy.
     slips = beta > -1 and (beta < 1 or contact.get("friction") is not None)
     inelastic = len(mass) > 1 and (pairs.min() < 1 or slips)
     found = {
@@ -205,14 +206,14 @@ def rows_of(group: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def known(value: Any) -> bool:
-    """Return whether the input specifies this value, which is None, NaN or 0 if not specified."""
+    """Return whether the input specifies `value`; an unspecified value is None, NaN or 0."""
     return value is not None and bool(np.isfinite(value)) and float(value) > 0
 
 
 def allow(run: Any, law: str, *traits: str) -> None:
     """Raise an error if the run has a trait that is not in the list `traits`.
 
-    `law` is the end of the error message.
+    The text `law` is the end of the error message.
     """
     for trait, reason in TRAITS.items():
         if trait in run.nature and trait not in traits:

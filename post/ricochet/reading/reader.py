@@ -258,8 +258,8 @@ class Run(BoxResults):
         """Return the frames as an xarray Dataset; the package xarray must be installed.
 
         The dimensions are "time", "disk" and "component" ("x" and "y").  The variables are all
-        quantities of the frames, and the mass, radius and species of each disk.  The attributes are
-        the path of the file and the seed.
+        quantities of the frames, and the mass, radius and species of each disk.  The attributes of
+        the Dataset are the path of the output file and the seed of the run.
 
         Returns
         -------

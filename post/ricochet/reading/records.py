@@ -10,8 +10,8 @@ class EventLog(NamedTuple):
 
     An event is a collision of disk `i` with another disk or with a boundary.  If `j` is positive,
     `j` is the id of the second disk.  The values 0, -1, -2 and -3 of `j` denote the left, right,
-    bottom and top side of the box.  The values -4, -5, ... denote first the circular obstacles,
-    then the straight walls.  `momentum_change` is the momentum change of disk `i`.
+    bottom and top side of the box.  The values -4, -5, ... of `j` denote the circular obstacles,
+    followed by the straight walls.  `momentum_change` is the momentum change of disk `i`.
     """
 
     time: np.ndarray
@@ -74,8 +74,8 @@ class Species(NamedTuple):
 class Restitution(NamedTuple):
     """Coefficient of normal restitution of a pair of disks.
 
-    If `law` is "constant", the coefficient is `xi` for all impact velocities.  Otherwise the
-    coefficient depends on the impact velocity below `speed`, and is `xi` above `speed`.
+    If `law` is "constant", the coefficient is `xi` for all impact velocities.  For any other `law`,
+    the coefficient depends on the impact velocity below `speed`, and is `xi` above `speed`.
     """
 
     xi: float
@@ -88,14 +88,14 @@ class Restitution(NamedTuple):
 
     @property
     def name(self) -> float | str:
-        """The coefficient if it is constant; otherwise a text that names the law."""
+        """Constant coefficient of restitution, or the name of its velocity-dependent law."""
         return self.xi if self.law == "constant" else f"{self:g}"
 
     def at(self, g: np.ndarray) -> np.ndarray:
         """Return the coefficients of restitution for an array `g` of normal impact velocities.
 
-        The coefficient is 1 - y + c y^2, where y is proportional to g^(1/5): see Ramirez et al.,
-        Phys. Rev. E 60, 4465 (1999).
+        The coefficient is 1 - y + c y^2, where y is proportional to g^(1/5): see Ramirez and
+        others, Physical Review E 60, 4465 (1999).
         """
         c = {"power": 0.0, "viscoelastic": 0.6}[self.law]
         y = 2 * (1 - self.xi) / (1 + np.sqrt(1 - 4 * c * (1 - self.xi)))

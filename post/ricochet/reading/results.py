@@ -202,8 +202,9 @@ class Results:
     def collisions_per_disk_at(self, time: np.ndarray) -> np.ndarray:
         """Return the mean number of collisions with other disks per disk at the given times.
 
-        The number is interpolated between the samples of the observables.  If the file has more
-        frames than such samples, the interpolation also uses the event counts of the frames.
+        The number of collisions is interpolated between the samples of the observables.  If the
+        file has more frames than samples of the observables, the interpolation also uses the event
+        counts of the frames.
 
         Parameters
         ----------
