@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Commands such as ricochet-player and ricochet-lab, one for each script in post/.
 
-`make install` copies this file to the names of the commands.  Commands that pip installs call the
-function `main`.  The scripts use the simulation program in the folder of the command, if that
-folder contains the program and the environment variable RICOCHET is not set.
+For each command, `make install` makes a copy of this file with the name of the command.  A command
+that pip has installed calls the function `main`.  If the environment variable RICOCHET is not set
+and the folder of the command contains the simulation program, the scripts use this program.
 """
 
 import os
@@ -12,8 +12,8 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-#: If the package was installed by pip, the scripts are inside the package.  In a source tree they
-#: are in the folder that contains the package.
+#: If the package was installed by pip, the scripts are inside the package.  In a source tree the
+#: scripts are in the folder that contains the package.
 SCRIPTS = HERE / "post" if (HERE / "post").is_dir() else HERE.parent
 #: Commands that are not Python scripts, with their paths in a source tree.
 IN_CLONE = {"ricochet": "build/ricochet", "ricochet-ensemble": "runs/ensemble.sh"}

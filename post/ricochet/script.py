@@ -163,9 +163,9 @@ def distinct(runs: list[Run]) -> list[Run]:
 
 
 def joined(words: Iterable[str]) -> list[str]:
-    """Join each list such as '-10:' to the option before it, as argparse requires.
+    """Join each list such as '-10:' to the preceding option, as in '--frames=-10:'.
 
-    Otherwise argparse would interpret the list as an option.
+    If the list were a separate word, argparse would interpret the list as an option.
     """
     result: list[str] = []
     for word in words:
@@ -183,10 +183,9 @@ def command_line(
 
     The script accepts a single run if `one` is true, and any number of runs otherwise.  `output` is
     the default name of the output file.  Duplicate runs are ignored unless `repeated` is true.
-    Unfinished runs are ignored unless the script sets the default `paired` to true.  If `csv` is
-    true, the script has the option --csv.  Each further keyword argument names one of the
-    `OPTIONS`; the value of the argument is the default of the option, where None means that the
-    option has no default.
+    Unfinished runs are ignored, except in a script that sets the parser default `paired` to true.
+    If `csv` is true, the script has the option --csv.  Each further keyword argument names one of
+    the `OPTIONS` and specifies its default; None means that the option has no default.
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
@@ -233,8 +232,8 @@ def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | No
 def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
     """Return the frames of --frames in the steady state, at least --min-separation apart.
 
-    If no frame satisfies these conditions, the last frame is returned.  A warning is added to
-    `args.notes` if there are fewer frames than requested, or if the frames are too early.
+    If no frame of --frames is in the steady state, the last frame is returned.  A warning is added
+    to `args.notes` if there are fewer frames than requested, or if the frames are too early.
     """
     frames, start = (
         chosen_frames(run, args.frames, None),
@@ -363,7 +362,7 @@ def over_runs(
 
 
 def spread(results: dict[str, dict]) -> dict[str, np.ndarray]:
-    """Convert groups of results to table columns; estimates become two columns.
+    """Convert groups of results to table columns: one for a number, two for an estimate.
 
     The key of each group is appended to the names of its columns.
     """

@@ -60,7 +60,7 @@ async def guarded(request: web.Request, handler: Callable) -> web.StreamResponse
 
 
 def application(paths: Mapping[str, Callable], frames: str = "'none'") -> web.Application:
-    """Return a web application that calls a function for each path.
+    """Return a web application that answers each request by the function for the requested path.
 
     `frames` lists the origins of web pages that may embed pages of this server in an HTML frame.
     """
@@ -135,7 +135,7 @@ class Live:
     """Film of a run that may still continue.
 
     The output file is opened without a lock for each request, and only completely written data are
-    read.  Therefore the running simulation is not disturbed.
+    read.  Therefore the requests do not disturb the running simulation.
     """
 
     def __init__(self, run: Run, make_film: Callable[[Run], dict]) -> None:
@@ -161,7 +161,8 @@ class Live:
         """Return the film unless the page has it already, and whether the run has ended."""
         with self.lock:
             end = self.end
-            # If the simulation program is just renaming the file, the next request will succeed.
+            # If a request fails because the simulation program is renaming the file, the next
+            # request will succeed.
             with suppress(RunError, FileNotFoundError):
                 run = read_run(self.part if self.part.exists() else self.final)
                 stamp = f"{run.n_frames} {end}"
@@ -214,8 +215,8 @@ def serve(
     """Show a run until it ends or a signal arrives, and return why the server stopped.
 
     The server stops when the run has ended, or after Ctrl-C or the signal TERM.  The function calls
-    `open_page` with the address of the page.  It raises RunError if the file cannot be shown, or if
-    the simulation program was killed.
+    `open_page` with the address of the page.  The function raises RunError if the file cannot be
+    shown, or if the simulation program was killed.
     """
     if run.path.suffix != ".part":
         raise RunError(f"{run.path}: has finished; leave out --live")

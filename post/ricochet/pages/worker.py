@@ -1,16 +1,16 @@
 """Worker process of the laboratory, which simulates and sends frames to a web page.
 
 The worker process reads requests from standard input; each request is one line of JSON.  Each
-answer on standard output begins with a letter and with its length in four bytes.  The letter b
-denotes a frame, and the letter t a JSON object.  The member "is" of a JSON object names the kind of
-the answer: "scene" (the constant part of the picture), "numbers", "events" (the next events),
-"state", "problems", "file" or "scan".  The page confirms with the request "got" that it has drawn a
-frame.  The worker process waits while two frames are unconfirmed.
+answer on standard output begins with a letter and with its length in four bytes.  An answer with
+the letter b is a frame, and an answer with the letter t is a JSON object.  The element "is" of each
+JSON object is the kind of the answer: "scene" (the constant part of the picture), "numbers",
+"events" (the next events), "state", "problems", "file" or "scan".  The page confirms with the
+request "got" that it has drawn a frame.  The worker process waits while two frames are unconfirmed.
 
 A frame consists of binary numbers in the byte order of the computer.  The first six numbers have 8
 bytes: the time, the number of collisions per disk, and the positions of the left, right, bottom and
-top side.  All following numbers have 4 bytes: the positions x, y of all disks, their velocities,
-and the angles of rotating disks.
+top side.  All numbers after the first six have 4 bytes: the positions x, y of all disks, their
+velocities, and the angles of rotating disks.
 
 Changes are applied only at times at which no event is partly processed.  Therefore the Python
 script that the function `script` returns can repeat the run bit for bit.
@@ -74,7 +74,7 @@ class Session:
     """The simulation that a page shows, and the pace at which the simulation advances."""
 
     def __init__(self, describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
-        """Store the function that returns the constant part of a picture as values and arrays."""
+        """Store the function that describes the constant part of a picture by values and arrays."""
         self.describe_scene = describe_scene
         self.simulation: Simulation | None = None
         self.playing, self.ended, self.reason = False, False, ""
@@ -466,8 +466,8 @@ def send_json(message: dict) -> None:
 def requests(wait: float | None) -> list[dict]:
     """Return all requests that have arrived.
 
-    If no request has arrived, the function waits for one.  The argument `wait` is the longest time
-    to wait [s]; None means without limit.
+    If no request has arrived, the function waits for one.  The function waits at most `wait`
+    seconds, or without limit if `wait` is None.
     """
     if select.select([0], [], [], wait)[0]:
         data = os.read(0, 1 << 20)
@@ -484,7 +484,7 @@ def requests(wait: float | None) -> list[dict]:
 def scan(request: dict) -> None:
     """Simulate several values of an input variable, and send the result for each value.
 
-    If a value cannot be simulated, the error message is sent instead.
+    If the simulation of a value fails, the error message is sent instead of a result.
     """
     for index, value in enumerate(request["values"]):
         try:
