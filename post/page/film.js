@@ -47,8 +47,8 @@ function upTo(values, value, number = one => one) {
 const frameAt = time => Math.max(0, upTo(past, time, frame => frame.time) - 1);  // the last frame that is not later
 const frameTime = k => past[clamp(k, 0, past.length - 1)].time;
 
-// Stores in a frame how many periods each disk has crossed since the first frame, in the order x1 y1 x2 y2 .... The function
-// `moved` returns the numbers of periods crossed since the previous frame.
+// Stores in a frame how many periods each disk has crossed since the first frame, in the order x1 y1 x2 y2 .... For each coordinate
+// of a disk, the function `moved` returns the number of periods crossed since the previous frame.
 function cross(frame, moved) {
   const before = past.at(-1);
   if (film.periodic.some(Boolean)) frame.crossed = new Int16Array(2 * disks).map((_, k) => before ? before.crossed[k] + moved(before, k) : 0);
@@ -108,8 +108,8 @@ function move(time) {
   Object.assign(moment, { kinetic: kinetic.map(mean), potential: potential.map(mean) });
 }
 
-// Returns the positions of the left, right, bottom and top side of the box at a given time. These positions are used only for
-// drawing.
+// Returns the positions of the left, right, bottom and top side of the box at a given time. The positions that this function
+// returns are used only for drawing.
 function sidesAt(time) {
   return past[moment.frame].sides ?? film.sides.map(({ place, motion, amplitude, period, phase, velocity, start_time: start, end_time: end, way }, k) => {
     if (way?.[0].length > 1) {

@@ -95,7 +95,7 @@ function mostOf({ key, to = Infinity }) {
   return isFinite(most) ? Math.min(to, most) : to;
 }
 
-// Returns different rounded values that cover the range of a slider.
+// Returns rounded values, without repetitions, that cover the range of a slider.
 function valuesOf(spec, steps) {
   const { key, from, to, log } = spec, top = mostOf(spec), whole = variableOf(key).type === 'integer';
   const unit = whole ? 1 : 10 ** Math.floor(Math.log10((to - from) / 100));
@@ -284,8 +284,8 @@ function run() {
   if (isThere(box)) begin(); else box.frame.addEventListener('load', begin, { once: true });
 }
 
-// If a running simulation allows the change of a variable, the change takes effect while the slider moves. Otherwise the change
-// starts a new run.
+// If a running simulation allows the change of a variable, the change takes effect while the slider moves. If a change cannot take
+// effect in a running simulation, the change starts a new run.
 function changed(key) {
   if (busy || !acts(key) || !current()?.run) { run(); return; }
   latest[key] = state.settings[key] ?? givenAs(key);
@@ -323,8 +323,8 @@ function hear(source, news) {
 function ready() { busy = 0; if (again) run(); }
 
 // Shows each error message once, beside the variable that caused the error. If the message names no variable, it is shown beside
-// the variable that changed last. The refused text stays visible in the form, but the variable keeps its old value. All other
-// changes take effect.
+// the variable that changed last. The refused text stays visible in the form, but the variable keeps its old value. All changes
+// that cause no error take effect.
 function showProblems(problems) {
   const changes = () => Object.keys({ ...state.has, ...state.settings }).filter(differs), before = changes();
   for (const { place, text } of problems) {

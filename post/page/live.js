@@ -39,7 +39,7 @@ function tellLive(end) {
     + (live.newest ? 'the film follows it.' : 'End follows it.') : '';
 }
 
-// Switches on or off that the film follows the newest frame.
+// Sets whether the film follows the newest frame.
 function follow(newest) {
   if (!live.on) return;
   live.newest = newest;

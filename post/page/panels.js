@@ -159,8 +159,8 @@ function setBins(most, resting) {
   film.speeds = { rest, edges: Array.from({ length: 41 }, (_, k) => rest ? most * 10 ** (k / 10 - 4) : most * k / 40) };
 }
 
-// Returns the fraction of the disks of each species in each bin of the histogram. The fractions are taken at the time shown, or
-// over all frames received so far.
+// Returns the fraction of the disks of each species in each bin of the histogram. The fractions are calculated for the time shown,
+// or as means over all frames received so far.
 function speedsNow() {
   const { edges, rest } = film.speeds, bins = edges.length - 1, width = edges[1] - edges[0];
   const bin = speed => rest ? speed > 0 ? Math.max(1, upTo(edges, speed)) : 0 : Math.floor(speed / width);

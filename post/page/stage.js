@@ -14,7 +14,8 @@ const cssColour = name => getComputedStyle(document.documentElement).getProperty
 const css = rgb => `rgb(${rgb})`;
 
 // In both colour themes the disks have a contrast of at least 3:1 to the background. The luminance increases along each colour
-// scale and differs between species. Therefore values and species can be distinguished in greyscale.
+// scale and differs between species. Therefore the colours of different values or of different species can be distinguished in
+// greyscale.
 const VIRIDIS = [[68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141], [39, 173, 129], [92, 200, 99], [170, 220, 50], [253, 231, 37]];
 const LIGHTS = { false: [0.02, 0.29, [0.11, 0.28, 0.04, 0.2, 0.07]], true: [0.14, 0.85, [0.27, 0.5, 0.14, 0.38, 0.2]] };
 const toLinear = part => part <= 10.3 ? part / 3294.6 : ((part / 255 + 0.055) / 1.055) ** 2.4;
@@ -36,8 +37,8 @@ function scaleColour(place) {
   return withLuminance(VIRIDIS[k].map((part, c) => part + (at - k) * (VIRIDIS[k + 1][c] - part)), low + (high - low) * place / 255);
 }
 
-// Each of these functions returns the value of one quantity for a disk at the time shown, scaled to the range from 0 to 1. Colours
-// by species are chosen without such a function.
+// Each function in `quantities` returns the value of one quantity for a disk at the time shown, scaled to the range from 0 to 1.
+// If colours show the species, no function in `quantities` is used.
 const quantities = {
   speed: i => Math.sqrt(VX[i] * VX[i] + VY[i] * VY[i]) / film.scales.speed[1],
   displacement: i => displacement(i) / film.scales.displacement[1],
@@ -103,9 +104,9 @@ function drawStage() {
   drawMarks();
 }
 
-// Sets the line style of a side of the box or of an obstacle. The hottest thermal boundaries have the colour for hot, and all other
-// thermal boundaries the colour for cold. Sliding boundaries are drawn with moving dashes. Returns true if the boundary is thermal
-// or slides.
+// Sets the line style of a side of the box or of an obstacle. The hottest thermal boundaries are drawn in the colour for hot
+// boundaries, and all other thermal boundaries in the colour for cold boundaries. Sliding boundaries are drawn with moving dashes.
+// Returns true if the boundary is thermal or slides.
 const actsOn = law => !!(law && (law.temperature || law.surface_velocity));
 function drawLike(law, along = 1) {
   const dash = 7 * page.dots;
@@ -189,7 +190,7 @@ function inBox(brush, action) {
 
 // ---------- drawing of the disks ----------
 
-// The disks are drawn pixel by pixel into an array, which is much faster than to draw thousands of arcs on the canvas. Disks of
+// The disks are drawn pixel by pixel into an array, which is much faster than drawing thousands of arcs on the canvas. Disks of
 // different species are distinguished by stripes if the disks are large enough. Pattern 0 is plain, 1 has horizontal stripes, 2
 // vertical stripes, and 3 both. The background is visible between the stripes.
 const SMALLEST_PATTERN = 3.5, PATTERNS = [0, 1, 2, 3];
@@ -226,8 +227,9 @@ function drawDisk(x, y, radius, colour, stripes, [left, top, right, bottom]) {
   }
 }
 
-// Returns the new value of a pixel at the rim of a disk. The disk covers a fraction of the pixel, which is expressed by a number
-// from 0 to 255. If several disks cover parts of the pixel, their colours are mixed and the covered fractions are added.
+// Returns the new value of a pixel at the rim of a disk. The argument `covered` is the fraction of the pixel that the disk covers,
+// expressed by a number from 0 to 255. If several disks cover parts of the pixel, their colours are mixed and the covered fractions
+// are added.
 function painted(old, colour, covered) {
   const there = old >>> 24;
   if (there === 0) return colour & 0xffffff | covered << 24;
@@ -254,7 +256,8 @@ function drawMarks() {
   if (state.arrows) drawArrowKey();
 }
 
-// Draws a line from the centre of each disk to its rim, which shows the orientation of the disk. Small disks have no such line.
+// Draws a line from the centre of each disk to its rim, which shows the orientation of the disk. In small disks no orientation line
+// is drawn.
 const LEAST_TO_TURN = 2;
 function drawRadii() {
   marks.strokeStyle = ink.stage;

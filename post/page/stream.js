@@ -241,7 +241,7 @@ function replay() {
   play(true);
 }
 
-// Shows the film as one of several films with pictures of the given size. Without `size`, the film fills the whole page.
+// Shows the film beside other films, with a picture of the given size. If no `size` is given, the film fills the whole page.
 let boxSize = null;
 function arrange(size, bare) {
   boxSize = size;
