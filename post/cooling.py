@@ -4,15 +4,16 @@
 
 Runs with the same coefficient of restitution xi are combined, and lines show means over the runs.
 The panels of the first row, one for each xi, show the mean kinetic energy per disk against time in
-the units of the input.  The bands in these panels contain 95 % of single runs.  The width of the
-bands is measured if there are at least four runs; otherwise it is estimated from the numbers of
-disks.  The panels of the second row compare all values of xi on a logarithmic axis.  They show the
-kinetic energy per disk of each species, divided by the initial mean over all disks; bands show the
-errors of the means.  The third row shows the ratio of the temperatures of the heaviest and the
-lightest species, which is 1 in equilibrium.  The third row is omitted if all masses are equal. If
-there are fewer than four runs, the half-width of the band in the third row is twice the standard
-deviation over single runs.  The table contains the reduced energies against collisions per disk,
-and the energies in the units of the input against time.
+the units of the input.  The bands in the first row contain the results of 95 % of single runs.  The
+width of the bands in the first row is measured if there are at least four runs; otherwise the width
+is estimated from the numbers of disks.  The panels of the second row compare all values of xi on a
+logarithmic axis.  The second row shows the kinetic energy per disk of each species, divided by the
+initial mean over all disks; bands show the errors of the means.  The third row shows the ratio of
+the temperatures of the heaviest and the lightest species, which is 1 in equilibrium.  The third row
+is omitted if all masses are equal. If there are fewer than four runs, the half-width of the band
+around the temperature ratio is twice the standard deviation of the ratio over single runs.  The
+table contains the reduced energies against collisions per disk, and the energies in the units of
+the input against time.
 """
 
 from itertools import chain, cycle
@@ -88,8 +89,8 @@ def draw_overview(figure: plt.Figure, places: tuple, runs: list[Run], found: lis
 def randomised(run: Run, kind: Species, tau: np.ndarray) -> np.ndarray:
     """Return the variance of the energies in a species, divided by the squared mean energy.
 
-    Collisions change this ratio from its initial value to 1, which is the ratio for an exponential
-    distribution.
+    Collisions change the ratio of the variance to the squared mean from its initial value to 1,
+    which is the ratio for an exponential distribution.
     """
     first = run.kinetic_energy(0)[kind.disks]
     start = float(np.var(first) / np.mean(first) ** 2) if np.any(first) else 1.0
@@ -103,7 +104,7 @@ def expected_scatter(run: Run, energies: dict[str, np.ndarray], tau: np.ndarray)
 
     The energies of the disks are assumed to be independent or, in an elastic gas, independent
     except for their fixed sum.  Inelastic collisions correlate the energies, and therefore the true
-    standard deviation is smaller.
+    standard deviation is smaller than the estimate of this function.
     """
     counts = {kind.name: int(kind.disks.sum()) for kind in run.by_species}
     variances = {
@@ -136,7 +137,8 @@ def scatter(runs: list[Run], found: Curves) -> dict[str, np.ndarray]:
 def ratio_band(runs: list[Run], found: Curves) -> np.ndarray:
     """Return the error of the temperature ratio.
 
-    If there are few runs, the function returns twice the standard deviation over single runs.
+    If there are fewer than `FEWEST_RUNS` runs, the function returns twice the standard deviation of
+    the temperature ratio over single runs.
     """
     if len(runs) >= FEWEST_RUNS:
         return found["ratio"].error

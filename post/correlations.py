@@ -6,40 +6,43 @@ The script accepts runs without obstacles and without gravity.  Runs of equal pa
 combined; lines show means over the runs, and bands show errors.  The frames may be spaced equally
 or logarithmically in time (use --equilibration 0 if the run begins in equilibrium).  The unit of
 time is the mean free time 1/w, and the unit of length is the mean diameter.  Equilibrium begins
-after --equilibration or, without that option, when no observable drifts any longer.  Earlier frames
-are used only for a2. If the gas cools or flows, the script computes only a2 and the structure.  The
-structure is averaged over the frames after --equilibration.  Without that option, it is averaged
-over the frames in which no observable drifts or, if the gas cools, over the frames later than 15
-collisions per disk.  Dashed lines show the single species of a mixture.
+after the first X collisions per disk, where X is the value of --equilibration, or by default when
+no observable drifts any longer.  Frames before equilibrium are used only for a2. If the gas cools
+or flows, the script computes only a2 and the structure.  The structure is averaged over the frames
+after the first X collisions per disk, where X is the value of --equilibration.  Without
+--equilibration, the structure is averaged over the frames in which no observable drifts or, if the
+gas cools, over the frames later than 15 collisions per disk.  Dashed lines show the single species
+of a mixture.
 
 The time correlations are calculated by the module `ricochet.correlations`, whose docstring explains
-how pairs of frames are chosen.  They are the velocity autocorrelation <v(0) v(t)>, the mean square
-displacement, the self-intermediate scattering function, and the non-Gaussian parameter.  The
-self-intermediate scattering function is F_s(k, t) = <exp(i k r)> at the wavenumber --wavenumber.
-The non-Gaussian parameter is alpha2 = <r^4> / (2 <r^2>^2) - 1. In theory the velocity
-autocorrelation decays as exp(-w t) at short times, and as 1/t at long times (mode coupling).  The
-table also contains the overlap, which is the fraction of the disks within 0.3 diameters of their
-first position.
+how pairs of frames are chosen.  The time correlations are the velocity autocorrelation <v(0) v(t)>,
+the mean square displacement, the self-intermediate scattering function, and the non-Gaussian
+parameter.  The self-intermediate scattering function is F_s(k, t) = <exp(i k r)> at the wavenumber
+--wavenumber.  The non-Gaussian parameter is alpha2 = <r^4> / (2 <r^2>^2) - 1. In theory the
+velocity autocorrelation decays as exp(-w t) at short times, and as 1/t at long times (mode
+coupling).  The table also contains the overlap, which is the fraction of the disks within 0.3
+diameters of their first position.
 
-There are two definitions of the diffusion coefficient D(t).  First, it is a quarter of the slope of
-the mean square displacement between neighbouring lags.  Second, it is half of the integral of <v(0)
-v(s)> from s = 0 to t.  The integral is computed as <v(0) (x(t) - x(0))>, which is exact for any
-spacing of frames.  For driven disks, whose velocities change between collisions, only the first
-definition applies.  Enskog's coefficient D_E is shown for equal smooth disks of fixed energy.  In
-two dimensions D(t) grows as the logarithm of t without limit, because of the long-time tail.
-Therefore a value of D applies only to one time and to one size of the box: when sound has crossed
-the box, D depends on its size.  The table contains D from both definitions, averaged over the lags
-from `D_time` / 2 to `D_time`; the two values must agree.  `D_time` is the time in which sound
-crosses the box, but at most an eighth of the duration of the run.  D is calculated only for a
-periodic box and equally spaced frames.
+There are two definitions of the diffusion coefficient D(t).  By the first definition, D is a
+quarter of the slope of the mean square displacement between neighbouring lags.  By the second
+definition, D is half of the integral of <v(0) v(s)> from s = 0 to t.  The integral of <v(0) v(s)>
+is computed as <v(0) (x(t) - x(0))>, which is exact for any spacing of frames.  For driven disks,
+whose velocities change between collisions, only the definition by the mean square displacement
+applies.  Enskog's coefficient D_E is shown for equal smooth disks of fixed energy.  In two
+dimensions D(t) grows as the logarithm of t without limit, because of the long-time tail.  Therefore
+a value of D applies only to one time and to one size of the box: when sound has crossed the box, D
+depends on its size.  The table contains D from the mean square displacement and D from the velocity
+autocorrelation, both averaged over the lags from `D_time` / 2 to `D_time`; the two values must
+agree.  `D_time` is the time in which sound crosses the box, but at most an eighth of the duration
+of the run.  D is calculated only for a periodic box and equally spaced frames.
 
 The second Sonine coefficient is a2 = <v^4> / (2 <v^2>^2) - 1, where each species has its own
-temperature.  It is 0 in equilibrium, and -1/2 if all speeds are equal. The structure factor is S(k)
-= <|sum of exp(i k x)|^2> / N.  The bond-orientational order parameter psi6 of a disk is the mean of
-exp(6 i theta) over its Delaunay neighbours.  In the table, `local` is the mean modulus of psi6, and
-`global` is the modulus of the mean of psi6, which is 1 in a perfect triangular crystal. The
-correlation function g6(r) = <psi6*(0) psi6(r)> decays exponentially in a fluid and as a power of r
-in a hexatic phase, and does not decay in a crystal.
+temperature.  The coefficient a2 is 0 in equilibrium, and -1/2 if all speeds are equal. The
+structure factor is S(k) = <|sum of exp(i k x)|^2> / N.  The bond-orientational order parameter psi6
+of a disk is the mean of exp(6 i theta) over its Delaunay neighbours.  In the table, `local` is the
+mean modulus of psi6, and `global` is the modulus of the mean of psi6, which is 1 in a perfect
+triangular crystal. The correlation function g6(r) = <psi6*(0) psi6(r)> decays exponentially in a
+fluid and as a power of r in a hexatic phase, and does not decay in a crystal.
 """
 
 from itertools import combinations_with_replacement, cycle
@@ -225,7 +228,7 @@ def table(groups: list, results: list[Found]) -> tuple[list[dict], list[str]]:
 
 
 def curves(groups: list, results: list[Found]) -> list[dict]:
-    """Return a table of the numbers with errors, followed by all curves."""
+    """Return a table that contains the numbers with errors, followed by all curve points."""
     names, rows = ("what", "packing", "x", "y", "error"), []
     for (eta, _), found in zip(groups, results, strict=True):
         for what, members in found.members.items():

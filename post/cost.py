@@ -4,9 +4,9 @@
 
 Each output file contains the number of collisions per second of processor time.  If several runs
 are equal, the script uses the fastest run.  The lines are power laws, fitted to the points whose
-number of disks N is in the range of --fit.  For smaller N, the cost of the collision itself is not
-small compared with the cost of the search.  For larger N, the data of the disks do not fit into the
-caches of the processor.
+number of disks N is in the range of --fit.  Below the range of --fit, the cost of the collision
+itself is not small compared with the cost of the search for the next event.  Above the range of
+--fit, the data of the disks do not fit into the caches of the processor.
 """
 
 from ricochet import Run
@@ -27,7 +27,7 @@ LABELS = {
 def costs(runs: list[Run]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Return the numbers of disks and the shortest times per collision [microseconds].
 
-    There is a pair of arrays for each method of search.
+    The dictionary contains one pair of arrays for each method of finding the next event.
     """
     least: dict[str, dict[int, float]] = {}
     for run in runs:

@@ -2,19 +2,19 @@
 
     python post/crater_scan.py runs/crater_scan/*.h5 -o crater_scan.png --csv crater_scan.csv
 
-The script reads these four parameters from each run.  Runs that differ in only one parameter form a
-curve against that parameter.  There is one curve for every combination of the other three
-parameters, and one panel for every parameter with at least one curve.  Runs that belong to no curve
-are listed in the printed warnings and on the figure.  Points are means over the runs, with error
-bars.  Lines are weighted fits of size = A x^p.  For the restitution xi, the variable x = 1 - xi^2
-is the fraction of the normal energy that a collision dissipates.  The exponents are printed with
-chi^2 per degree of freedom.  If a fit does not describe its points, a warning is printed.  If a
-point of a curve is the mean of fewer than four runs, all points of the curve have equal weights.
-In this case, the error of the exponent is determined from the deviations of the points from the
-fit.  Points with open symbols are not used in fits, for one of two reasons.  One reason is that the
-walls affect the crater; this is assumed if the number of collisions with walls exceeds 1 % of the
-number of disks.  The second reason is that some runs reached `stop.time` with more energy left than
-`stop.energy_fraction`.
+The script reads the mass, speed and radius of the projectile and the coefficient of restitution
+from each run.  Runs that differ in only one parameter form a curve against that parameter.  For
+each parameter with at least one curve there is a panel; along each curve in the panel, the other
+three parameters are constant.  Runs that belong to no curve are listed in the printed warnings and
+on the figure.  Points are means over the runs, with error bars.  Lines are weighted fits of size =
+A x^p.  For the restitution xi, the variable x = 1 - xi^2 is the fraction of the normal energy that
+a collision dissipates.  The exponents are printed with chi^2 per degree of freedom.  If a fit does
+not describe its points, a warning is printed.  If a point of a curve is the mean of fewer than four
+runs, all points of the curve have equal weights.  If the points of a curve have equal weights, the
+error of the exponent is determined from the deviations of the points from the fit.  Points with
+open symbols are not used in fits.  A point is not used if the walls affect the crater, which is
+assumed if the number of collisions with walls exceeds 1 % of the number of disks.  A point is also
+not used if some of its runs reached `stop.time` with more energy left than `stop.energy_fraction`.
 """
 
 from itertools import chain

@@ -9,10 +9,11 @@ disks, kT = m <(v - u)^2> / 2 times N / (N - 1).  The table also contains the co
 kT_y, and the temperature of each species.  For equal disks with white-noise driving in a periodic
 box, the dashed line is the temperature at which driving and dissipation balance (van Noije and
 Ernst 1998).  If one side of the box moves at a constant velocity and the disks are equal and
-elastic, the dashed line shows the adiabat instead.  The adiabat follows from the equation of state,
-including the layers at the walls (`hard_disks.adiabat`), and applies to slow compression and
-expansion.  This comparison requires several runs: when the side is at rest, the temperature of a
-single run is constant, and no error can be determined from its fluctuations.
+elastic, the dashed line shows the temperature on the adiabat.  The adiabat follows from the
+equation of state, including the layers at the walls (`hard_disks.adiabat`), and applies to slow
+compression and expansion.  A comparison with the adiabat requires several runs: while the side is
+at rest, the temperature of a single run is constant, and no error can be determined from its
+fluctuations.
 
 --show width: width of a box with a piston (motion = 'piston').  For equal elastic disks, the dashed
 lines show the predicted mean width and the range of one standard deviation around it.  The
@@ -37,10 +38,10 @@ The figure contains a curve for each run; the colours denote inputs and species.
 average over 1/60 of the duration of the run, or over 1/1000 of the duration for `width`.  The
 script prints the mean over the second half of the run with its error, and the ratio of this mean to
 the theoretical value.  For `share` the script prints the mean fraction of the disks in the half of
-the box that contains more disks.  Which half contains more disks is determined from another part of
-the run, because otherwise the mean would be biased.  The pictures show the last frame of the first
-run of each input.  If all runs have the same input, the pictures show the first and the last frame.
-Very small disks are drawn enlarged.
+the box that contains more disks.  For each frame, the half with more disks is determined from
+another part of the run, because the mean would otherwise be biased.  The pictures show the last
+frame of the first run of each input.  If all runs have the same input, the pictures show the first
+and the last frame.  Very small disks are drawn enlarged.
 """
 
 from collections.abc import Callable
@@ -108,7 +109,7 @@ def noise_law(run: Run) -> float | None:
 
 
 def temperature_law(run: Run) -> np.ndarray | float | None:
-    """Return the predicted temperature: of the steady state, or on the adiabat at each time."""
+    """Return the temperature of the steady state, or the temperatures on the adiabat."""
     side = only_moving(run, "constant_velocity")
     if side is None:
         return noise_law(run)
@@ -195,10 +196,11 @@ def share(run: Run) -> Curves:
 def fuller(share: np.ndarray) -> np.ndarray:
     """Return the fractions (T,) of disks in the half of the box that contains more disks.
 
-    The argument contains the fractions in the left half.  For frames in the first third of the run,
-    the half with more disks is determined from the last third, and vice versa.  If the half were
-    determined from the same frames, its fraction would exceed 1/2 by chance.  The middle third is
-    not used, because the first and last third must be statistically independent.
+    The argument `share` contains the fractions of the disks in the left half of the box.  For
+    frames in the first third of the run, the half with more disks is determined from the last
+    third, and vice versa.  If the half with more disks were determined from the frames whose
+    fractions are averaged, the mean fraction would exceed 1/2 by chance.  The middle third is not
+    used, because the first and last third must be statistically independent.
     """
     third = max(1, len(share) // 3)
     ends = share[:third], share[-third:]
@@ -254,8 +256,8 @@ def viscosity(run: Run) -> Curves:
 
 
 #: Each quantity that can be drawn, with the text and unit of its axis label and three functions.
-#: The functions return the curves, the prediction, and the values whose mean is compared with the
-#: prediction.
+#: The functions return the measured curves, the prediction, and the values of which the mean is
+#: compared with the prediction.
 QUANTITIES = {
     "width": (("width of the box", "length"), width, width_law, np.asarray),
     "temperature": (("kT", "energy"), temperature, temperature_law, np.asarray),
@@ -278,7 +280,7 @@ def on_average(laws: list) -> np.ndarray | float | Room | None:
 
 
 def levels(law: np.ndarray | float | Room | None, compared: Callable) -> list:
-    """Return the values at which horizontal lines show a prediction."""
+    """Return the values of a prediction that the figure shows as horizontal lines."""
     if isinstance(law, Room):
         return [law.mean, law.mean - law.deviation, law.mean + law.deviation]
     return [] if law is None else [law, 1 - law] if compared is fuller else [law]

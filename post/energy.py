@@ -14,10 +14,12 @@ exact parabolas, and every collision conserves energy, so all changes are roundi
 error of large time steps is that collisions are missed; the script missed.py counts missed
 collisions.
 
-The table contains three numbers for each run.  The drift is the change of a fitted straight line
-over the whole run.  The spread is the standard deviation of the conserved quantity from this line.
-The third number is the largest change of the conserved quantity.  All three numbers are divided by
-the total energy at the start or, if this energy is 0, by the largest total energy.
+The table contains three numbers for each run: the drift, the spread and the largest change of the
+conserved quantity.  The drift is the change over the whole run of a straight line that is fitted to
+the conserved quantity.  The spread is the standard deviation of the conserved quantity from the
+fitted line.  The largest change is the largest difference of the conserved quantity from its
+initial value.  The drift, the spread and the largest change are divided by the total energy at the
+start or, if this energy is 0, by the largest total energy.
 """
 
 from collections.abc import Callable
@@ -150,7 +152,7 @@ def draw(runs: list[Run]) -> plt.Figure:
 
 
 def draw_changes(axes: plt.Axes, runs: list[Run]) -> None:
-    """Draw for each run the largest change of the conserved quantity before each time."""
+    """Draw for each run the largest change of the conserved quantity up to each time."""
     worst = 0.0
     for run, colour in zip(runs, colours(len(runs), 2), strict=True):
         time, lost = change(run)

@@ -2,19 +2,20 @@
 
     python post/equation_of_state.py runs/state/eta_*.h5 -o state.png --csv state.csv
 
-The pressure P is determined from the virial of the pair collisions.  For equal disks it is also
-determined from the collision rate, and in boxes with walls from the force on the walls.  Means are
-taken in equilibrium, which begins after --equilibration or, without that option, when no observable
-drifts any longer.  Errors account for the autocorrelation of the pressure; in the table, `samples`
-is the effective number of independent samples of the virial. Runs with equal packing fraction are
-combined.  The disks must be elastic, and there must be no gravity.  Thermal walls and driving are
-allowed if all of them impose the same temperature; in this case kT is a measured mean, and its
-error is included.  Near walls there is a layer that the centres of disks cannot reach, and
-therefore the density in the interior is higher.  For this reason Z from the wall pressure refers to
-the area that centres can reach, and differs from Z of the bulk by a fraction of about 1/sqrt(N).
-For disks of many radii r, the curves show the equation of state of fluids derived by Santos, Yuste
-and Lopez de Haro (1999).  This equation depends on the radii only through the ratio <r>^2 / <r^2>,
-which must be the same for all runs.
+The pressure P is determined from the virial of the pair collisions.  For equal disks, the pressure
+is also determined from the collision rate, and in boxes with walls from the force on the walls.
+Means are taken in equilibrium, which begins after the first X collisions per disk, where X is the
+value of --equilibration, or by default when no observable drifts any longer.  Errors account for
+the autocorrelation of the pressure; in the table, `samples` is the effective number of independent
+samples of the virial. Runs with equal packing fraction are combined.  The disks must be elastic,
+and there must be no gravity.  Thermal walls and driving are allowed if all of them impose the same
+temperature; in this case kT is a measured mean, and its error is included.  Near walls there is a
+layer that the centres of disks cannot reach, and therefore the density in the interior is higher.
+Therefore Z from the wall pressure refers to the area that centres can reach, and differs from Z of
+the bulk by a fraction of about 1/sqrt(N).  For disks of many radii r, the curves show the equation
+of state of fluids derived by Santos, Yuste and Lopez de Haro (1999).  The equation of Santos, Yuste
+and Lopez de Haro depends on the radii only through the ratio <r>^2 / <r^2>, which must be the same
+for all runs.
 """
 
 from ricochet import Run, RunError, hard_disks
@@ -44,7 +45,7 @@ def likeness(runs: list[Run]) -> float:
 def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
     """Return a table row for each packing fraction, and warnings.
 
-    If a method does not apply to the runs, its cells are empty.
+    If a method of measuring Z does not apply to the runs, the cells of this method are empty.
     """
     rows, notes, alike = [], [], likeness(runs)
     for eta, same in by_packing(runs):

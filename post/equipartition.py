@@ -46,7 +46,7 @@ class Approach(NamedTuple):
 
 
 def entry(time: np.ndarray, gap: np.ndarray, within: float = 0.1, lasting: int = 3) -> float:
-    """Return the interpolated time at which a difference (W,) falls below `within`.
+    """Return the interpolated time at which an energy difference (W,) falls below `within`.
 
     The difference must stay below `within` for at least `lasting` windows.
     """

@@ -10,18 +10,19 @@ u, kT is the mean of m c^2 / 2, and kT_x and kT_y are the means of m c_x^2 and m
 rotate, kT_rot is the mean of I omega^2. The kinetic part of the stress is the sum of m c_a c_b per
 area, and the kinetic part of the heat flux is the sum of m c^2 c / 2 per area.  The collisional
 parts of stress and heat flux are not included.  Within a cell, u is interpolated linearly from the
-neighbouring cells.  The averages include the frames after --equilibration, by default the second
-half of each run.  Errors are determined from the differences between blocks of time, taken from all
-runs of one input (docs/theory.md).  If a cell contained disks in fewer than two blocks, only its
-density is calculated.  The table contains kT, stress and heat flux of a cell only if at least three
-disks remain in the cell when any one block of time is left out.  With --species, the fields of one
+neighbouring cells.  The averages include the frames after the first X collisions per disk, where X
+is the value of --equilibration; by default they include the second half of each run.  Errors are
+determined from the differences between blocks of time, taken from all runs of one input
+(docs/theory.md).  If a cell contained disks in fewer than two blocks, only its density is
+calculated.  The table contains kT, stress and heat flux of a cell only if the cell contained at
+least three disks even when any one block of time is ignored.  With --species, the fields of one
 species are calculated, relative to the mean flow of that species.
 
 With --grid, the script also draws the stream function psi of the particle flux j = n u, where j_x =
 d psi / dy and j_y = -d psi / dx.  The contour lines of psi are the streamlines of the mean flow.
 The longest arrow represents the largest significant flow.  Arrows are pale in cells without
-significant flow, where chi^2 of the two components is below 5.99. Noise alone exceeds this value in
-5 % of the cells.
+significant flow, where chi^2 of the two components is below 5.99. In a gas without flow, noise
+alone causes a chi^2 above 5.99 in 5 % of the cells.
 
 For equal disks between two walls, dashed lines show predicted profiles without fitted parameters.
 A profile is calculated from the measured temperature and flow in the middle of the box, and from
@@ -108,7 +109,7 @@ def draw_fields(axes: plt.Axes, units: Units, x: np.ndarray, found: dict, *names
 
 
 def with_ends(run: Run, axis: int, x: np.ndarray) -> np.ndarray:
-    """Return the positions x together with the smallest and largest position of disk centres."""
+    """Return x with the smallest and the largest possible position of a disk centre at its ends."""
     reach = run.radius[0]
     return np.concatenate([[run.lower[axis] + reach], x, [run.upper[axis] - reach]])
 
@@ -205,7 +206,7 @@ def draw_grid(
 
 
 def cells_of(text: str) -> tuple[int, ...]:
-    """Convert a text to the number of cells of a profile (N), or to those of a map (NX,NY)."""
+    """Convert a text to numbers of cells: N for a profile, or (NX, NY) for a map."""
     cells = tuple(int(word) for word in text.split(","))
     if min(cells) < 1 or not 2 <= np.prod(cells) <= MOST_CELLS:
         raise argparse.ArgumentTypeError(f"the number of cells must be 2 to {MOST_CELLS}")

@@ -3,17 +3,18 @@
     python post/gravity.py runs/gravity/long.h5 -o gravity.png --csv gravity.csv
 
 The temperature kT is the mean kinetic energy of a disk in equilibrium.  Equilibrium begins after
---equilibration or, without that option, when no observable drifts any longer.  The figure and the
-second table state why earlier frames are not used.  The solid lines show P(v^2) = m / (2 kT) exp(-m
-v^2 / 2 kT) and P(h) ~ exp(-m g h / kT).  The height h is the height of the centre of a disk above
-its lowest possible position.  These laws are exact for a large number of point particles.  The
-dashed lines include two corrections.  The first correction is for a fixed total energy of N disks:
-it replaces the factor exp(-e / kT) for the energy e of a disk by (1 - e / (2 N kT))^(2 N - 2).  The
-second correction is for the area that disks exclude.  The centres of disks of species i cannot be
-in the area pi s_ij^2 around each disk of species j, where s_ij is the sum of the two radii.  To
-first order, the excluded area multiplies the density of species i by exp(-sum_j pi s_ij^2 n_j(h)).
-This correction is a few per cent near the floor.  If the sum, calculated for point particles,
-exceeds 0.5, no dashed line is drawn for the heights.
+the first X collisions per disk, where X is the value of --equilibration, or by default when no
+observable drifts any longer.  The figure and the second table state why earlier frames are not
+used.  The solid lines show P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT).  The
+height h is the height of the centre of a disk above its lowest possible position.  These laws are
+exact for a large number of point particles.  The dashed lines include two corrections.  The first
+correction is for a fixed total energy of N disks: it replaces the factor exp(-e / kT) for the
+energy e of a disk by (1 - e / (2 N kT))^(2 N - 2).  The second correction accounts for the area
+that disks exclude for the centres of other disks.  The centres of disks of species i cannot be in
+the area pi s_ij^2 around each disk of species j, where s_ij is the sum of the two radii.  To first
+order, the excluded area multiplies the density of species i by exp(-sum_j pi s_ij^2 n_j(h)).  The
+correction for the excluded area is a few per cent near the floor.  If sum_j pi s_ij^2 n_j(h),
+calculated for point particles, exceeds 0.5, no dashed line is drawn for the heights.
 
 Slopes are the decay constants of greatest likelihood of exponential distributions that are fitted
 to the values from 0 to 5 kT of the kinetic energy and from 1 to 5 kT of m g h.  The heights below
@@ -182,7 +183,7 @@ def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, li
 
 
 def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[dict]:
-    """Return the ratios of the fitted slopes to the slopes of the solid and dashed lines."""
+    """Return the fitted slopes, divided by the slopes of the solid and of the dashed lines."""
     temperature = kt[0]
     grid, crowded = heights(run, species, temperature)
     rows, warm = [], warmth(species)

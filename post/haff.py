@@ -3,29 +3,32 @@
     python post/haff.py runs/haff/*.h5 -o haff.png --csv haff.csv
 
 Runs with the same coefficient of restitution xi are combined.  The left panel shows the kinetic
-energy K against time in units of the initial mean free time 1/w0. It also shows Haff's law K0 / (1
-+ (1 - xi^2) w0 t / 4)^2 (Haff 1983).  The right panel shows K against collisions per disk, and an
-exponential law (van Noije and Ernst 1998).  The lower panels show the ratios of K to both laws.
-Both laws apply while the gas is homogeneous.  At later times a part of K is the energy of flows in
-the gas, and K decreases more slowly.  The boxes must be periodic, and the total momentum must be 0.
-For equal disks the initial collision rate w0 is calculated from the equation of state.  For unequal
-disks w0 is measured from the first collisions.  Both laws assume that all species have the same
-temperature; this assumption is wrong if the masses are very different.
+energy K against time in units of the initial mean free time 1/w0. The left panel also shows Haff's
+law K0 / (1 + (1 - xi^2) w0 t / 4)^2 (Haff 1983).  The right panel shows K against collisions per
+disk, and an exponential law (van Noije and Ernst 1998).  The lower panels show the ratio of K to
+Haff's law and the ratio of K to the exponential law.  Haff's law and the exponential law apply
+while the gas is homogeneous.  At later times a part of K is the energy of flows in the gas, and K
+decreases more slowly.  The boxes must be periodic, and the total momentum must be 0. For equal
+disks the initial collision rate w0 is calculated from the equation of state.  For unequal disks w0
+is measured from the first collisions.  Haff's law and the exponential law assume that all species
+have the same temperature; this assumption is wrong if the masses are very different.
 
 The cooling rate is -d ln K / d tau, where tau is the number of collisions per disk.  The rate is
-averaged over two collisions per disk and over the runs.  If this rate falls below 90 % of the
-predicted rate and stays below it, the homogeneous state is assumed to have ended at this tau.  At
-larger tau the curves are pale.  For several runs, the tau at the end of the homogeneous state is
-printed with an error.  The column `rate` is the rate determined by a linear fit to ln K.  The fit
-begins at tau = 2, and ends at half of the tau at which the homogeneous state ends.  If the gas
-stays homogeneous, the fit includes all later data.  The error of `rate` is determined from the
-scatter of the runs.
+averaged over two collisions per disk and over the runs.  If the measured cooling rate falls below
+90 % of the predicted rate at some tau and stays below this limit, the homogeneous state is assumed
+to end at this tau.  The curves are pale at values of tau after the end of the homogeneous state.
+For several runs, the tau at the end of the homogeneous state is printed with an error.  The column
+`rate` is the rate determined by a linear fit to ln K.  The fit to ln K begins at tau = 2, and ends
+at half of the tau at which the homogeneous state ends.  If the gas stays homogeneous until the end
+of the run, the fit includes all data later than tau = 2.  The error of `rate` is determined from
+the scatter of the runs.
 
 If the restitution depends on velocity (contact.restitution_law), K is compared with another law,
-which assumes a Maxwell distribution of velocities (docs/theory.md).  For such disks the table
-contains no rate.  It contains the `exponent` p of K ~ t^-p in the last decade of time, which
-approaches 5/3. If the gas stays homogeneous but K differs from the law by more than 10 % at the
-end, a warning states how much a slightly smaller cooling rate would change K.
+which assumes a Maxwell distribution of velocities (docs/theory.md).  If the restitution depends on
+velocity, the table contains no cooling rate.  Instead of the cooling rate, the table contains the
+`exponent` p of the power law K ~ t^-p in the last decade of time; p approaches 5/3. If the gas
+stays homogeneous but K differs from the law by more than 10 % at the end, a warning states the
+ratio of K to the law.
 """
 
 from ricochet import Run
@@ -120,7 +123,7 @@ def rates(groups: list, results: list) -> list[dict]:
 
 
 def apart(xi: Restitution, found: dict, end: float) -> list[str]:
-    """Return the ratio of final K to the law for a slightly smaller cooling rate."""
+    """Return a warning if the gas stays homogeneous but the final K differs from the law."""
     ratio, tau = found["K"].mean[-1] / found["law"][-1], found["collisions_per_disk"][-1]
     if not np.isnan(end) or abs(ratio - 1) < 1 - SLOW:
         return []

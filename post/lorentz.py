@@ -6,20 +6,20 @@ Each run contains one disk in a periodic box with equal circular obstacles, and 
 intervals of time.  The reduced density is n R^2, where n is the number of obstacles per unit of
 area, and R the sum of the radii of disk and obstacle.  The diffusion coefficient D is a quarter of
 the slope of the mean square displacement between the two values of --lags, in units of the mean
-free time.  Between these lags the slope is nearly constant, because the velocity autocorrelation is
-small: it is negative and decays as 1/t^2. Runs with the same density are combined, and the error is
-the standard error of the mean.
+free time.  Between the two values of --lags the slope is nearly constant, because the velocity
+autocorrelation is small: it is negative and decays as 1/t^2. Runs with the same density are
+combined, and the error is the standard error of the mean.
 
 The figure shows D / D_0. The Boltzmann equation, which is exact in the limit of low density, yields
-the diffusion coefficient D_0 = 3 v / (16 n R).  The curves show the density expansion for
-scatterers that may overlap,
+the diffusion coefficient D_0 = 3 v / (16 n R).  The curves show the density expansion
+by van Leeuwen and Weijland, Physica 36, 457 (1967) and 38, 35 (1968), for scatterers that may
+overlap, with and without the last term:
 
-    D_0/D = 1 - (4/3) nR^2 ln(nR^2) - 0.8775 nR^2 + 4.519 (nR^2 ln(nR^2))^2,
+    D_0/D = 1 - (4/3) nR^2 ln(nR^2) - 0.8775 nR^2 + 4.519 (nR^2 ln(nR^2))^2.
 
-by van Leeuwen and Weijland, Physica 36, 457 (1967) and 38, 35 (1968), with and without the last
-term.  (The coefficients are quoted from memory, because these papers could not be consulted.) The
-mean free time is 1/(2 n R v) exactly, at every density.  The table contains the measured mean free
-time divided by this value.
+The coefficients of the expansion are quoted from memory; they have not been compared with the
+papers by van Leeuwen and Weijland.  The mean free time is 1/(2 n R v) exactly, at every density.
+The table contains the ratio of the measured mean free time to 1/(2 n R v).
 """
 
 from ricochet import Run, RunError

@@ -4,14 +4,15 @@
 
 The runs are combined to pairs in the given order.  The two runs of a pair start from almost the
 same state and have frames at the same times.  The distance between two runs is the Euclidean
-distance between the positions of all disks, calculated with the nearest periodic images.  This
-distance grows as exp(lambda t) until it reaches the size of the box.  A straight line is fitted to
-the logarithm of the distance of each pair, in the same interval of time for all pairs.  The
-interval ends at the time at which the first pair reaches the distance --largest.  The interval
-begins at the fraction --fit-from of this time.  Earlier times are not used, because the separation
-has not yet turned into the direction of fastest growth.  The Lyapunov exponent lambda is the mean
-slope of the fitted lines, and its error is the standard error of the mean.  The script rejects
-gases that cool, because their rate of divergence is not constant.
+distance between the positions of all disks, calculated with the nearest periodic images.  The
+distance between the two runs of a pair grows as exp(lambda t) until it reaches the size of the box.
+A straight line is fitted to the logarithm of the distance of each pair, in the same interval of
+time for all pairs.  The fits end at the time at which the first pair reaches the distance
+--largest.  The value of --fit-from is the ratio of the start time to the end time of the fits.
+Earlier times are not used, because the separation has not yet turned into the direction of fastest
+growth.  The Lyapunov exponent lambda is the mean slope of the fitted lines, and its error is the
+standard error of the mean.  The script rejects gases that cool, because their rate of divergence is
+not constant.
 """
 
 from typing import NamedTuple
@@ -49,8 +50,8 @@ def distance(one: Run, other: Run) -> np.ndarray:
 def divergence(time: np.ndarray, apart: np.ndarray, largest: float, begin: float) -> Divergence:
     """Fit straight lines to the logarithms of the distances (P, T) of P pairs.
 
-    The fits end when the first distance reaches `largest`.  `begin` is the start of the fits as a
-    fraction of this time.
+    The fits end at the time at which the first distance reaches `largest`.  `begin` is the ratio of
+    the start time to the end time of the fits.
     """
     with np.errstate(divide="ignore"):
         logarithm = np.log(apart)

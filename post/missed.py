@@ -4,28 +4,28 @@
 
 The script requires event-driven runs and time-stepped runs with the same seeds.  For each time step
 dt the script calculates the fraction of missed pair collisions, relative to the number of pair
-collisions in the event-driven run with the same seed.  The first --equilibration collisions per
-disk are not counted, and the fraction is averaged over the seeds.  The result is compared with the
-predicted fraction P, which is derived below.  If there is only one pair of runs, the error is
-determined from the fluctuations of the two collision rates in time.  For small time steps these
-fluctuations are larger than the fraction of missed collisions; therefore runs with several seeds
-are required.
+collisions in the event-driven run with the same seed.  The first X collisions per disk, where X is
+the value of --equilibration, are not counted, and the fraction is averaged over the seeds.  The
+script compares the measured fraction with the predicted fraction P, which is derived below.  If
+there is only one pair of runs, the error is determined from the fluctuations of the two collision
+rates in time.  For small time steps the fluctuations of the collision rates are larger than the
+fraction of missed collisions; therefore runs with several seeds are required.
 
 Two disks of diameter s with the relative speed g and the impact parameter b would overlap along a
-chord of length 2 l, where l = sqrt(s^2 - b^2).  They approach each other only along the first half
-of the chord, for the time l / g.  If an overlap is detected later, it is ignored, because the disks
-already separate.  The time between the first contact and the next time step is random.  Therefore
-the probability that a collision is missed is 1 - l / (g dt), or 0 if this expression is negative.
-The impact parameter b is distributed uniformly between -s and s.  With q = g dt / s the mean
-probability is
+chord of length 2 l, where l = sqrt(s^2 - b^2).  The two disks approach each other only along the
+first half of the chord, for the time l / g.  An overlap that is detected after the time l / g is
+ignored, because the disks are already separating.  The time between the first contact and the next
+time step is random.  Therefore the probability that a collision is missed is 1 - l / (g dt), or 0
+if this expression is negative.  The impact parameter b is distributed uniformly between -s and s.
+With q = g dt / s the mean probability is
 
     P(q) = 1 - sqrt(1 - q^2) - (asin q - q sqrt(1 - q^2)) / (2 q)    for q < 1,
     P(q) = 1 - pi / (4 q)                                            beyond; q^2 / 6 for small q.
 
 The probability density of the relative speeds of colliding pairs is proportional to g^2 exp(-mu g^2
 / 2 kT), where mu is the reduced mass.  The collision rate of disks of species i with disks of
-species j is proportional to N_i N_j / (h_i + h_j) / sqrt(mu).  Here h_i = kT / (m_i a) is the scale
-height of species i in a gravitational field of acceleration a.
+species j is proportional to N_i N_j / (h_i + h_j) / sqrt(mu), where h_i and h_j are scale heights.
+Here h_i = kT / (m_i a) is the scale height of species i in a gravitational field of acceleration a.
 """
 
 from itertools import combinations_with_replacement
@@ -44,7 +44,7 @@ SPEEDS = np.linspace(0, 12, 2001)  # in units of sqrt(kT / mu)
 
 
 def missed_share(q: np.ndarray) -> np.ndarray:
-    """Return P(q), the mean probability that a collision at q = g dt / s is missed."""
+    """Return P(q), the mean probability that a collision is missed, where q = g dt / s."""
     q = np.asarray(q, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         short = np.minimum(q, 1)
@@ -81,8 +81,8 @@ def rate_and_temperature(run: Run, skip: float | None) -> tuple[SeriesMean, floa
 def missed_of_pairs(rates: list[SeriesMean], exact: list[SeriesMean]) -> Estimate:
     """Return the fraction of missed collisions, determined from pairs of runs with equal seeds.
 
-    The error is determined from the scatter of the pairs.  For a single pair it is determined from
-    the fluctuations of the two collision rates.
+    The error is determined from the scatter of the pairs.  For a single pair of runs, the error is
+    determined from the fluctuations of the collision rates of both runs.
     """
     shares = [1 - one.mean / other.mean for one, other in zip(rates, exact, strict=True)]
     if rates == exact:

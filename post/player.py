@@ -147,11 +147,12 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
 
 
 def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[str, np.ndarray]]:
-    """Return collisions per disk in each frame, events and paths, unless the log is too long.
+    """Return collisions per disk in each frame and, unless the log is too long, events and paths.
 
     For each event, the function returns the time and the two partners.  The paths are described by
-    the number of velocity changes in each interval between frames.  For each velocity change they
-    contain the disk, the time as a fraction of the interval, and the new velocity.
+    the number of velocity changes in each interval between frames.  For each velocity change, the
+    description of the paths contains the disk, the time as a fraction of the interval, and the new
+    velocity.
     """
     exact, facts = run.n_disks <= FEW_DISKS, {"known": False, "events": False}
     try:
@@ -206,8 +207,9 @@ def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
 def curves(run: Run) -> dict:
     """Return the energy of each species and the pressure against time, for small plots.
 
-    The values are taken from the observables, because observables are written more often than
-    frames.  Missing values are None; the pressure is None before the first collision.
+    The energies and the pressure are taken from the observables, because observables are written
+    more often than frames.  Missing values are None; the pressure is None before the first
+    collision.
     """
     series, found = {}, {}
     for name in (
@@ -281,8 +283,8 @@ def film(
     told, blocks = told_by_log(run, frames, room / 2 // TURN)
     blocks = {name: block.tobytes() for name, block in blocks.items()}
     blocks |= moving(run, frames, tops.get("collisions", 1))
-    # Displacements are measured from these positions, which are continuous across periodic sides up
-    # to the first frame of the film.
+    # Displacements of disks are measured from the positions `origin`, which are continuous across
+    # periodic sides up to the first frame of the film.
     origin = run.unwrapped(0) + run.position[frames[0]] - run.unwrapped(frames[0])
     blocks["origins"] = in_room(run, origin).astype("<f4").tobytes()
     facts, own = scene(run)
@@ -389,7 +391,7 @@ def enclosed(data: object) -> str:
 
 
 def policy(style: str, script: str, *more: str) -> str:
-    """Return a content security policy that allows only the code of this page, and `more`."""
+    """Return a content security policy that allows only this style and script, and `more`."""
     rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'", *more]
     for tag, own in (("script", script), ("style", style)):
         digest = base64.b64encode(hashlib.sha256(own.encode()).digest()).decode()

@@ -3,12 +3,12 @@
     python post/rates.py runs/bulk.h5 -o rates.png --csv rates.csv
 
 The script combines runs of one system without gravity.  Means are taken in equilibrium, which
-begins after --equilibration or, without that option, when no observable drifts any longer.  Errors
-account for the autocorrelation of each quantity; in the table, `samples` is the effective number of
-independent samples.  Warnings explain why an error may be unreliable.  If the kinetic energy is
-conserved, kT of each run is exact, and the results of all runs are scaled to the mean kT.  With
-thermal walls, with a thermostat of one temperature, or for rotating disks, kT is a measured mean
-with an error.
+begins after the first X collisions per disk, where X is the value of --equilibration, or by default
+when no observable drifts any longer.  Errors account for the autocorrelation of each quantity; in
+the table, `samples` is the effective number of independent samples.  Warnings explain why an error
+may be unreliable.  If the kinetic energy is conserved, kT of each run is exact, and the results of
+all runs are scaled to the mean kT.  With thermal walls, with a thermostat of one temperature, or
+for rotating disks, kT is a measured mean with an error.
 
 The pressure is measured from the virial of the pair collisions and from the momentum transfer to
 each side.  The pressure on the sides is slightly larger, because the centre of a disk cannot be
@@ -23,8 +23,9 @@ scatter of blocks of frames.  The line shows the prediction for equal disks and 
 collisions.
 
 If the disks lose energy, or if the walls have different temperatures, the script analyses only the
-free paths.  It uses the frames after --equilibration.  Without that option, it uses the frames in
-which no observable drifts or, if the gas cools, the frames later than 15 collisions per disk.
+free paths.  The analysis of free paths uses the frames after the first X collisions per disk, where
+X is the value of --equilibration.  Without --equilibration, the analysis uses the frames in which
+no observable drifts or, if the gas cools, the frames later than 15 collisions per disk.
 """
 
 from ricochet import Run, RunError, equilibrium, statistics, thermodynamics as td

@@ -4,8 +4,8 @@
     python post/scaling.py runs/t*.h5 -o scaling.png --csv scaling.csv
 
 The script compares the wall times of complete runs that differ only in `run.threads`.  If runs were
-repeated, it shows the median, the smallest and the largest time.  The shell script runs/scaling.sh
-performs the runs and calls this script.
+repeated, the script shows the median, the smallest and the largest of their wall times.  The shell
+script runs/scaling.sh performs the runs and calls this script.
 """
 
 from ricochet import Run, RunError

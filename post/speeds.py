@@ -6,24 +6,26 @@ The figure shows histograms of the reduced speed u = v / sqrt(2 kT / m), where k
 kinetic energy of the species.  The equilibrium distribution of u is P(u) = 2 u exp(-u^2) for any
 mass.  If m = 1 and all initial speeds are 1, u equals v.  With --unscaled the histograms show v in
 units of the input.  Runs with the same number of disks N are combined.  Equilibrium, or the steady
-state of a driven gas, begins after --equilibration or, without that option, when no observable
-drifts any longer.  Frames selected by --frames are used only if they are at least --min-separation
-collisions per disk apart.  The temperature kT is the mean over the frames that are used.  In a
-sheared box, speeds are measured relative to the mean flow.  A gas that only loses energy does not
-reach a steady state.  The histogram of such a gas contains the frames after --equilibration (by
-default after 15 collisions per disk), and the speeds in each frame are scaled with kT of that
-frame.  Speeds are also scaled frame by frame if sides of the box move or if kT drifts; then
-`kT_first` and `kT_last` show the change of kT.  Each species of a mixture has a separate row in the
-table and a separate curve.  The row contains the temperature kT, and the temperatures kT_x and kT_y
-of both velocity components.  Kolmogorov-Smirnov (KS) and chi-square tests compare the speeds with
-the expected distribution.  Before the tests, the speeds in each frame are divided by the thermal
-speed in that frame.  If the kinetic energy is conserved, the expected distribution is that of N
-disks with a fixed total kinetic energy; otherwise the Maxwell distribution is expected.  The
-p-values are determined from random samples that are scaled in the same way (docs/theory.md).
-Frames that are close in time contain correlated speeds; therefore the number of `independent`
-speeds is reduced by the statistical inefficiency.  The tests do not apply if disks conserve their
-angular momentum in a round container.  The last panel shows the second Sonine coefficient a2 =
-<v^4> / (2 <v^2>^2) - 1 against the number of collisions per disk.
+state of a driven gas, begins after the first X collisions per disk, where X is the value of
+--equilibration, or by default when no observable drifts any longer.  Frames selected by --frames
+are used only if they are at least --min-separation collisions per disk apart.  The temperature kT
+is the mean over the frames that are used.  In a sheared box, speeds are measured relative to the
+mean flow.  A gas that only loses energy does not reach a steady state.  The histogram of a gas that
+only loses energy contains the frames after the first X collisions per disk, where X is the value of
+--equilibration (by default 15), and the speeds in each frame are scaled with kT of that frame.
+If sides of the box move or if kT drifts, the speeds in each frame are also scaled with kT of that
+frame; then `kT_first` and `kT_last` show the change of kT.  Each species of a mixture has a
+separate row in the table and a separate curve.  The row contains the temperature kT, and the
+temperatures kT_x and kT_y of both velocity components.  Kolmogorov-Smirnov (KS) and chi-square
+tests compare the speeds with the expected distribution.  Before the tests, the speeds in each frame
+are divided by the thermal speed in that frame.  If the kinetic energy is conserved, the expected
+distribution is that of N disks with a fixed total kinetic energy; otherwise the Maxwell
+distribution is expected.  The p-values are determined from random samples, whose speeds are also
+divided by their thermal speed (docs/theory.md).  Frames that are close in time contain correlated
+speeds; therefore the number of `independent` speeds is reduced by the statistical inefficiency.
+The statistical tests do not apply to disks that conserve their angular momentum in a round
+container.  The last panel shows the second Sonine coefficient a2 = <v^4> / (2 <v^2>^2) - 1 against
+the number of collisions per disk.
 """
 
 from typing import NamedTuple
@@ -57,8 +59,8 @@ from ricochet.script import command_line, grouped, late_frames, launch, measured
 import numpy as np
 
 BINS = np.linspace(0, 3, 51)  # u = 1 is the centre of a bin
-#: Panel titles for the possible states of the late frames.  In the first two states, kT is the same
-#: in all late frames on average.
+#: Panel titles for the possible states of the late frames.  In the states `EQUILIBRIUM` and
+#: `STEADY`, the average of kT does not change during the late frames.
 EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
 COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each frame at its own kT"
 UNSTEADY = "No steady kT yet: each frame at its own"
@@ -111,7 +113,7 @@ def tracks_of(
 def pooled(
     runs: list[Run], picked: list[list[int]], state: str, name: str
 ) -> tuple[Estimate, dict]:
-    """Return the speed density (B,) of a species in late frames, and results of the tests."""
+    """Return the speed density (B,) of a species in late frames, and statistical test results."""
     own, each = zip(runs, picked, strict=True), state not in (EQUILIBRIUM, STEADY)
     members = [reduced_speeds(*one, each=each, species=name) for one in own]
     members = [u.reshape(len(frames), -1) for u, frames in zip(members, picked, strict=True)]
@@ -167,7 +169,7 @@ def scale_of(run: Run, kt: float, unscaled: bool) -> Scale:
 def draw_histogram(
     axes: plt.Axes, heights: list[Estimate], labels: list[str], scales: list[Scale]
 ) -> None:
-    """Draw histograms as steps, and the Maxwell distribution for each scale."""
+    """Draw histograms of speeds as steps, and a Maxwell distribution for each scale of speeds."""
     style = {"fill": True, "alpha": 0.45} if len(heights) == 1 else {"fill": False}
     each = zip(heights, labels, scales, colours(len(labels)), strict=True)
     for height, label, scale, colour in each:

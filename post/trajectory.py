@@ -3,7 +3,7 @@
     python post/trajectory.py runs/sinai.h5 -o sinai.png               all disks (at most 12)
     python post/trajectory.py runs/sinai.h5 --disks 1,5 --frames :200  two of them, 200 frames
 
-Positions in successive frames are connected by straight lines.  These lines are the exact
+Positions in successive frames are connected by straight lines.  The straight lines are the exact
 trajectories if there is no gravity and the run has a frame at every event
 (output.frames_every_events = 1).  Several runs are drawn side by side.
 """
