@@ -5,10 +5,10 @@
 #   runs/bench.sh --full     1e6 disks as well: rates, random start, memory; runs and threads on two cores
 #   runs/bench.sh --check    instructions per collision against what is promised (needs valgrind)
 #
-# A rate is the number of collisions, in millions, per second of processor time. It is measured in runs on one core that also sample
-# observables, and is the median of RUNS=5 runs. Before the measurement, the system is simulated until it has lost all correlations
-# to its initial state. No other program should run at the same time. The environment variable RICOCHET names the measured program
-# (default build/ricochet). For --check the program must not contain AVX-512 code.
+# A rate is the number of collisions, in millions, per second of processor time. A rate is measured in runs on one core that also
+# sample observables, and the printed rate is the median of RUNS=5 runs. Before the measurement, the system is simulated until it
+# has lost all correlations to its initial state. No other program should run at the same time. The environment variable RICOCHET
+# names the measured program (default build/ricochet). The option --check requires a program without AVX-512 code.
 set -euo pipefail
 export LC_ALL=C # awk then reads and writes 0.5 with a point in every language
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
@@ -92,11 +92,11 @@ table() {
     "$(repeated rate gas_1000_0.5 20000 --set run.search=pairs | median)"
 }
 
-# --- Rates with an additional option, measured alternately with and without the option ----------------------
+# --- Rates with and without an additional option, measured alternately ------------------------------------
 
-# beside WHAT LEAST NAME OTHER COLLISIONS [OPTION...]: measures the rate of a run with the options from the starting state OTHER,
-# and the rate of a run without options from the starting state NAME. The function prints the first rate, and the ratio of the first
-# to the second rate.
+# beside WHAT LEAST NAME OTHER COLLISIONS [OPTION...]: measures the rate of a run without options that begins from the starting
+# state NAME, and the rate of a run with the options that begins from the starting state OTHER. The function prints both rates, and
+# the ratio of the rate with the options to the rate without options.
 beside() {
   local what=$1 least=$2 name=$3 other=$4 collisions=$5 k
   shift 5
@@ -213,9 +213,9 @@ ensemble() {
 
 # --- Numbers of instructions, compared with their limits ----------------------------------------------
 
-# instructions RADII PACKING COLLISIONS [OPTION...]: counts the instructions in the event loop and at the start of epochs.
-# Instructions in other parts of a run (start, output) are not counted, because their number depends on the time of day. The runs
-# have 1000 equal disks, or 4000 disks with many different radii.
+# instructions RADII PACKING COLLISIONS [OPTION...]: counts the instructions in the event loop and at the start of epochs (periods
+# between two shifts of the time origin). Instructions in other parts of a run (start, output) are not counted, because their number
+# depends on the time of day. The runs have 1000 equal disks, or 4000 disks with many different radii.
 instructions() {
   local radii=$1 packing=$2 collisions=$3 name
   shift 3

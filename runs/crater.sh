@@ -2,9 +2,10 @@
 # Exercise S5: pictures of one crater, and crater size against mass, speed and radius of the projectile and against restitution.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# Each parameter is varied over ten values, with eight beds (seeds) for each value. The other three parameters keep the values mass
-# 25, speed 5, radius 5 and restitution 0.5. The crater does not depend on the speed, because hard disks define no energy scale. A
-# constant contact time in the TC model would define an energy scale; therefore the contact time is proportional to 1/speed.
+# Each parameter is varied over ten values, with eight beds (seeds) for each value. While one parameter varies, the other three
+# parameters keep their standard values: mass 25, speed 5, radius 5 and restitution 0.5. The crater does not depend on the speed,
+# because hard disks define no energy scale. A constant contact time in the TC model would define an energy scale; therefore the
+# contact time is proportional to 1/speed.
 member() { # mass speed radius restitution seed
   local contact_time
   contact_time=$(awk -v v="$2" 'BEGIN { printf "%.17g", 5e-5 / v }')

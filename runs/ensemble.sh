@@ -218,8 +218,8 @@ has_failed() {
   [[ ! $last_line =~ $goes_on ]]
 }
 
-# Appends an empty line to the log file of the member run NAME. Otherwise the last line of the log file could be attributed to the
-# next attempt.
+# Appends an empty line to the log file of the member run NAME. Without the empty line, the last line of the log file could be
+# attributed to the next attempt.
 forget_failure() {
   local lock
   has_failed "$1" && open_log "$folder/$1.log" || return 0
@@ -227,7 +227,7 @@ forget_failure() {
   exec {lock}>&-
 }
 
-# Checks that the member runs of earlier commands in this folder have the same settings. The check is necessary because results are
+# Checks that the member runs of earlier commands in this folder have the same settings. This check is necessary because results are
 # identified only by the names of the member runs.
 remember() {
   local line name k door='' changed='' mended='' extended=() found=()
@@ -326,8 +326,9 @@ run_member() {
     [[ -n $resume && $(last_words "${names[$1]}") == *": its run broke off "* ]] || break
     resume= # the member starts from the beginning
   done
-  # If the script is being stopped, these values of the exit status mean that the member run was stopped while it started, or while
-  # bash waited for it a second time. The value -1 means that bash has lost the exit status.
+  # If the script is being stopped, a negative exit status or an exit status of at least 127 means that the member run was stopped
+  # while it started, or while bash waited for it a second time. An exit status of -1 means that bash has lost the exit status of
+  # the member run.
   if [[ -n $stopping ]] && ((status >= 127 || status < 0)); then status=75; fi
   if ((status == 3)) && [[ -e $base.h5 && $(last_words "${names[$1]}") == *"$is_finished"* ]]; then
     touch -- "$base.h5" && status=0
@@ -393,8 +394,8 @@ clock() {
   fi
 }
 
-# tell MEMBER TEXT: prints a line about a member run of a share. Because shares are processed on other computers or at other times,
-# the line contains the name of the member run, the time and the host.
+# tell MEMBER TEXT: prints a line about a member run of a share. The line contains the name of the member run, the time and the
+# host, because shares are processed on other computers or at other times.
 tell() {
   [[ -z $task ]] || printf '%(%FT%T%z)T %s %s %s: %s\n' -1 "$task" "$host" "$1" "$2" >&2
 }
@@ -490,8 +491,8 @@ summarise() {
 
 # --- engines (GNU parallel, Slurm): they start this script several times, each time for a share of the member runs ---
 
-# Sets two variables: `shares` is the number M of shares, which is at most the argument, and `share_command` is the command for a
-# share, to which the text K/M must be appended. Failed member runs do not belong to any share.
+# Sets two variables: `shares` is the number M of shares into which the member runs are divided, at most the value of the argument;
+# `share_command` is the command that performs a share if the text K/M is appended. Failed member runs do not belong to any share.
 prepare_shares() {
   local most=$1 k here left=0
   here=$(cd -- "$folder" && pwd)
@@ -504,7 +505,7 @@ prepare_shares() {
     --manifest "$here/left.txt" -j 1 --share)
 }
 
-# Determines which member runs have failed from their output and log files.
+# Determines from the output files and log files which member runs have failed.
 judge_by_files() {
   local name last_line
   for name in "${names[@]}"; do
@@ -514,8 +515,8 @@ judge_by_files() {
   done
 }
 
-# The signal TERM must be delivered to the script itself, and not to a shell that runs the script. Such a shell would terminate at
-# once, and GNU parallel would treat the share as finished although the script continues.
+# The signal TERM must be delivered to the script itself, and not to a shell that runs the script. A shell that runs the script
+# would terminate at once, and GNU parallel would treat the share as finished although the script continues.
 run_parallel() {
   local options=(--will-cite -j "$jobs" --termseq 'TERM,600000') child=''
   command -v parallel >/dev/null || die "--engine parallel needs GNU parallel (package parallel)"
@@ -549,7 +550,8 @@ check_inputs() {
   ((failed == 0)) || summarise 'nothing is submitted: correct the members that failed, or leave them out: '
 }
 
-# Waits until the member runs on other computers have ended. They end shortly after the connection to these computers has ended.
+# Waits until the member runs on other computers have ended. The member runs end shortly after the connection to the other computers
+# has ended.
 wait_for_locks() {
   local name
   for name in "${names[@]}"; do
@@ -670,8 +672,8 @@ for k in "${!overrides[@]}"; do
   overrides[k]=${common:+$common${overrides[k]:+ }}${overrides[k]}
 done
 
-# Share K of M consists of the member runs with the numbers K, K + M, K + 2M, and so on. With a manifest, the numbers are those of
-# its lines.
+# Share K of M consists of the member runs with the numbers K, K + M, K + 2M, and so on. If a manifest is given, the number of a
+# member run is the number of its line in the manifest.
 if [[ -n $share ]]; then
   task=${SLURM_ARRAY_JOB_ID:+${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID:-}}
   task=${task:-share $share}

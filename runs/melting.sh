@@ -2,12 +2,12 @@
 # Melting of hard disks: pressure against packing fraction, and pictures of the bond-orientational order.
 #
 # Between the packing fractions 0.70 and 0.72, crystals melt and liquids freeze very slowly. Therefore the runs of 64^2 disks start
-# from a crystal that has been melted by about half at a packing fraction of 0.66. Two starting states are used, one slightly less
-# and one slightly more melted. If the starting state affects the results, the two runs yield different results. The runs of 128^2
-# disks start from four copies of the final state of 64^2 disks, with new velocities. The script takes several minutes. The pressure
-# P* near melting is then correct to 0.1, and warnings name the packing fractions at which the two starting states yield different
-# results. With FULL=1 the script performs longer runs, and also runs of 256^2 disks, which takes about eight hours of processor
-# time.
+# from a crystal of which about half has melted at a packing fraction of 0.66. There are two starting states: slightly less than
+# half of the crystal has melted in one, and slightly more than half in the other. If the starting state affects the results, the
+# two runs yield different results. The runs of 128^2 disks start from four copies of the final state of 64^2 disks, with new
+# velocities. The script takes several minutes. The pressure P* near melting is then correct to 0.1, and warnings name the packing
+# fractions at which the two starting states yield different results. With FULL=1 the script performs longer runs, and also runs of
+# 256^2 disks, which takes about eight hours of processor time.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 if [[ -n ${FULL:-} ]]; then
