@@ -104,7 +104,7 @@ def condition(group: str, entry: dict) -> str:
 
 
 def facts(group: str, entry: dict) -> list[str]:
-    """Return the facts about a variable that its section lists, such as its allowed values."""
+    """Return the properties of a variable, such as its allowed values, for its section."""
     allowed = [f"Allowed: {entry['allowed']}" + f" [{entry['unit']}]" * bool(entry["unit"])]
     if entry["default"] is not None:
         default = f"Default: `{written(entry)}`"
