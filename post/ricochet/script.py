@@ -230,7 +230,7 @@ def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | No
 
 
 def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
-    """Return the frames of --frames in the steady state, at least --min-separation apart.
+    """Return the selected frames (--frames) in the steady state with the required separation.
 
     If no frame of --frames is in the steady state, the last frame is returned.  A warning is added
     to `args.notes` if there are fewer frames than requested, or if the frames are too early.

@@ -1,7 +1,7 @@
 """Web server for browsers on the same computer, and the page that shows an unfinished run.
 
-The server refuses requests from pages of other web sites.  Such pages might otherwise read data
-through a host name that is resolved to this computer (DNS rebinding).
+The server refuses requests from pages of other web sites.  Pages of other web sites might otherwise
+read data through a host name that is resolved to this computer (DNS rebinding).
 """
 
 import asyncio

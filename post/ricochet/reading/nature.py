@@ -43,7 +43,8 @@ TRAITS = {
     "walls": "has walls",
     "mixture": "has disks of different mass or radius",
 }
-#: Traits of runs whose energy changes other than by dissipation in collisions.
+#: Physical properties (traits) of a run by which its energy changes other than by dissipation in
+#: collisions.
 SOURCES = {
     "changed",
     "sheared",
@@ -54,15 +55,15 @@ SOURCES = {
     "sliding_surfaces",
 }
 SOURCES |= {"thermostatted", "thermal_walls"}
-#: Traits of runs in which velocities also change between collisions.
+#: Physical properties (traits) of a run by which velocities also change between collisions.
 KICKED = {"noise_driven", "active", "thermostatted"}
-#: Traits of runs whose velocities do not relax to a Maxwell distribution.
+#: Physical properties (traits) of a run by which velocities do not relax to a Maxwell distribution.
 UNSETTLED = {*SOURCES, "unequal_temperatures", "inelastic", "soft_contacts", "round_container"} - {
     "thermostatted",
     "thermal_walls",
     "piston",
 }
-#: Traits of runs whose velocities relax to a Maxwell distribution.
+#: Physical properties (traits) of a run with which velocities relax to a Maxwell distribution.
 SETTLED = TRAITS.keys() - UNSETTLED
 
 
