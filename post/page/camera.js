@@ -43,8 +43,8 @@ function pan(dx, dy) {
   camera.y += dy / view.unit;
 }
 
-// Returns the range of numbers of periods by which copies of an object from `low` to `high` are shifted. Copies outside this range
-// are not visible.
+// The functions return the smallest and the largest number of periods by which a visible copy of an object is shifted; the object
+// extends from `low` to `high`.
 function firstCopy(axis, high) {
   return film.periodic[axis] ? Math.ceil(((axis ? view.y : view.x) - high) / film.edges[axis]) : 0;
 }

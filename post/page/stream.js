@@ -232,7 +232,7 @@ function choices(wish) {
   return { pace, speed: $('pace').value, state: { colour, arrows, sofar, total } };
 }
 
-// When another run starts beside this run, this film plays again from its first stored frame.
+// When another run starts beside the run of this film, this film plays again from its first stored frame.
 function replay() {
   if (!film) return;
   show(first(), true);
