@@ -17,11 +17,11 @@ of a mixture.
 The time correlations are calculated by the module `ricochet.correlations`, whose docstring explains
 how pairs of frames are chosen.  The time correlations are the velocity autocorrelation <v(0) v(t)>,
 the mean square displacement, the self-intermediate scattering function, and the non-Gaussian
-parameter.  The self-intermediate scattering function is F_s(k, t) = <exp(i k r)> at the wavenumber
---wavenumber.  The non-Gaussian parameter is alpha2 = <r^4> / (2 <r^2>^2) - 1. In theory the
-velocity autocorrelation decays as exp(-w t) at short times, and as 1/t at long times (mode
-coupling).  The table also contains the overlap, which is the fraction of the disks within 0.3
-diameters of their first position.
+parameter.  The self-intermediate scattering function is F_s(k, t) = <exp(i k r)>, where the
+wavenumber k is the value of --wavenumber.  The non-Gaussian parameter is alpha2 = <r^4> / (2
+<r^2>^2) - 1. In theory the velocity autocorrelation decays as exp(-w t) at short times, and as 1/t
+at long times (mode coupling).  The table also contains the overlap, which is the fraction of the
+disks within 0.3 diameters of their first position.
 
 There are two definitions of the diffusion coefficient D(t).  By the first definition, D is a
 quarter of the slope of the mean square displacement between neighbouring lags.  By the second
@@ -77,7 +77,8 @@ from ricochet.script import by_packing, command_line, launch, measured, over_run
 import numpy as np
 
 PLAIN = {"walls"}  # the only special property allowed for Enskog's D
-#: Traits of runs that do not reach equilibrium, but for which the structure can be computed.
+#: Physical properties (traits) of runs that do not reach equilibrium, but of which the structure
+#: can be computed.
 RESTLESS = (
     "inelastic",
     "soft_contacts",

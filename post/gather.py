@@ -5,7 +5,7 @@
 The table contains a row for each member run.  The first columns are the name of the run, the values
 of all variables that the sweep changes, and the seed.  The next columns contain the state of the
 run (finished, unfinished or failed), the reason of a failure, and the wall time in seconds.  The
-last columns are the final values of all scalar observables.
+last columns of the table are the final values of all scalar observables.
 """
 
 import argparse

@@ -4,17 +4,18 @@
 
 The temperature kT is the mean kinetic energy of a disk in equilibrium.  Equilibrium begins after
 the first X collisions per disk, where X is the value of --equilibration, or by default when no
-observable drifts any longer.  The figure and the second table state why earlier frames are not
-used.  The solid lines show P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT).  The
-height h is the height of the centre of a disk above its lowest possible position.  These laws are
-exact for a large number of point particles.  The dashed lines include two corrections.  The first
-correction is for a fixed total energy of N disks: it replaces the factor exp(-e / kT) for the
-energy e of a disk by (1 - e / (2 N kT))^(2 N - 2).  The second correction accounts for the area
-that disks exclude for the centres of other disks.  The centres of disks of species i cannot be in
-the area pi s_ij^2 around each disk of species j, where s_ij is the sum of the two radii.  To first
-order, the excluded area multiplies the density of species i by exp(-sum_j pi s_ij^2 n_j(h)).  The
-correction for the excluded area is a few per cent near the floor.  If sum_j pi s_ij^2 n_j(h),
-calculated for point particles, exceeds 0.5, no dashed line is drawn for the heights.
+observable drifts any longer.  The figure and the second table state why the frames before
+equilibrium are not used.  The solid lines show P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~
+exp(-m g h / kT).  The height h is the height of the centre of a disk above its lowest possible
+position.  The laws that the solid lines show are exact for a large number of point particles.  The
+dashed lines include two corrections.  The first correction is for a fixed total energy of N disks:
+it replaces the factor exp(-e / kT) for the energy e of a disk by (1 - e / (2 N kT))^(2 N - 2).  The
+second correction accounts for the area that disks exclude for the centres of other disks.  The
+centres of disks of species i cannot be in the area pi s_ij^2 around each disk of species j, where
+s_ij is the sum of the two radii.  To first order, the excluded area multiplies the density of
+species i by exp(-sum_j pi s_ij^2 n_j(h)).  The correction for the excluded area is a few per cent
+near the floor.  If sum_j pi s_ij^2 n_j(h), calculated for point particles, exceeds 0.5 at the
+floor, no dashed line is drawn for the heights.
 
 Slopes are the decay constants of greatest likelihood of exponential distributions that are fitted
 to the values from 0 to 5 kT of the kinetic energy and from 1 to 5 kT of m g h.  The heights below
@@ -135,8 +136,9 @@ def crowded_heights(
 ) -> list[np.ndarray]:
     """Return the densities at the heights (H,), corrected to first order for the excluded area.
 
-    `width` is the width of the area that the centres of disks can reach, and `share` is the result
-    of the function `sharers`.  The area that a disk excludes does not affect the disk itself.
+    `width` is the width of the area that the centres of disks can reach, and `share` is the number
+    of disks that share a fixed total energy.  The area that a disk excludes does not affect the
+    disk itself.
     """
     numbers = [s.height.shape[1] for s in species]
     ideal = [sharing(s.mass * pull * height, kt, share) for s in species]
@@ -220,8 +222,8 @@ def draw(run: Run, species: list[Samples], result: list[dict], began: tuple) -> 
 
     The left panels have linear axes, and the right panels have logarithmic axes.
 
-    `began` contains the time of the first frame used, and the reason why earlier frames are not
-    used.
+    `began` contains the time of the first frame used, and the reason why the frames before this
+    time are not used.
     """
     figure, panels = plt.subplots(2, 2, figsize=(11, 8), sharex="row")
     kt, g = result[0]["kT"], float(np.abs(run.gravity[1]))

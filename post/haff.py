@@ -7,11 +7,12 @@ energy K against time in units of the initial mean free time 1/w0. The left pane
 law K0 / (1 + (1 - xi^2) w0 t / 4)^2 (Haff 1983).  The right panel shows K against collisions per
 disk, and an exponential law (van Noije and Ernst 1998).  The lower panels show the ratio of K to
 Haff's law and the ratio of K to the exponential law.  Haff's law and the exponential law apply
-while the gas is homogeneous.  At later times a part of K is the energy of flows in the gas, and K
-decreases more slowly.  The boxes must be periodic, and the total momentum must be 0. For equal
-disks the initial collision rate w0 is calculated from the equation of state.  For unequal disks w0
-is measured from the first collisions.  Haff's law and the exponential law assume that all species
-have the same temperature; this assumption is wrong if the masses are very different.
+while the gas is homogeneous.  After the end of the homogeneous state, a part of K is the energy of
+flows in the gas, and K decreases more slowly.  The boxes must be periodic, and the total momentum
+must be 0. For equal disks the initial collision rate w0 is calculated from the equation of state.
+For unequal disks w0 is measured from the first collisions.  Haff's law and the exponential law
+assume that all species have the same temperature; this assumption is wrong if the masses are very
+different.
 
 The cooling rate is -d ln K / d tau, where tau is the number of collisions per disk.  The rate is
 averaged over two collisions per disk and over the runs.  If the measured cooling rate falls below

@@ -34,7 +34,7 @@ work(scene)"""
 
 
 def routes(lab: Lab) -> dict:
-    """Return for each address the function that answers its requests."""
+    """Return for each address of the web server the function that answers the requests."""
     data = {"table": lab.table, "inputs": chooser([*lab.inputs.values()])}
 
     async def formed(request: web.Request) -> web.Response:

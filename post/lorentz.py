@@ -50,7 +50,7 @@ def density_of(run: Run) -> float:
 
 
 def diffusion(run: Run, lags: tuple[float, float]) -> dict[str, float]:
-    """Return D / D_0 between two lags in mean free times, and the reduced mean free time."""
+    """Return D / D_0, measured between two lags, and the mean free time divided by 1/(2 n R v)."""
     speed = float(run.speed(0)[0])
     reach = float(run.radius[0] + run.obstacles[0].radius)
     free = reach / (2 * density_of(run) * speed)

@@ -2,17 +2,17 @@
 
     python post/lyapunov.py runs/pairs/*.h5 -o lyapunov.png --csv lyapunov.csv
 
-The runs are combined to pairs in the given order.  The two runs of a pair start from almost the
-same state and have frames at the same times.  The distance between two runs is the Euclidean
-distance between the positions of all disks, calculated with the nearest periodic images.  The
-distance between the two runs of a pair grows as exp(lambda t) until it reaches the size of the box.
-A straight line is fitted to the logarithm of the distance of each pair, in the same interval of
-time for all pairs.  The fits end at the time at which the first pair reaches the distance
+Successive runs in the given order are combined into pairs.  The two runs of a pair start from
+almost the same state and have frames at the same times.  The distance between two runs is the
+Euclidean distance between the positions of all disks, calculated with the nearest periodic images.
+The distance between the two runs of a pair grows as exp(lambda t) until it reaches the size of the
+box.  A straight line is fitted to the logarithm of the distance of each pair, in the same interval
+of time for all pairs.  The fits end at the time at which the first pair reaches the distance
 --largest.  The value of --fit-from is the ratio of the start time to the end time of the fits.
-Earlier times are not used, because the separation has not yet turned into the direction of fastest
-growth.  The Lyapunov exponent lambda is the mean slope of the fitted lines, and its error is the
-standard error of the mean.  The script rejects gases that cool, because their rate of divergence is
-not constant.
+Times before the start of the fits are not used, because the difference of the two states has not
+yet turned into the direction of fastest growth.  The Lyapunov exponent lambda is the mean slope of
+the fitted lines, and its error is the standard error of the mean.  The script rejects gases that
+cool, because their rate of divergence is not constant.
 """
 
 from typing import NamedTuple

@@ -10,8 +10,8 @@ up to 6 % lower, is the result of direct simulations of the Boltzmann equation a
 available.  The prediction and the simulation result apply to a homogeneous dilute gas of equal
 disks without Coulomb friction.  In a cooling gas a flow develops, which contributes to T and
 therefore decreases the ratio.  The flow decreases the ratio by 3.8 to 4.6 % at a packing fraction
-of 0.02, and by 0.3 to 0.5 % at a packing fraction of 0.0025. If the gas cools faster, the decrease
-is larger.  All runs must have the same input, and the box must be periodic.
+of 0.02, and by 0.3 to 0.5 % at a packing fraction of 0.0025. If the gas cools faster, the flow
+decreases the ratio more.  All runs must have the same input, and the box must be periodic.
 """
 
 from ricochet import Run, RunError, theory

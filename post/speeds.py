@@ -8,24 +8,24 @@ mass.  If m = 1 and all initial speeds are 1, u equals v.  With --unscaled the h
 units of the input.  Runs with the same number of disks N are combined.  Equilibrium, or the steady
 state of a driven gas, begins after the first X collisions per disk, where X is the value of
 --equilibration, or by default when no observable drifts any longer.  Frames selected by --frames
-are used only if they are at least --min-separation collisions per disk apart.  The temperature kT
-is the mean over the frames that are used.  In a sheared box, speeds are measured relative to the
-mean flow.  A gas that only loses energy does not reach a steady state.  The histogram of a gas that
-only loses energy contains the frames after the first X collisions per disk, where X is the value of
---equilibration (by default 15), and the speeds in each frame are scaled with kT of that frame.
-If sides of the box move or if kT drifts, the speeds in each frame are also scaled with kT of that
-frame; then `kT_first` and `kT_last` show the change of kT.  Each species of a mixture has a
-separate row in the table and a separate curve.  The row contains the temperature kT, and the
-temperatures kT_x and kT_y of both velocity components.  Kolmogorov-Smirnov (KS) and chi-square
-tests compare the speeds with the expected distribution.  Before the tests, the speeds in each frame
-are divided by the thermal speed in that frame.  If the kinetic energy is conserved, the expected
-distribution is that of N disks with a fixed total kinetic energy; otherwise the Maxwell
-distribution is expected.  The p-values are determined from random samples, whose speeds are also
-divided by their thermal speed (docs/theory.md).  Frames that are close in time contain correlated
-speeds; therefore the number of `independent` speeds is reduced by the statistical inefficiency.
-The statistical tests do not apply to disks that conserve their angular momentum in a round
-container.  The last panel shows the second Sonine coefficient a2 = <v^4> / (2 <v^2>^2) - 1 against
-the number of collisions per disk.
+are used only if they are at least X collisions per disk apart, where X is the value of
+--min-separation.  The temperature kT is the mean over the frames that are used.  In a sheared box,
+speeds are measured relative to the mean flow.  A gas that only loses energy does not reach a steady
+state.  The histogram of a gas that only loses energy contains the frames after the first X
+collisions per disk, where X is the value of --equilibration (by default 15), and the speeds in each
+frame are scaled with kT of that frame.  If sides of the box move or if kT drifts, the speeds in
+each frame are also scaled with kT of that frame; then `kT_first` and `kT_last` show the change of
+kT.  Each species of a mixture has a separate row in the table and a separate curve.  Each row
+contains the temperature kT, and the temperatures kT_x and kT_y of both velocity components.
+Kolmogorov-Smirnov (KS) and chi-square tests compare the speeds with the expected distribution.
+Before the tests, the speeds in each frame are divided by the thermal speed in that frame.  If the
+kinetic energy is conserved, the expected distribution is that of N disks with a fixed total kinetic
+energy; otherwise the Maxwell distribution is expected.  The p-values are determined from random
+samples, whose speeds are also divided by their thermal speed (docs/theory.md).  Frames that are
+close in time contain correlated speeds; therefore the number of `independent` speeds is reduced by
+the statistical inefficiency.  The statistical tests do not apply to disks that conserve their
+angular momentum in a round container.  The last panel shows the second Sonine coefficient a2 =
+<v^4> / (2 <v^2>^2) - 1 against the number of collisions per disk.
 """
 
 from typing import NamedTuple
@@ -211,7 +211,7 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
 
 
 def cooling(row: dict) -> str:
-    """Return the change of the temperature of a gas as text; kT can increase under gravity."""
+    """Return the temperature change of a gas as text; under gravity, kT can also increase."""
     goes = "falls" if row["kT_last"] < row["kT_first"] else "goes"
     if row["frames"] == row["runs"]:
         return f"kT is {row['kT_last']:.4g}"
@@ -233,7 +233,7 @@ def label_of(row: dict, state: str) -> str:
 
 
 def chance(p: float) -> str:
-    """Return a probability as text; the text is never 0 or 1."""
+    """Return a p-value as text, which is never "0" or "1"."""
     return "p < 0.0001" if p < 1e-4 else f"p = {min(p, 0.9999):.4f}"
 
 
