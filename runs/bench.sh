@@ -32,7 +32,7 @@ input() {
 
 # state NAME SPECIES...: simulates these species for 20 collisions per disk, and writes the input file $work/NAME.nml, which starts
 # from the last frame of this simulation. The initial positions are random or, if the packing fraction is too high for random
-# insertion, on a lattice. A lattice of 1e5 disks or more does not melt during the 20 collisions per disk.
+# insertion, on a lattice. A lattice of 1e5 disks or more does not melt during a simulation of 20 collisions per disk.
 state() {
   local name=$1 placement=random
   shift

@@ -394,8 +394,8 @@ clock() {
   fi
 }
 
-# tell MEMBER TEXT: prints a line about a member run of a share. The line contains the name of the member run, the time and the
-# host, because shares are processed on other computers or at other times.
+# tell MEMBER TEXT: prints a line about a member run if this script performs only a share of the member runs. The line contains the
+# name of the member run, the time and the host, because shares are processed on other computers or at other times.
 tell() {
   [[ -z $task ]] || printf '%(%FT%T%z)T %s %s %s: %s\n' -1 "$task" "$host" "$1" "$2" >&2
 }
