@@ -1,8 +1,8 @@
 !> Calendar: the part of the event queue that contains events of later times. Time is divided into windows of equal length. Each of
 !> the next windows has a bucket: an array that occupies one cache line. Later times are divided into spans of many windows, and
-!> each span has an unordered list of events. An entry is appended to a bucket or a list, which accesses few cache lines. Single
-!> entries are never searched for or removed. All lists share one array, which is divided into chunks. The chunks of a list are
-!> reused after the span of the list has been processed.
+!> each span has an unordered list of events. A new entry is appended at the end of a bucket or a list, so that few cache lines are
+!> accessed. No procedure searches a bucket or a list for the entry of a particular disk, or removes a single entry. All lists share
+!> one array, which is divided into chunks. The chunks of a list are reused after the span of the list has been processed.
 module calendar
   use kinds, only: int32, real64
   use disks, only: tag_t
@@ -12,7 +12,7 @@ module calendar
 
   integer(int32), parameter :: bucket_capacity = 15
   !> Intended mean number of events in a window. With fewer events per window, more windows are processed that contain no event.
-  !> With more events per window, more buckets are full, and events that do not fit into a bucket are stored in the heap.
+  !> With more events per window, buckets are full more often, and events that do not fit into a full bucket are stored in the heap.
   real(real64), parameter :: events_per_window = 4.0_real64
   integer(int32), parameter :: few_disks = 5000    !! number of disks up to which nearly all events fit into buckets
   !> For each stage of prefetching, the number of windows between the current window and the last prefetched window.
@@ -43,8 +43,8 @@ module calendar
   type :: calendar_t
     type(bucket_t), allocatable :: bucket(:)       !! (0:last_bucket) circular buffer of the buckets of the next windows
     !> (0:last_span) position in `filed` after the last entry in the list of each span, 0 if the list is empty. `list_end` is a
-    !> circular buffer, like `bucket`. A span contains half as many windows as there are buckets. Because the buffer is circular,
-    !> the list of a span can also contain events of later spans that use the same element of `list_end`.
+    !> circular buffer, like `bucket`. The number of windows in a span is half the number of buckets. Because the buffer is
+    !> circular, the list of a span can also contain events of later spans that use the same element of `list_end`.
     integer(int32), allocatable :: list_end(:)
     !> (0:) the chunks of all lists. Each chunk contains a link to the previous chunk of the same list.
     type(filed_t), allocatable :: filed(:)
@@ -68,10 +68,10 @@ module calendar
 
 contains
 
-  !> Empties the calendar, and chooses the numbers of buckets and spans. The windows of all buckets and spans are intended to
-  !> contain at least 2n events in total, so that most events of n disks fit into the calendar. For many disks the number of buckets
-  !> is limited, so that buckets and disks fit into the cache together. The number of cache lines that are written is smallest if
-  !> the numbers of buckets and spans are equal.
+  !> Empties the calendar, and chooses the numbers of buckets and spans. The numbers are chosen such that the windows of all buckets
+  !> and spans together contain at least 2n events on average, so that most events of n disks fit into the calendar. If there are
+  !> many disks, the number of buckets is limited, so that buckets and disks fit into the cache together. The program writes to the
+  !> smallest number of different cache lines if there are as many buckets as spans.
   subroutine empty(self, n)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: n                !! number of disks

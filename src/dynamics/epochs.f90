@@ -15,7 +15,7 @@ module epochs
   !> Intended number of collisions per disk in an epoch. The time origin moves at the end of each epoch, so that times keep their
   !> precision.
   integer(int64), parameter :: epoch_length = 24
-  !> Number of significant bits in a shift of the time origin. With so few bits, sums of shifts are exact.
+  !> Number of significant bits in a shift of the time origin. The number is so small that sums of shifts have no rounding error.
   integer, parameter :: significant_bits = 20
   !> A collapse is reported if the time does not advance during `collapse_length` events in total and during
   !> `collapse_length_per_disk` events per disk.
@@ -125,7 +125,7 @@ contains
     sim%last_advance = sim%last_advance - shift
     sim%box%epoch = sim%box%epoch + shift
     sim%box%side%clock = sim%box%side%clock - shift
-    if (.not. any(sim%box%surface(:n_sides)%motion%moves())) return      ! disks are separated only from moving sides
+    if (.not. any(sim%box%surface(:n_sides)%motion%moves())) return      ! disks are moved away only from moving sides
     do i = 1, sim%n_disks()
       call separate_from_sides(sim%box, sim%disk(i), sim%now)
     end do

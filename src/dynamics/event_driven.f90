@@ -29,7 +29,8 @@ module event_driven
 
   !> Largest number of events between two checks of the limits.
   integer(int64), parameter :: events_to_look = 20000
-  !> Largest number of disks that fit into a second-level cache. With more disks, prefetching saves time.
+  !> Largest number of disks that fit into a second-level cache. Prefetching saves time only if a simulation contains more disks
+  !> than this number.
   integer(int32), parameter :: disks_in_cache = 20000
   integer(int64), parameter :: events_ahead = 8    !! number of events between two prefetches
 
@@ -71,8 +72,8 @@ contains
     call self%queue%fill(sim%disk, sim%tag, sim%now, self%windowed)
   end subroutine start
 
-  !> Predicts the events of the changed disks again. An event that another disk stores, with a changed disk as its partner, has
-  !> become stale.
+  !> Predicts the events of the changed disks again. If another disk stores an event with one of the changed disks as the partner,
+  !> the stored event has become stale.
   subroutine renew(self, sim, changed)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -96,7 +97,7 @@ contains
   subroutine renew_all(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64) :: last                           ! time of the last event that enters the queue [time]
+    real(real64) :: last                           ! latest time of an event that is entered into the queue [time]
     integer(int32) :: i, n
 
     n = sim%n_disks()

@@ -9,8 +9,8 @@ module event_heap
   private
   public :: event_heap_t, need_order, precedes
 
-  !> Number of children of a node. A heap with four children per node has half the depth of a binary heap, and the number of cache
-  !> lines that are accessed per level is equal.
+  !> Number of children of a node. A heap with four children per node has half the depth of a binary heap, but a level needs as many
+  !> accesses to cache lines as a level of a binary heap.
   integer(int32), parameter :: arity = 4
 
   type :: event_heap_t

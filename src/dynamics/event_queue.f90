@@ -2,8 +2,8 @@
 !>
 !> Events of the current time window are in a short sorted list. If the sorted list becomes full, its events are moved to the heap,
 !> and the heap is used until the end of the window. Events of later windows are in the calendar, or in the heap if their bucket is
-!> full. Single entries are never searched for or removed. An entry is valid only if the entry still equals the event that its disk
-!> stores. Without the calendar all events are in the heap.
+!> full. No procedure searches the lists of the calendar for the entry of a particular disk, or removes a single entry. An entry is
+!> valid only if the entry still equals the event that its disk stores. Without the calendar all events are in the heap.
 module event_queue
   use kinds, only: int32, int64, never, real64
   use calendar, only: bucket_capacity, bucket_t, calendar_t, events_per_window, most_coming, window_none
@@ -69,7 +69,7 @@ contains
     self%near(0)%time = huge(now)
     call self%heap%initialise(self%n_disks)
     tag%window = window_none
-    ! The lower bound ensures that window numbers fit into 32-bit integers.
+    ! The width of a window has a lower bound, so that window numbers fit into 32-bit integers.
     self%width = max(window_width(), 1.0e-9_real64*now, 1/never)
     self%windowed = windowed .and. self%width < never
     self%near_is_open = self%windowed

@@ -9,10 +9,11 @@ module evolution
   private
   public :: evolution_t, limits_t
 
-  !> Limits of the dynamics. The dynamics returns to the caller when the first limit is reached. A default value is a limit that is
-  !> never reached.
+  !> Limits of the dynamics. The dynamics returns to the caller when the first limit is reached. By default each limit has a value
+  !> that no simulation reaches.
   type :: limits_t
-    !> Limit of the time, relative to the start of the run; relative to `box%epoch` in calls of `evolution_t` [time]
+    !> Limit of the simulated time, measured from the start of the run [time]. In calls of the procedures of `evolution_t` the limit
+    !> is measured from the time origin `box%epoch`.
     real(real64) :: time = never
     integer(int64) :: collisions = huge(0_int64)
     integer(int64) :: events = huge(0_int64)
@@ -32,7 +33,8 @@ module evolution
     logical :: arrived = .false.  !! whether `advance` has reached its time limit and executed all events up to this limit
     integer(int64) :: iterations_left = 0  !! number of allowed iterations that the last call of `advance` did not use
     integer(int64) :: serial_events = 0    !! number of events executed by the serial engine of a parallel run
-    integer(int32) :: last_event(2) = 0    !! disk and partner of the last event, or of the first event after the time limit
+    !> Disk and partner of the last executed event; if the time limit was reached, of the first event after the limit.
+    integer(int32) :: last_event(2) = 0
   contains
     procedure :: warning
     procedure :: pause_at
@@ -75,8 +77,8 @@ contains
   end function reached
 
   !> Whether a quantity that can change in any collision, such as the dissipated energy, has reached its limit. A quantity with a
-  !> limit must never decrease during a run. A parallel run detects only at the end of a time window that a quantity has exceeded
-  !> its limit. To find the collision at which a limit was reached, a parallel run repeats the window.
+  !> limit must never decrease during a run. A parallel run, which advances by time windows, detects only at the end of a window
+  !> that a quantity has exceeded its limit. The run then repeats the window to find the collision at which the limit was reached.
   pure function outgrown(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally

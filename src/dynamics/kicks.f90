@@ -1,6 +1,6 @@
-!> Applies kicks: changes of the velocities of disks at regular times. The random numbers of a kick are functions of the seed, the
-!> disk and the number of the kick alone. The random numbers therefore depend neither on the order of the disks nor on the history
-!> of the run.
+!> Applies kicks: changes of the velocities of disks at regular times. The random numbers of a kick depend only on the seed, the
+!> disk and the number of the kick. The random numbers therefore depend neither on the order of the disks nor on the history of the
+!> run.
 module kicks
   use kinds, only: int32, int64, pi, real64
   use disks, only: advance_disk
@@ -72,7 +72,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer(int64), intent(in) :: key            !! key of the random numbers of all disks, from `key_of_draws`
-    logical, intent(out) :: is_hit               !! .false. if the driving is 'andersen' and the disk is not selected
+    logical, intent(out) :: is_hit               !! whether the disk receives the kick; 'andersen' selects disks at random
     real(real64), intent(out) :: z(2)            !! Gaussian random numbers of variance 1 drawn for the velocity
     type(random_stream_t) :: stream
     real(real64) :: u, spin(2), v(2)

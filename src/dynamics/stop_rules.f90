@@ -1,9 +1,10 @@
-!> Determines when a run ends: when one of the stop rules in the input is met, or when rounding errors dominate.
+!> Determines when a run ends: when one of the stop rules in the input is met, or when rounding errors dominate the velocities of
+!> the disks.
 !>
 !> Inelastic disks in a periodic box cool without end. The run ends when rounding errors dominate the temperature. The test for a
 !> negligible temperature is made at the start of each epoch, so that the end of the run depends on the trajectory alone. The test
-!> compares the kinetic energy with its value at the time when the velocities were last set, because the earlier value determines
-!> the magnitude of the rounding errors.
+!> compares the present kinetic energy with the kinetic energy at the time when the velocities were last set, because the magnitude
+!> of the rounding errors follows from that earlier energy.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use epochs, only: is_at_rest, stands_still
@@ -18,7 +19,7 @@ module stop_rules
   real(real64), parameter :: coldest = 1.0e-25_real64        !! temperature at which a run ends, divided by the initial temperature
   character(len=*), parameter :: coldness = "cooled to 1e-25 of the initial temperature"
 
-  !> Stop rules in the input. A default value is a limit that is never reached.
+  !> The values of the stop rules in the input. By default each limit has a value that no simulation reaches.
   type :: stop_settings_t
     real(real64) :: time = never
     integer(int64) :: collisions = huge(0_int64)
@@ -106,8 +107,9 @@ contains
       yes = relative_energy(sim) < coldest*sim%reference_energy
   end function too_cold
 
-  !> Whether a run is finished. A run is finished when a stop rule is met, when rounding errors dominate, or, if the run has no time
-  !> limit, when no event will occur any more. Failures are not tested here, because `timeline` and the evolution report failures.
+  !> Whether a run is finished. A run is finished when a stop rule is met, when rounding errors dominate the velocities of the
+  !> disks, or, if the run has no time limit, when no event will occur any more. Failures are not tested here, because `timeline`
+  !> and the evolution report failures.
   pure function is_over(self, sim, evolution) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

@@ -139,8 +139,8 @@ contains
 
   !> Advances all disks to the time t and executes all collisions at this time. Collisions with sides come first, then collisions
   !> with obstacles, then collisions of two disks. Within each of the three kinds, collisions are executed in ascending order of the
-  !> indices, so that the result does not depend on the search for pairs. A stop request ends a long search before the state has
-  !> changed.
+  !> indices, so that the result does not depend on the search for pairs. If a stop is requested during a long search for pairs, the
+  !> procedure returns early, and the state is then still unchanged.
   subroutine take_step(self, sim, t, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -211,8 +211,8 @@ contains
       end do
     end subroutine meet_sides
 
-    !> Reflects disk i, which is beyond a side or an obstacle, if it moves further outwards. The position of the disk is not
-    !> changed, so that its potential energy is conserved.
+    !> Reflects disk i, which overlaps a wall (a side or an obstacle), if the disk moves further into the wall. The position of the
+    !> disk is not changed, so that its potential energy is conserved.
     subroutine meet_wall(i, code)
       integer(int32), intent(in) :: i, code
       real(real64) :: normal(2)

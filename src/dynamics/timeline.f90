@@ -58,7 +58,7 @@ contains
     due = min(limits%time, kick_time)
     goal = limits
     until = due - sim%box%epoch
-    if (sim%box%epoch + until < due) until = nearest(until, 1.0_real64)   ! rounded up; otherwise `due` would never be reached
+    if (sim%box%epoch + until < due) until = nearest(until, 1.0_real64)   ! rounding up ensures that `due` is reached
     goal%time = until
     if (sim%epoch_end > 0) then                    ! time-stepped dynamics has no epochs
       goal%time = min(goal%time, sim%epoch_end)
@@ -111,12 +111,12 @@ contains
   end subroutine advance_once
 
   !> Number of iterations that take about `pause_interval`. The number is increased only after a call that used all its iterations.
-  !> If calls that reach a limit early also increased the number, the number would become arbitrarily large in a run with many
-  !> samples, and signals would not be checked for hours after the last sample.
+  !> A call that reaches a limit early does not increase the number. Otherwise the number would become arbitrarily large in a run
+  !> with many samples, and signals would not be checked for hours after the last sample.
   pure function adapted_iterations(iterations, elapsed, cut_short) result(n)
     integer(int64), intent(in) :: iterations
     real(real64), intent(in) :: elapsed               !! wall-clock time of the iterations that were used [s]
-    logical, intent(in) :: cut_short                  !! a limit was reached before all iterations were used
+    logical, intent(in) :: cut_short                  !! whether a limit was reached before all iterations were used
     integer(int64) :: n
 
     n = iterations
@@ -177,7 +177,7 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code
     logical :: yes
-    real(real64), parameter :: grazing = 1.0e-6_real64     ! largest ratio of the normal velocity to the speed
+    real(real64), parameter :: grazing = 1.0e-6_real64     ! largest ratio of normal velocity to speed of a sliding disk
     real(real64) :: x(2), v(2), normal(2)
 
     yes = .false.

@@ -127,10 +127,10 @@ contains
     end associate
   end subroutine mark_overlaps
 
-  !> Adds the pairs of disks that are close to each other. The search for each disk finds smaller disks, and disks of equal size
-  !> with higher indices. The search for a small disk therefore covers only few bins, however large the largest disk is. The grid of
-  !> bins is treated as periodic along both axes. Near walls the periodicity of the grid has no effect, because disks near opposite
-  !> walls are too far apart to form a pair.
+  !> Adds the pairs of disks that are close to each other. The search for the partners of a disk is limited to smaller disks, and to
+  !> disks of equal size with higher indices. The search for a small disk therefore covers only few bins, however large the largest
+  !> disk is. The grid of bins is treated as periodic along both axes. Near walls the periodicity of the grid has no effect, because
+  !> disks near opposite walls are too far apart to form a pair.
   subroutine list_disks(self, sim, x, bins)
     type(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
