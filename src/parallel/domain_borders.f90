@@ -50,7 +50,7 @@ contains
           found = found + 1
           associate (history => mine%history(mine%history_of(s)))
             same = history%digest == theirs%history(r)%digest .and. same_state() &
-              .and. self%patch%holds(self%sim%tag(s)%cell)  ! a copy outside of the patch needs a correction
+              .and. self%patch%holds(self%sim%tag(s)%cell)  ! a copy that has left the patch must be corrected
             if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
             near = came_near(theirs%history(r), met)
             if (.not. met) met = mine%could_have_met(int(history%low, int32), int(history%high, int32))
@@ -105,7 +105,7 @@ contains
       yes = all(transfer(self%sim%extra(s), [0_int64]) == transfer(other%sim%extra(t), [0_int64]))
     end function same_state
 
-    !> Adds the true state of a disk, which has the index t in the neighbouring domain, to the list of corrections.
+    !> Adds the true state of a disk to the list of corrections. The disk has the index t in the neighbouring domain.
     subroutine add_correction()
       if (.not. allocated(self%corrections)) allocate (self%corrections(256))
       if (self%n_corrections == size(self%corrections)) self%corrections = [self%corrections, self%corrections]

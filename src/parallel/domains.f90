@@ -20,7 +20,7 @@ module domains
   public :: advance_domain, correction_t, domain_t, forever, list_copies, load, merge_logs, next_time, slot_of_copy, write_back
 
   real(real64), parameter :: forever = 2.0e150_real64      !! a time later than the time of any event
-  !> Largest wall-clock time in which a domain tries to complete a window [s]
+  !> Wall-clock time after which a domain gives up a window that it has not completed [s]
   real(real64), parameter :: longest_window = 5.0_real64
   !> Number of iterations between two checks of signals and of the clock.
   integer(int64), parameter :: iterations_between_checks = 100000

@@ -19,13 +19,16 @@ module parallel_events
 
   integer, parameter :: most_windows = 24                      !! largest number of windows in one call of `run_domains`
   real(real64), parameter :: shortest = 0.1_real64             !! shortest window that is tried, relative to the usual length
-  !> Numbers of events per disk that must remain before a limit is reached; with fewer remaining events the serial engine is used.
-  !> The required number of events per disk is `least_left` while domains are in use, and `least_left_to_begin` otherwise.
+  !> Domains are used only if more than a certain number of events per disk remain before a limit is reached. This number is
+  !> `least_left` if domains are already in use, and `least_left_to_begin` otherwise.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
-  ! Shortest and longest periods for which the serial engine is used [events per disk]
-  integer(int64), parameter :: brief(2) = 5                         !! shortest and longest period if domains cannot be used
-  integer(int64), parameter :: after_failures(2) = [5, 5*2**20]     !! shortest and longest period after invalid windows
-  integer(int64), parameter :: while_busy(2) = [50, 1600]  !! shortest and longest period while other programs use the cores
+  !> Shortest and longest period of the serial engine if domains cannot be used, if a limit or an inelastic collapse is reached, or
+  !> if no event is left [events per disk]
+  integer(int64), parameter :: brief(2) = 5
+  !> Shortest and longest period of the serial engine after invalid windows [events per disk]
+  integer(int64), parameter :: after_failures(2) = [5, 5*2**20]
+  !> Shortest and longest period of the serial engine while other programs use the cores [events per disk]
+  integer(int64), parameter :: while_busy(2) = [50, 1600]
 
   !> Values of `predicted_by`: the engine that has predicted the events.
   integer, parameter :: no_engine = 0, serial_engine = 1, all_domains = 2
@@ -34,8 +37,8 @@ module parallel_events
     !> Template of the serial engine, which is copied when the serial engine is needed.
     type(event_driven_t) :: serial
     type(partition_t) :: parts
-    !> Smallest number of disks in a domain. The smallest number is doubled in a periodic box, in which domains have neighbouring
-    !> domains on all sides.
+    !> Smallest number of disks in a domain. A domain must contain at least twice this number in a periodic box, in which domains
+    !> have neighbouring domains on all sides.
     integer(int32) :: least_disks = 1250
     integer(int32) :: most_disks = 62000           !! largest number of disks in a domain that fits into the cache
     !> Average number of active cores below which the serial engine is faster than several threads.
@@ -45,7 +48,7 @@ module parallel_events
     type(event_driven_t), allocatable, private :: engine   !! the serial engine in use
     integer, private :: predicted_by = no_engine   !! engine that holds the predicted events
     integer(int64), private :: serial_period = 0   !! length of the last period of the serial engine [events per disk]
-    integer(int64), private :: serial_until = -1   !! number of events up to which the serial engine is used
+    integer(int64), private :: serial_until = -1   !! total number of events at which the last period of the serial engine ends
   contains
     procedure :: start
     procedure :: renew
@@ -173,17 +176,17 @@ contains
       if (all(self%parts%domain%engine%idle)) call use_serial_engine(brief)
     end subroutine run_domains
 
-    !> Largest number of windows in a call of `run_domains`. After recent failures the largest number is smaller, because an invalid
-    !> window invalidates all windows of the call.
+    !> Largest number of windows in the next call of `run_domains`. The number is reduced after invalid windows, because a single
+    !> invalid window invalidates all windows of a call.
     pure function most_windows_now() result(n)
       integer :: n
 
       n = max(1, int(most_windows*self%parts%shortening**4))
     end function most_windows_now
 
-    !> Makes windows longer after a call in which all windows were valid. The length of windows is constant within a call. If
-    !> windows became longer after each valid window, a single call could undo the shortening after the last failure. An invalid
-    !> window at the end of each call would discard all windows of the call, and the run would make no progress.
+    !> Makes windows longer after a call in which all windows were valid. The length of windows is constant within a call. Otherwise
+    !> windows could become so long within a single call that its last window is invalid. If this happened in each call, all windows
+    !> would be discarded, and the run would make no progress.
     subroutine lengthen_windows(windows)
       integer, intent(in) :: windows               !! number of windows in the last call
 
@@ -205,10 +208,10 @@ contains
     end subroutine shorten_windows
 
     !> Selects the serial engine for a period. The period is twice as long as the last period, unless the domains have worked for
-    !> longer than the last period in the meantime. A run that is unsuitable for domains therefore takes hardly longer than with the
-    !> serial engine alone.
+    !> longer than the last period in the meantime. If a run is unsuitable for domains, the repeated doubling ensures that the run
+    !> takes hardly longer than with the serial engine alone.
     subroutine use_serial_engine(periods)
-      integer(int64), intent(in) :: periods(2)      !! shortest and longest period [events per disk]
+      integer(int64), intent(in) :: periods(2)      !! limits of the period [events per disk]
 
       if (sim%tally%events - self%serial_until > self%serial_period*sim%n_disks()) self%serial_period = 0
       self%serial_period = min(max(2*self%serial_period, periods(1)), periods(2))

@@ -34,7 +34,7 @@ module partition
     logical :: corrects = .false.                  !! whether domains first apply the corrections of the previous window
     real(real64) :: t = 0.0_real64                 !! time up to which domains advance, relative to `box%epoch` [time]
     integer(int64) :: iterations = 0               !! largest number of iterations of an engine in this step
-    logical :: compares = .false.                  !! whether domains are compared, because the window has ended
+    logical :: compares = .false.                  !! whether the window has ended, so that the domains are compared
     logical :: valid = .true.                      !! whether the window is valid
   end type plan_t
 
@@ -45,7 +45,7 @@ module partition
     integer(int32) :: halo = 6                     !! width of the halo around a domain [cells]
     !> Largest number of iterations of one engine in a step, divided by the number of iterations expected in all domains together.
     real(real64) :: overload = 4.0_real64
-    type(patch_t) :: whole                         !! all cells of the box, which are constant during a run
+    type(patch_t) :: whole                         !! patch of all cells of the box; the cells do not change during a run
     type(domain_cuts_t) :: cuts
     type(domain_t), allocatable :: domain(:)
     real(real64) :: event_rate = 0.0_real64        !! number of events per unit of time; 0 if not known yet [1/time]
@@ -131,8 +131,8 @@ contains
   !> Executes successive windows in all domains, until a window is invalid, a limit is reached, or `longest_call` has passed. A
   !> window ends early when the number of events or collisions reaches its limit. `good` is .true. if all windows are valid.
   !>
-  !> The threads synchronise twice in each window: before the domains are compared, and before the states that the comparison uses
-  !> are changed.
+  !> The threads wait for each other twice in each window: all domains must have ended the window before they are compared, and all
+  !> comparisons must be complete before any state is changed.
   subroutine run_windows(self, sim, limits, most, t, windows, good)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -197,7 +197,7 @@ contains
       real(real64) :: length
 
       length = self%window*self%shortening*sim%n_disks()/(2*self%event_rate)
-      ! With more domains than threads, windows are longer, because each window loads each domain into the cache once.
+      ! With more domains than threads, each domain has to be loaded into the cache once per window; longer windows save such loads.
       if (self%wanted > self%threads) length = 2*length
       plan%windows = plan%windows + 1
       plan%t_begin = plan%t
@@ -257,7 +257,7 @@ contains
     end function events_left
   end subroutine run_windows
 
-  !> Copies the present states of the domains to the whole simulation. The domains can advance further afterwards.
+  !> Copies the present states of the domains to the whole simulation. The domains remain loaded and can advance further.
   subroutine write_back_all(self, sim, now)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
