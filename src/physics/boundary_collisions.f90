@@ -167,12 +167,13 @@ contains
 
   !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk is the sum of the work of the
   !> moving surface and a remainder. At a thermal wall, the energy change of the disk minus the work of the surface is the
-  !> transferred heat. At any other wall, the work of the surface minus the energy change of the disk is the dissipated energy.
+  !> transferred heat. At a wall that is not thermal, the work of the surface minus the energy change of the disk is the dissipated
+  !> energy.
   pure subroutine add_wall_sums(sim, i, k, heats, u, v, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer, intent(in) :: k                     !! index of the surface
-    logical, intent(in) :: heats                 !! the surface is a thermal wall
+    logical, intent(in) :: heats                 !! whether the surface is a thermal wall
     real(real64), intent(in) :: u(2)             !! velocity of the surface [length/time]
     real(real64), intent(in) :: v(2), omega      !! velocities of the disk before the collision [length/time, 1/time]
     real(real64) :: mass, gained, done

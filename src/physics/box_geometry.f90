@@ -161,8 +161,8 @@ contains
     v = self%shear_rate*(self%upper(2) - self%lower(2))
   end function shear_velocity
 
-  !> Velocity of the linear shear profile at the point x. Averages of quantities relative to the shear profile are the same
-  !> everywhere in the box.
+  !> Velocity of the linear shear profile at the point x. If velocities are measured relative to the shear profile, their averages
+  !> are the same everywhere in the box.
   pure function shear_profile(self, x) result(v)
     class(box_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
@@ -299,7 +299,8 @@ contains
   pure subroutine next_obstacle(box, disk, last, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    !> The value of `last_partner` of the disk. After a collision with an obstacle, `last_partner` is the code of the obstacle.
+    !> Last collision partner of the disk: its component `last_partner`, which is the code of an obstacle after a collision with
+    !> that obstacle.
     integer(int32), intent(in) :: last
     integer(int32), intent(in) :: list(:)       !! codes of the obstacles to be tested, in descending order
     real(real64), intent(inout) :: t
@@ -325,7 +326,8 @@ contains
   pure subroutine find_image_contact(box, disk, last, obstacle, shift, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    !> The value of `last_partner` of the disk. After a collision with an obstacle, `last_partner` is the code of the obstacle.
+    !> Last collision partner of the disk: its component `last_partner`, which is the code of an obstacle after a collision with
+    !> that obstacle.
     integer(int32), intent(in) :: last
     integer(int32), intent(in) :: obstacle      !! code of the obstacle
     real(real64), intent(in) :: shift(2)        !! shift from the obstacle to its image [length]
@@ -353,7 +355,7 @@ contains
     integer(int32), intent(in) :: obstacle      !! code of the obstacle
     real(real64), intent(in) :: shift(2)        !! shift from the obstacle to its image [length]
     real(real64), intent(in) :: t               !! time since the epoch [time]
-    logical, intent(in) :: falling              !! .false. if there is no gravity
+    logical, intent(in) :: falling              !! whether gravity acts on the disk
     logical :: yes
     real(real64) :: d(2)
 
@@ -369,16 +371,16 @@ contains
     end associate
   end function stays_clear
 
-  !> Whether a point on a straight path certainly stays outside of a circle around the origin during a given time. The result .false.
-  !> means that the point may enter the circle. A point that moves away from the centre does not touch a round outline. The radius of
-  !> the circle is enlarged by more than all rounding errors. A contact before the time s requires c < -2 b s, as in
-  !> `neighbour_search: earliest_contact`.
+  !> Whether a point on a straight path certainly stays outside of a circle around the origin during a given time. The result
+  !> .false. means that the point may enter the circle. A point that moves away from the centre does not touch a round outline. The
+  !> radius of the circle is enlarged by a margin that exceeds all rounding errors. A contact before the time s requires c < -2 b s,
+  !> as in `neighbour_search: earliest_contact`.
   pure function passes_by(d, v, s, rho, is_round) result(yes)
     real(real64), intent(in) :: d(2)            !! initial position [length]
     real(real64), intent(in) :: v(2)            !! [length/time]
     real(real64), intent(in) :: s               !! duration [time]
     real(real64), intent(in) :: rho             !! radius of the circle [length]
-    logical, intent(in) :: is_round             !! the outline is this circle
+    logical, intent(in) :: is_round             !! whether the outline is this circle
     logical :: yes
     real(real64) :: b, c, sigma2, disc
 
@@ -390,16 +392,17 @@ contains
     yes = (min(disc, -2*b*s - c) < 0 .and. c > 0) .or. (is_round .and. b >= 0)
   end function passes_by
 
-  !> Like `passes_by`, for a falling point. The path of the point lies in a triangle. The corners of the triangle are the two ends of
-  !> the path, and the position that the point would reach without gravity in half the time. The circle does not overlap the triangle
-  !> if all three corners are beyond the circle in the same direction, either along the chord of the path or across the chord.
+  !> Like `passes_by`, for a falling point. The path of the point lies in a triangle. The corners of the triangle are the two ends
+  !> of the path, and the position that the point would reach without gravity in half the time. The circle does not overlap the
+  !> triangle if a line that is parallel or perpendicular to the chord of the path (the line between its two ends) separates the
+  !> circle from all three corners.
   pure function falls_past(d, v, g, s, rho) result(yes)
     real(real64), intent(in) :: d(2), v(2), g(2), s, rho
     logical :: yes
     real(real64) :: middle(2), chord(2), chord2, along(2), across(2), clear, slack
 
     yes = .false.
-    if (s > sqrt(never)) return                 ! the length of the path may overflow
+    if (s > sqrt(never)) return                 ! the length of the path may exceed the largest real number
     middle = 0.5_real64*s*v
     chord = s*(v + 0.5_real64*s*g)
     chord2 = chord(1)*chord(1) + chord(2)*chord(2)

@@ -39,7 +39,7 @@ contains
   pure function side_time(box, disk, side) result(t)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    integer(int32), intent(in) :: side          !! 0, -1, -2, -3: left, right, bottom, top
+    integer(int32), intent(in) :: side          !! code of the side: 0 left, -1 right, -2 bottom, -3 top
     real(real64) :: t, gap, inset, tau, v, since, after
     integer :: axis, sense
 

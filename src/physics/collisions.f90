@@ -28,8 +28,8 @@ module collisions
     procedure :: least
   end type speed_law_t
 
-  !> Tangential interaction of two rough surfaces (Walton 1993; Luding, Huthmann, McNamara and Zippelius, Physical Review E 57, 3416
-  !> (1998)).
+  !> Tangential interaction of two rough surfaces (Walton 1993, and Luding, Huthmann, McNamara and Zippelius, Physical Review E 57,
+  !> 3416 (1998)).
   type :: tangential_law_t
     real(real64) :: restitution = -1.0_real64        !! tangential restitution, from -1 (smooth) to 1
     real(real64) :: friction = huge(1.0_real64)      !! Coulomb friction coefficient; set to huge() if the impulse is not limited
@@ -83,8 +83,9 @@ contains
     xi = 1 - y + self%c*y**2
   end function restitution_at
 
-  !> Smallest coefficient of restitution at g0 for which the restitution is a monotonic function of the impact velocity. At the
-  !> smallest coefficient, the series 1 - y + c y**2 for the restitution has its minimum at the impact velocity g0.
+  !> Smallest coefficient of restitution at g0 for which the restitution is a monotonic function of the impact velocity. With this
+  !> smallest coefficient, the series 1 - y + c y**2, which describes the restitution, has its minimum exactly at the impact
+  !> velocity g0.
   elemental function least(self) result(xi)
     class(speed_law_t), intent(in) :: self
     real(real64) :: xi
@@ -136,7 +137,7 @@ contains
     type(wall_law_t), intent(in) :: law
     real(real64), intent(in) :: v(2)                 !! [length/time]
     real(real64), intent(in) :: normal(2)            !! unit vector from the wall to the disk
-    logical, intent(in) :: elastic                   !! the previous contact of the disk has not ended yet (TC model)
+    logical, intent(in) :: elastic                   !! whether the previous contact of the disk still lasts (TC model)
     real(real64) :: after(2), approach, restitution
 
     approach = v(1)*normal(1) + v(2)*normal(2)

@@ -313,7 +313,7 @@ contains
     type(images_t) :: images
     type(image_t) :: image
 
-    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! nearly all pairs of disks return here
+    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! nearly all calls return here
     images = sim%images()
     image = images%image(images%nearest_image(dx, t))
     dx = dx + [image%shift(1) + image%velocity*t, image%shift(2)]

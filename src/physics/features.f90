@@ -7,11 +7,11 @@ module features
   public :: features_t
 
   type :: features_t
-    logical :: own_sizes = .false.      !! disks have individual masses and radii
-    logical :: rotation = .false.       !! disks can rotate
-    logical :: orientation = .false.    !! disks have an orientation; true for all disks that can rotate
-    logical :: stress = .false.         !! momentum changes in collisions are added to the stress and to the event log
-    logical :: helfand = .false.        !! the Helfand moments are accumulated
+    logical :: own_sizes = .false.      !! whether disks have individual masses and radii
+    logical :: rotation = .false.       !! whether disks can rotate
+    logical :: orientation = .false.    !! whether disks have an orientation (always, if disks can rotate)
+    logical :: stress = .false.         !! whether momentum changes are added to the stress and the event log
+    logical :: helfand = .false.        !! whether the Helfand moments are accumulated
   contains
     procedure :: need_general_collision
   end type features_t

@@ -17,7 +17,7 @@ module observables
   type :: observable_t
     character(len=64) :: name = ""                !! path below the HDF5 group /observables
     integer :: width = 0                          !! number of components
-    logical :: is_count = .false.                 !! the value is an integer
+    logical :: is_count = .false.                 !! whether the value is an integer
     real(real64) :: value(most_components) = 0.0_real64    !! present value; counts are exact up to 2**53
   end type observable_t
 
@@ -29,7 +29,7 @@ module observables
     procedure :: values
   end type observable_list_t
 
-  !> Indices of sums over the disks of a species, or over all disks.
+  !> Positions of the sums over the disks of a species, or over all disks, in the first dimension of an array of sums.
   integer, parameter :: disks = 1, mass = 2, speed = 3, momentum = 4       !! momentum has two components
   integer, parameter :: kinetic = 6, potential = 7, rotational = 8         !! energies
   !> Kinetic energy and momentum relative to the velocity profile of a sheared box; the momentum has two components.
@@ -171,7 +171,7 @@ contains
     empty%drive%kind = noise
     call empty%tally%make_room(n_sides)
     empty%box = box_t()
-    empty%box%surface%law%temperature = 1         ! thermal walls and moving surfaces enable all observables
+    empty%box%surface%law%temperature = 1         ! all observables of walls exist if walls are thermal and move
     empty%box%surface%law%speed = 1
     empty%features%stress = .true.
     empty%features%helfand = .true.

@@ -82,7 +82,8 @@ contains
     code = first_crossing + side
   end function crossing
 
-  !> The side of the box in whose direction a disk leaves its cell. The argument is the code of the crossing.
+  !> The side of the box in whose direction a disk leaves its cell. The argument is the code of the event in which the disk leaves
+  !> its cell: see `crossing`.
   elemental function side_crossed(code) result(side)
     integer(int32), intent(in) :: code
     integer(int32) :: side

@@ -14,8 +14,8 @@ module simulation_state
   private
   public :: specification_t, simulation_t, system_t
 
-  !> Factors that determine the bound for the terms of a sum: see `exact_sums: choose_unit`. The bound is `common` times a typical
-  !> term of the heaviest disks or `rare` times a typical term of the lightest disks, whichever is smaller.
+  !> Factors that determine the bound for the terms of a sum: see `exact_sums: choose_unit`. The bound is the smaller of two values:
+  !> `common` times a typical term of the heaviest disks, and `rare` times a typical term of the lightest disks.
   real(real64), parameter :: common = 2.0_real64**7, rare = 2.0_real64**22
   !> Factor by which the units of the sums are multiplied in driven simulations. The work of walls and kicks may be far less than
   !> the estimate from their parameters. The factor `finer` makes the units so small that the sums also resolve the energies of
@@ -38,7 +38,7 @@ module simulation_state
 
   !> A simulation: the values given by the input, and the state that a checkpoint stores.
   type, extends(specification_t) :: simulation_t
-    type(disk_t), allocatable :: disk(:)          !! (n) the disks, sorted by cells; `tag%id` is the number of a disk in the input
+    type(disk_t), allocatable :: disk(:)          !! (n) disks, sorted by cells; their numbers in the input are in `tag%id`
     type(tag_t), allocatable :: tag(:)            !! (n)
     real(real64), allocatable :: own_mass(:)      !! (n) individual masses, allocated if masses within a species differ [mass]
     type(extra_t), allocatable :: extra(:)        !! (n) optional data, allocated if `has_extra`
@@ -143,7 +143,7 @@ contains
   pure subroutine make_room(self, n, like)
     class(simulation_t), intent(inout) :: self    !! in: simulation with all values given by the input
     integer(int32), intent(in) :: n
-    class(simulation_t), intent(in), optional :: like   !! the whole simulation, if `self` is one of its domains
+    class(simulation_t), intent(in), optional :: like   !! the whole simulation, if `self` is a domain
     logical :: own_masses
 
     own_masses = self%features%own_sizes
@@ -282,7 +282,7 @@ contains
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: t
-    logical, intent(inout) :: elastic             !! in: .true. if the collision is elastic for another reason
+    logical, intent(inout) :: elastic             !! in: whether the collision is already known to be elastic
 
     associate (last => self%extra(i)%last_contact)
       elastic = elastic .or. (self%tag(i)%collisions > 0 .and. t - last < self%law%contact_time)
@@ -371,10 +371,10 @@ contains
     end do
   end function mean_square_speed
 
-  !> Chooses the units of the sums according to the sizes of typical terms. Typical terms follow from the mean square speed of the
-  !> disks and from the effects of gravity, walls and kicks. If masses differ widely, each term of the lightest disks still has 40
-  !> binary digits. Terms of the heaviest disks may exceed the bound of `exact_sum_t`; the addition of such rare terms takes
-  !> slightly longer.
+  !> Chooses the units of the sums according to the sizes of typical terms. The size of a typical term is estimated from the mean
+  !> square speed of the disks and from the effects of gravity, walls and kicks. If masses differ widely, each term of the lightest
+  !> disks still has 40 binary digits. Terms of the heaviest disks may exceed the bound of `exact_sum_t`; the addition of such rare
+  !> terms takes slightly longer.
   pure subroutine choose_units(self)
     class(simulation_t), intent(inout) :: self
     real(real64) :: mass(size(self%disk)), kicked(size(self%species))    ! [mass, (length/time)**2]

@@ -7,8 +7,8 @@ module tally
   private
   public :: kinetic_flux, tally_t
 
-  !> Kinds of terms with different physical dimensions. The kind of the terms determines the unit of a sum: see `simulation_state:
-  !> choose_units`.
+  !> Kinds of terms, which differ in their physical dimensions. The unit of a sum depends on the kind of its terms: see
+  !> `simulation_state: choose_units`.
   integer, parameter, public :: energies = 1, impulses = 2, virials = 3, energy_transfers = 4, momentum_transfers = 5
 
   type :: sum_t
@@ -16,8 +16,8 @@ module tally
     integer :: kind                                !! kind of the terms of the sum, such as `energies`
   end type sum_t
 
-  !> Indices of the sums over collisions. The list `sums` determines the units of the sums and their order in checkpoints and in the
-  !> exchange between domains.
+  !> Positions of the sums over collisions in the list `sums`. The list determines the units of the sums, and their order in
+  !> checkpoints and in the exchange between domains.
   integer, parameter, public :: virial = 1, dissipated = 2, heat = 3, work = 4, drive_energy = 5, stress = 6
   integer, parameter, public :: heat_virial = 10, flux_changes = 12  ! stress has four components, heat_virial has two
   type(sum_t), parameter :: sums(*) = [ &
@@ -67,7 +67,8 @@ contains
     allocate (self%surface_sums(gain, n))
   end subroutine make_room
 
-  !> Sets the unit of each sum according to the bound for the terms of its kind (see `exact_sums: choose_unit`).
+  !> Sets the unit of each sum according to a bound for its terms (see `exact_sums: choose_unit`). All sums with terms of the same
+  !> kind have the same bound.
   pure subroutine choose_units(self, bound)
     class(tally_t), intent(inout) :: self
     real(real64), intent(in) :: bound(:)           !! bound for the terms of each kind
