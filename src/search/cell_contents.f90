@@ -173,7 +173,8 @@ contains
     n = iand(self%slot(count_slot), counted)
   end function in_slots
 
-  !> Whether predictions in this cell need the general procedure, because the cell is marked or near a crowded cell.
+  !> Whether predictions in this cell need the general procedure: the cell is marked, or the cell or one of its eight neighbours is
+  !> crowded.
   elemental function needs_care(self) result(yes)
     class(cell_t), intent(in) :: self
     logical :: yes

@@ -1,7 +1,7 @@
 !> The faces of the cells, and the times when disks leave their cells. The sides of the box are also faces of cells.
 !>
-!> Neighbouring cells overlap. The overlap is as wide as possible under the condition that disks in cells that are not adjacent
-!> cannot touch. A disk in the overlap of two cells is assigned to the cell that the disk leaves last. If cells are much wider than
+!> Neighbouring cells overlap. The overlap has the largest width for which two disks in cells that are not adjacent cannot touch
+!> each other. A disk in the overlap of two cells is assigned to the cell that the disk leaves last. If cells are much wider than
 !> disks, the overlap halves the number of events in which disks cross faces.
 module cell_faces
   use kinds, only: int16, int32, never, real64
@@ -22,14 +22,16 @@ module cell_faces
   !> patch that is not a side of the box is open: a disk that crosses an open face leaves the patch.
   type :: patch_t
     integer(int32) :: whole(2) = 0                 !! numbers of columns and rows in the box
-    integer(int32) :: first(2) = 1                 !! first column and row of the patch; less than 1 beyond a periodic side
+    !> First column and row of the patch. The values are less than 1 if the patch begins beyond a periodic side of the box.
+    integer(int32) :: first(2) = 1
     integer(int32) :: n(2) = 0                     !! numbers of columns and rows in the patch
     real(real64) :: small = 0.0_real64             !! radius of the largest disks for which the cells are wide enough [length]
     real(real64) :: reach = 0.0_real64             !! largest distance between the centres of two disks in contact [length]
     real(real64) :: lower(2) = 0.0_real64          !! lower left corner of the box [length]
     real(real64) :: width(2) = 0.0_real64          !! distance between the centres of adjacent cells [length]
     ! If a periodic side of the box is inside the patch, `last` is the last column or row before the side, and `next` is the first
-    ! column or row behind the side. Along an axis without a periodic side inside the patch, `last` and `next` are 0.
+    ! column or row behind the side. If the patch contains no periodic side along an axis, `last` and `next` are set to 0 for this
+    ! axis.
     integer(int32) :: last(2) = 0
     integer(int32) :: next(2) = 0
   contains
@@ -46,8 +48,8 @@ module cell_faces
   !> A line that limits a cell, parallel to an axis: a face of a column or row of cells, or a side of the box.
   type :: line_t
     real(real64) :: place = 0.0_real64             !! position of the face or side [length]
-    !> Signed distance from the line to the centre of a disk at the event, in radii of the disk. The signed distance is 1 for a left
-    !> or bottom wall, -1 for a right or top wall, and 0 for a face or a periodic side.
+    !> Signed distance from the line to the centre of a disk at the event, divided by the radius of the disk. The value is 1 for a
+    !> left or bottom wall, -1 for a right or top wall, and 0 for a face or a periodic side.
     real(real64) :: inset = 0.0_real64
     integer(int32) :: code = 0                     !! code of the event: contact with a side, or crossing of a face
     logical :: struck = .false.                    !! whether a moving side may touch disks in this cell
@@ -64,7 +66,8 @@ module cell_faces
     real(real64) :: due = never                    !! time when the first piston leaves its strip, relative to `box%epoch` [time]
     !> Centre of the strip of each piston, as an inward displacement from the mean position of the side [length]
     real(real64) :: centre(n_sides) = 0.0_real64
-    real(real64) :: beyond(2, 2) = 0.0_real64  !! (axis, lower or upper side) largest distance of disks beyond each side [length]
+    !> (axis, 1: lower side, 2: upper side) Largest distance by which disks can be beyond the mean position of each side [length]
+    real(real64) :: beyond(2, 2) = 0.0_real64
     type(line_t), allocatable :: column(:, :)      !! (0:1,columns) left and right faces
     type(line_t), allocatable :: row(:, :)         !! (0:1,rows) lower and upper faces
   contains
@@ -139,7 +142,7 @@ contains
     yes = all(cell >= 1 .and. cell <= self%n)
   end function holds
 
-  !> Determines for each given cell, whose column and row refer to the whole grid, whether the patch contains the cell.
+  !> Whether the patch contains each of the given cells. The columns and rows of the given cells refer to the whole grid.
   pure function covers(self, cell) result(yes)
     class(patch_t), intent(in) :: self
     integer(int16), intent(in) :: cell(:, :)       !! (2,n)
@@ -183,7 +186,7 @@ contains
     end associate
   end subroutine step
 
-  !> Whether two patches have the same cells, which were chosen for disks of the same sizes.
+  !> Whether two patches consist of the same cells, and the cells were chosen for disks of the same sizes.
   pure function equals(self, other) result(yes)
     class(patch_t), intent(in) :: self
     type(patch_t), intent(in) :: other
@@ -250,8 +253,9 @@ contains
     end subroutine find_struck
   end subroutine set
 
-  !> Finds the columns and rows in which a piston may touch disks before the piston has moved by the width of a cell. Disks outside
-  !> of all cells belong to the outermost cells. A piston outside of all cells can therefore touch the disks in the outermost cells.
+  !> Finds the columns and rows in which a piston may touch disks before the piston has moved by the width of a cell. A disk outside
+  !> of all cells is assigned to an outermost cell. A piston outside of all cells can therefore touch disks that are assigned to the
+  !> outermost cells.
   pure subroutine find_strips(self, box, small, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -282,8 +286,8 @@ contains
     end subroutine mark
   end subroutine find_strips
 
-  !> Finds the earliest time at which a piston leaves its strip, the columns or rows in which the piston may touch disks. The result
-  !> is valid until a disk collides with a piston.
+  !> Finds the earliest time at which any piston leaves its strip. The strip of a piston consists of the columns or rows in which
+  !> the piston may touch disks. The result is valid until a disk collides with a piston.
   pure subroutine watch_pistons(self, box, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -304,8 +308,8 @@ contains
     end do
   end subroutine watch_pistons
 
-  !> The rectangle that contains the centres of the disks in a cell. An outermost cell extends as far as its side can move. If an
-  !> outermost cell is at a piston, the cell is unbounded towards the piston.
+  !> The rectangle that contains the centres of the disks in a cell. A cell at a side of the box extends to the outermost position
+  !> that the side can reach. If the side is a piston, the cell is unbounded towards the piston.
   pure subroutine rectangle(self, cell, n, low, high)
     class(cell_faces_t), intent(in) :: self
     integer(int32), intent(in) :: cell(2)          !! column and row in the box
@@ -330,8 +334,8 @@ contains
     cell(2) = cell(2) + ahead(self%row, self%overlap(2), disk%x(2), disk%v(2), gravity(2), s, cell(2))
   end subroutine choose_cell
 
-  !> Step to the next cell along one axis, in the direction of motion of a disk: 1 or -1 if the disk is also in the next cell,
-  !> otherwise 0.
+  !> Change of the column or row if a disk is assigned to the next cell in its direction of motion along one axis: 1 or -1 if the
+  !> next cell also contains the disk, otherwise 0.
   pure function ahead(line, overlap, x, v, g, s, cell) result(step)
     type(line_t), intent(in) :: line(0:1, *)
     real(real64), intent(in) :: overlap, x, v, g, s

@@ -83,7 +83,7 @@ contains
     type(prospect_t), intent(inout) :: near
     integer(int32) :: e, last(2)                   ! index of a list entry; periodic image that contains the candidates in `near`
     real(real64) :: number(2), shift(2)            ! index of the image of an obstacle; shift to this image [length]
-    logical :: falling                             ! .false. if there is no gravity
+    logical :: falling                             ! whether gravity acts on the disks
 
     near%n = 0
     last = 0
@@ -235,9 +235,8 @@ contains
   end subroutine add_chains_around
 
   !> Finds contacts of a disk if some of the nine cells around the disk are across a periodic side. All cells that belong to the
-  !> same periodic image are searched in one call. In a sheared box the images above and below the box move along x. In a sheared
-  !> box the search includes all columns that the disk can reach before the images above and below have moved by the width of a
-  !> column. Disks in columns that are not adjacent cannot touch.
+  !> same periodic image are searched in one call. A sheared box, in which the images above and below the box move along x, is
+  !> searched by `scan_around_moving_seam`.
   subroutine scan_around_seam(cells, patch, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
@@ -312,9 +311,9 @@ contains
     end subroutine scan_block
   end subroutine scan_around_seam
 
-  !> Like `scan_around_seam`, for a sheared box, in which the images above and below the box move along x. The search includes all
-  !> columns that the disk can reach before these images have moved by the width of a column. Disks in columns that are not adjacent
-  !> cannot touch.
+  !> Like `scan_around_seam`, for a sheared box, in which the images above and below the box move along x. In the moving images the
+  !> search covers six columns instead of three, so that no contact is missed until the images have moved by the width of a column.
+  !> Disks in columns that are not adjacent cannot touch.
   subroutine scan_around_moving_seam(cells, patch, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch

@@ -22,10 +22,11 @@ module neighbour_lists
   private
   public :: neighbour_lists_t
 
-  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! marks that are stored instead of the number of entries
-  !> Number of entries that are copied even from shorter lists, so that no branch depends on the lengths of short lists.
+  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! marks stored instead of the number of entries
+  !> Number of array elements that are copied from every list, even if the list is shorter, so that copying a short list needs no
+  !> branch.
   integer(int32), parameter :: always_copied = 15
-  !> Factor of the image index in an entry. The factor is larger than any number of disks.
+  !> Factor by which the index of an image is multiplied in an entry. The factor exceeds the index of every disk in a list.
   integer(int32), parameter :: image_unit = 2**27
   !> Largest number of disks for which neighbour lists are used, so that 32-bit integers can number all entries.
   integer(int32), parameter :: most_listed = image_unit/4
@@ -125,7 +126,7 @@ contains
     end if
     if (.not. allocated(self%first)) then
       allocate (self%first(n + 1), self%neighbourhood(n))
-      allocate (self%extent(4, n), source=0.0_real32)           ! initial values, which are read for candidates without a list
+      allocate (self%extent(4, n), source=0.0_real32)           ! the values of disks without a list are also read
     end if
     self%first(1) = 0
     do i = 1, n
@@ -192,7 +193,7 @@ contains
 
     self%entry(self%first(i)) = 0
     own = self%extent(:, i)
-    self%extent(4, i) = -(2*own(4) + 4*own(3))     ! disk i, which is among the candidates, then fails the test of candidates
+    self%extent(4, i) = -(2*own(4) + 4*own(3))     ! excludes disk i itself from the candidates
     n = 0
     if (patch%at_seam(cell)) then
       call find_cells(cells, patch, cell, around, image)
@@ -366,7 +367,7 @@ contains
     end do
   end subroutine find_cells
 
-  !> Index of the image of disk i that disk j can touch, if disk i can touch the image `image` of disk j.
+  !> If disk i can touch the image `image` of disk j, the result is the index of the image of disk i that disk j can touch.
   elemental function reverse(image)
     integer(int32), intent(in) :: image
     integer(int32) :: reverse

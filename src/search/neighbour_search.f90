@@ -10,7 +10,7 @@ module neighbour_search
   public :: event_t, prospect_t, earliest_contact, event_of, list_capacity, latest_clock, no_gravity, wins
 
   integer(int32), parameter :: list_capacity = 64
-  !> Flags for conditions that the caller of `earliest_contact` guarantees. The sum of the two flags states that both conditions
+  !> Flags for conditions that the caller of `earliest_contact` guarantees. The sum of the two flags means that both conditions
   !> hold. The flag `latest_clock` means that the clock of the disk is `now` and that no candidate has a later clock. The flag
   !> `no_gravity` means that no gravity acts on the disks. The compiler generates versions of `earliest_contact` without the
   !> operations that a flag makes unnecessary.
@@ -48,15 +48,16 @@ contains
   !> The shift of a disk by a period is an event, after which the contact is predicted again. Predictions for the two disks at later
   !> times lead to the same decision.
   !>
-  !> The root of |dx + dv s| = sigma is s = c/(sqrt(disc) - b). The expression for the root s has no cancellation for disks that are
-  !> close to contact. The discriminant sigma**2 dv**2 - (dx x dv)**2 has no cancellation for distant grazing pairs. If two disks
-  !> approach each other and touch, or overlap because of rounding errors, the disks collide at the time `now`.
+  !> The root of |dx + dv s| = sigma is s = c/(sqrt(disc) - b). The expression for the root s loses no digits by cancellation if the
+  !> disks are close to contact. The discriminant sigma**2 dv**2 - (dx x dv)**2 loses no digits by cancellation if two distant disks
+  !> graze each other. If two disks approach each other and touch, or overlap because of rounding errors, the disks collide at the
+  !> time `now`.
   !>
   !> A single test, which combines several conditions, excludes most candidates. A candidate is excluded if the root is not real, if
   !> the root is not earlier than the earliest contact found so far, or if the root is not earlier than the next event of the
-  !> candidate. The events of a candidate are predicted again after its next event, and that prediction tests the pair. If the root
-  !> is earlier than a time t, then c < -2 b (t - late), where `late` is the later clock of the two disks. The condition for c is
-  !> tested with a margin that is larger than all rounding errors.
+  !> candidate. When the candidate executes its next event, its events are predicted again, and the new prediction tests the pair.
+  !> If the root is earlier than a time t, then c < -2 b (t - late), where `late` is the later clock of the two disks. The condition
+  !> for c is tested with a margin that is larger than all rounding errors.
   pure subroutine earliest_contact(disk, tag, near, now, gravity, known, image)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, with indices that start at 0
     type(tag_t), intent(in) :: tag(*)
@@ -105,7 +106,7 @@ contains
       in_time = merge(in_time, disc, in_time < disc)
       if (in_time > 0 .and. b < 0) then
         t_j = late + max(c, 0.0_real64)/(sqrt(min(disc, b*b)) - b)
-        if (t_j < now .and. .not. fresh) then ! rounding error: contact at `now`, or none
+        if (t_j < now .and. .not. fresh) then ! rounding error: the contact occurs at `now` or not at all
           t_j = merge(2*never, now, b + (du*du + dv*dv)*(now - late) >= 0)
         end if
         if (t_j < best) then

@@ -97,8 +97,8 @@ contains
   contains
 
     !> Adds the obstacle to the lists in a block of cells. The block is halved recursively until the block is a single cell, or
-    !> until the outline of the obstacle does not cross the block. In a block that the outline does not cross, a disk overlaps the
-    !> obstacle at every point or at no point.
+    !> until the outline of the obstacle does not cross the block. If the outline does not cross a block, a disk overlaps the
+    !> obstacle either at every position in the block or at no position.
     recursive subroutine enter_block(low, high)
       !> First and last column and row of the block, counted from 0. The block may extend beyond periodic sides.
       integer(int32), intent(in) :: low(2), high(2)
