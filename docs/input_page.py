@@ -86,7 +86,7 @@ def written(entry: dict) -> str:
 
 
 def shared(walls: list[dict[str, dict]], name: str) -> bool:
-    """Return whether the variable exists, with the same meaning, for all kinds of boundaries."""
+    """Return whether all kinds of boundaries have a variable of this name with the same meaning."""
     return len({wall[name]["help"] for wall in walls if name in wall}) == 1 and all(
         name in wall for wall in walls
     )
