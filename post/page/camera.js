@@ -43,8 +43,8 @@ function pan(dx, dy) {
   camera.y += dy / view.unit;
 }
 
-// The functions return the smallest and the largest number of periods by which a visible copy of an object is shifted; the object
-// extends from `low` to `high`.
+// An object that extends from `low` to `high` has periodic copies, which are shifted by whole numbers of periods. The two functions
+// return the smallest and the largest of these numbers among the visible copies.
 function firstCopy(axis, high) {
   return film.periodic[axis] ? Math.ceil(((axis ? view.y : view.x) - high) / film.edges[axis]) : 0;
 }

@@ -166,7 +166,7 @@ function zoomBy(factor, px, py) {
   look();
 }
 
-// ---------- in the laboratory: dragging a side while the disks move, or a disk while they stand ----------
+// ---------- in the laboratory: dragging of a side during the simulation, or of a disk during a pause ----------
 
 let grabbed = null;  // { side } or { disk }, and when the worker was last told [ms]
 const HOLDABLE = [undefined, 'still', 'constant_velocity', 'piston'], TOLD_AGAIN = 100;

@@ -47,8 +47,8 @@ function upTo(values, value, number = one => one) {
 const frameAt = time => Math.max(0, upTo(past, time, frame => frame.time) - 1);  // the last frame that is not later
 const frameTime = k => past[clamp(k, 0, past.length - 1)].time;
 
-// Stores in a frame how many periods each disk has crossed since the first frame, in the order x1 y1 x2 y2 .... For each coordinate
-// of a disk, the function `moved` returns the number of periods crossed since the previous frame.
+// Stores in a frame the numbers of periods of the box that each disk has crossed since the first frame, in the order x1, y1, x2,
+// y2 and so on. For each coordinate of a disk, the function `moved` returns the number of periods crossed since the previous frame.
 function cross(frame, moved) {
   const before = past.at(-1);
   if (film.periodic.some(Boolean)) frame.crossed = new Int16Array(2 * disks).map((_, k) => before ? before.crossed[k] + moved(before, k) : 0);
@@ -152,7 +152,7 @@ function flights(i, from, to) {
 }
 
 // Calls `action` for the speed of each disk in each frame received so far. If there are very many frames, only a part of the frames
-// is used. Returns the number of frames used.
+// is used. Returns the number of frames whose speeds were passed to `action`.
 function eachSpeed(action) {
   const some = Math.ceil((moment.frame + 1) * disks / 2e6);
   let samples = 0;

@@ -58,7 +58,7 @@ function set(key, text) {
 const wish = () => ({ input: state.input.name, added: state.added, settings: { ...state.settings } });
 const differs = key => (state.settings[key] ?? givenAs(key)) !== (state.has[key] ?? givenAs(key));
 
-// Returns a value with the words of its slider, or with the name of the variable if it has no slider.
+// Returns a variable and its value as text; the label of the slider is used or, without a slider, the name of the variable.
 function inWords([key, value]) {
   const slider = state.input.sliders.find(one => one.key === key);
   return `${slider ? slider.words.replace(/ \(.*/, '') : key} = ${slider?.at >= 0 ? split(value)[slider.at] : value}`;
@@ -182,9 +182,8 @@ function addGroup(kind, name) {
 
 // ---------- choice of an input file ----------
 
-// The run starts before the form is complete, so that disks appear early, unless the address contains
-// values. Kept runs of another input are removed, because runs of different inputs cannot be compared
-// in one plot.
+// Unless the address of the page contains values, the run starts before the form is complete, so that disks appear early. Kept runs
+// of another input are removed, because runs of different inputs cannot be compared in one plot.
 async function choose(name, settings = {}) {
   const input = lab.inputs.find(one => one.name === name);
   if (name !== state.input?.name) {
@@ -214,7 +213,7 @@ async function choose(name, settings = {}) {
   sync();
 }
 
-// Starts the input with the values of an address. A group that the file does not contain is added.
+// Starts a run with the values of variables in the address of the page. Groups that the input file lacks are added.
 function begin(settings) {
   const isKnown = key => key.split('.').length > 1 && lab.table[key.split('.')[0]]?.[nameOf(key)], keys = Object.keys(settings), wrong = keys.find(key => !isKnown(key));
   state.settings = Object.fromEntries(keys.filter(isKnown).map(key => [key, settings[key]]));
@@ -262,7 +261,7 @@ function newBox() {
   return box;
 }
 
-// Only one run can be starting at any time. If values change during the start of a run, the changes take effect in the next run.
+// Two runs are never started at the same time. If values change during the start of a run, the changes take effect in the next run.
 const PLACING = 2000;  // time [ms] after which a placement of disks is given up for newer settings
 let busy = 0, again = false, timer, latest = {};
 function run() {
@@ -356,7 +355,8 @@ function remove(box) {
   regroup();
 }
 
-// Arranges the films after one of them has been shown, hidden or removed. They continue at a common time.
+// Arranges the films after one of them has been shown, hidden or removed. Unless the films are paused, all of them continue from
+// the same time.
 function regroup() {
   clock.next = null;
   arrangeAll();
@@ -419,9 +419,9 @@ setInterval(() => { if (shownBoxes().length > 1) overlayAll(); }, 1000);
 
 // ---------- the time of compared runs ----------
 
-// The newest film sets the time of all films. The next time is requested from all workers, and all
-// films show it when the slowest of them has reached it. As long as a film repeats kept frames, the
-// times are those of its frames.
+// The newest film determines the time that all films show. The next time is requested from all
+// worker processes, and the films show this time as soon as the slowest worker has reached it.
+// While a film replays stored frames, the requested times are the times of these frames.
 const clock = { next: null, shown: 0 };  // the time requested; when the films were last drawn [ms]
 function conducts(source) {
   if (!isComparing()) return false;
@@ -444,7 +444,7 @@ function request(all, passed) {
   if (clock.next !== null) for (const one of all) one.reach(clock.next);
 }
 
-// Lets all films show the time to which a paused film has gone.
+// If the films are paused and the user moves one film to another time, all other films show that time, too.
 function went(source, time) {
   clock.next = null;
   if (state.paused) for (const one of films()) if (one !== source) one.join(time);
@@ -522,8 +522,8 @@ for (const [id, action] of Object.entries(actions)) $(id).addEventListener('clic
 const MOVES = new Set(['ArrowLeft', 'ArrowRight', 'Home', 'End', 'n', ' ']);  // keys that act on the newest film, which the others follow
 const keys = { r: 'run', p: 'pause', k: 'keep', s: 'settings', l: 'larger' };
 
-// Keyboard shortcuts of the laboratory work whichever element has the keyboard focus. Keyboard shortcuts for films apply to the
-// film with the focus, or to all films if no film has the focus.
+// Keyboard shortcuts of the laboratory work unless an input field or a selection menu has the keyboard focus. Keyboard shortcuts
+// for films apply to the film with the focus, or to all films if no film has the focus.
 function typed(event) {
   const { key, target } = event, own = target.ownerDocument === document;
   if (target.matches('input:not([type=range]), select') || event.ctrlKey || event.metaKey || event.altKey || $('inputs').open) return;

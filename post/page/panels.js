@@ -217,7 +217,7 @@ function drawHistogram() {
   pen.restore();
 }
 
-// What another film needs to draw the histogram of this film.
+// Returns the data that another film needs to draw the histogram of this film.
 const speedsOfFilm = () => ({ kinds, ...film.speeds, ...speedsNow() });
 
 // Draws the histogram of a compared run as a line above the bars, with the letter of the run at the
@@ -327,7 +327,7 @@ function speedsAndTemperature() {
   return [Math.max(0, thermal) / disks, ...speeds.map((sum, s) => sum / kinds[s].count)];
 }
 
-// Returns name, present value, mean with error, and theoretical value of each quantity at the moment shown.
+// Returns name, present value, mean with error, and theoretical value of each quantity at the time shown.
 function numbersNow() {
   const means = source.means?.() ?? [];
   if (!means.length || disks < FEWEST) return [];
@@ -335,7 +335,9 @@ function numbersNow() {
   return means.map((one, k) => ({ ...one, now: now[k] ?? null }));
 }
 
-// One run: its present values, means and theory. Several runs: one value and theory of each.
+// For a single run, the table shows the present value, the mean and the theoretical value of each
+// quantity. For several runs, the table shows for each run the means (or else the present values)
+// and the theoretical values.
 function tellNumbers() {
   const own = numbersNow(), seen = value => value === null ? '' : short(value), some = (rows, what) => rows.some(one => one[what] !== null);
   $('measured').hidden = !own.length;

@@ -13,9 +13,9 @@ const dark = () => document.documentElement.dataset.theme === 'dark';
 const cssColour = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
 const css = rgb => `rgb(${rgb})`;
 
-// In both colour themes the disks have a contrast of at least 3:1 to the background. The luminance increases along each colour
-// scale and differs between species. Therefore the colours of different values or of different species can be distinguished in
-// greyscale.
+// In both colour themes the disks have a contrast of at least 3:1 to the background. Because the luminance
+// increases along each colour scale and differs between species, the colours of different values or of different species can be
+// distinguished in greyscale.
 const VIRIDIS = [[68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141], [39, 173, 129], [92, 200, 99], [170, 220, 50], [253, 231, 37]];
 const LIGHTS = { false: [0.02, 0.29, [0.11, 0.28, 0.04, 0.2, 0.07]], true: [0.14, 0.85, [0.27, 0.5, 0.14, 0.38, 0.2]] };
 const toLinear = part => part <= 10.3 ? part / 3294.6 : ((part / 255 + 0.055) / 1.055) ** 2.4;
@@ -152,7 +152,8 @@ function drawGround() {
   ground.setLineDash([]);
 }
 
-// Draws an obstacle or, if it is smaller than a pixel, a square of the same area, which is far faster.
+// Draws an obstacle. If the obstacle is smaller than a pixel, a square of the same area is drawn, because squares are drawn much
+// faster.
 function drawObstacle([x, y, radius, inside], k) {
   const size = radius * view.unit, half = 0.886 * size;
   if (inside) {
@@ -192,7 +193,7 @@ function inBox(brush, action) {
 
 // The disks are drawn pixel by pixel into an array, which is much faster than drawing thousands of arcs on the canvas. Disks of
 // different species are distinguished by stripes if the disks are large enough. Pattern 0 is plain, 1 has horizontal stripes, 2
-// vertical stripes, and 3 both. The background is visible between the stripes.
+// vertical stripes, and 3 both. Between the stripes of a disk, the background is visible.
 const SMALLEST_PATTERN = 3.5, PATTERNS = [0, 1, 2, 3];
 const isStriped = (kind, radius) => PATTERNS[kind % PATTERNS.length] > 0 && radius >= SMALLEST_PATTERN * page.dots;
 const bare = share => share - Math.floor(share) > 0.66;  // the last third of each period of the stripes is transparent

@@ -1,8 +1,8 @@
-// ---------- run of the laboratory: frames that a worker process sends ----------
+// ---------- laboratory (interactive page): film of a running simulation, whose frames a worker process sends ----------
 
-// The page draws the newest frame. Earlier frames are kept, so that the user can go back. Above a
-// limit of memory every second frame of the older half is removed. After going back, the film first plays the kept frames; then the worker
-// continues.
+// The page draws the newest frame. Earlier frames are kept, so that the user can go back to them. If the frames need too much
+// memory, every second frame of their older half is removed. If the user goes back and plays the film, the page first shows the
+// kept frames, and then new frames of the worker process.
 const PAST_ROOM = 6e7, HEAD = 6, MOST_CURVE = 3000;  // memory for frames [bytes]; numbers before the positions of a message; samples of a plot
 const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
 
@@ -33,7 +33,7 @@ function start(run) {
   });
 }
 
-// Stops the worker process if the placement of disks takes too long. The next run uses a new worker process.
+// Stops the worker process if the placement of disks takes too long. The next run is then performed by a new worker process.
 function leave() { stream.socket.leave(); }
 
 const hear = {
@@ -157,7 +157,7 @@ const fromWorker = {
     if (stream.live && !parent.isComparing()) send({ do: 'play' });
   },
   rest() { send({ do: 'pause' }); if (stream.live && !parent.isComparing()) show(last(), true); },  // the newest frame is shown
-  // A step beyond the last frame is computed by the worker.
+  // A step beyond the last received frame is computed by the worker process.
   goOn(what) {
     play(false);
     if (what === 'step' && moment.time !== last()) return false;
@@ -187,13 +187,15 @@ const fromWorker = {
 // These functions are called by the laboratory for each of its films.
 function inside() { return { film, source, state, moment, kinds, stream, overlaid, past, numbersNow, speedsOfFilm }; }
 
-// Returns where a position of the box is on the stage [CSS pixels].
+// Converts a position in the box to a position on the page [CSS pixels].
 function pixelOf(x, y) { return [across(x) / page.dots, up(y) / page.dots]; }
 
-// Whether the film can show a time; a run that has ended shows its end.
+// Returns whether the film can show a given time; if the run has ended, its last frame is shown at
+// all later times.
 function hasReached(time) { return past.length > 0 && !isStarting() && (last() >= time || stream.ended); }
 
-// Continues when compared films have become one film, or one film several.
+// Continues the film after the page has changed from one film to several films, or from several
+// films to one.
 function resume() { if (state.playing) source.begins(); }
 
 function reach(time) {
@@ -202,7 +204,7 @@ function reach(time) {
   send({ do: 'reach', time });
 }
 
-// Shows, while the films are paused, the time that another film shows.
+// Shows the same time as another film; this function is called while the films are paused.
 function join(time) {
   if (!past.length) return;
   show(Math.min(time, last()), true);
@@ -210,7 +212,8 @@ function join(time) {
   reach(time);
 }
 
-// Returns the latest of the frames up to a time that follow the frame shown, or else the next frame.
+// Returns the time of the last frame up to a given time or, if that frame is not later than the frame shown, the time of the frame
+// after the frame shown. The result is null if there is no such frame.
 function frameBefore(time) {
   const k = Math.max(frameAt(time), frameAt(moment.time) + 1);
   return past[k]?.time ?? null;
