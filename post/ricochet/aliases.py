@@ -1,8 +1,7 @@
 """Short module names, such as `ricochet.structure` for `ricochet.analysis.structure`.
 
 With a short name, users do not have to know the sub-package of a module.  A short name and the full
-name refer to the same module object.  Therefore each class and each variable of the module exists
-only once.
+name refer to the same module object, and therefore each class of the module exists only once.
 """
 
 import sys
@@ -24,7 +23,7 @@ def modules() -> dict[str, str]:
 
 
 class Aliases(MetaPathFinder, Loader):
-    """Import finder for short module names, which Python calls after all other finders."""
+    """Import finder for short module names; Python calls it after all other finders."""
 
     def __init__(self) -> None:
         """Collect the short and full names of all modules."""

@@ -1,7 +1,7 @@
 """Check whether the required packages are installed, and report missing packages.
 
-All scripts import `ricochet` before other packages.  Therefore the scripts themselves do not have
-to check whether packages are installed.
+Because all scripts import `ricochet` before other packages, the scripts themselves do not have to
+check whether packages are installed.
 """
 
 import sys

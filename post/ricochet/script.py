@@ -185,7 +185,7 @@ def command_line(
     the default name of the output file.  Duplicate runs are ignored unless `repeated` is true.
     Unfinished runs are ignored, except in a script that sets the parser default `paired` to true.
     If `csv` is true, the script has the option --csv.  Each further keyword argument names one of
-    the `OPTIONS` and specifies its default; None means that the option has no default.
+    the `OPTIONS` and specifies its default.  An option with the default None has no default.
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
@@ -233,7 +233,8 @@ def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
     """Return the selected frames (--frames) in the steady state with the required separation.
 
     If no frame of --frames is in the steady state, the last frame is returned.  A warning is added
-    to `args.notes` if there are fewer frames than requested, or if the frames are too early.
+    to `args.notes` if some requested frames are not used, or if the speeds in the first used frame
+    may still depend on the initial speeds.
     """
     frames, start = (
         chosen_frames(run, args.frames, None),
@@ -346,7 +347,7 @@ def measured(
     """Return two cells of a table row: the mean and the error of an estimate.
 
     If the estimate is a curve, `at` is the index of a point of the curve.  If the estimate is None,
-    both cells are None.
+    the mean and the error are None.
     """
     parts = (None, None) if estimate is None else (estimate.mean, estimate.error)
     values = [part if part is None else float(np.asarray(part)[at]) for part in parts]
@@ -356,7 +357,7 @@ def measured(
 def over_runs(
     name: str, members: Sequence[SeriesMean], notes: list[str], about: str
 ) -> dict[str, float | None]:
-    """Return the table cells of a mean over runs, and add warnings about it to `notes`."""
+    """Return the table cells of a mean over runs, and add warnings about the mean to `notes`."""
     notes += diagnostics(about, members)
     return measured(name, combine_runs(members))
 

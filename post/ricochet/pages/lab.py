@@ -209,7 +209,7 @@ async def send(socket: web.WebSocketResponse, message: dict) -> None:
 def terminate(worker: Process) -> None:
     """Ask a worker process to end.
 
-    If the worker is writing a temporary file, it removes the file before it ends.
+    A worker that is writing a temporary file removes this file before it ends.
     """
     with suppress(ProcessLookupError):
         worker.terminate()

@@ -134,8 +134,8 @@ def page_of(text: str) -> Callable:
 class Live:
     """Film of a run that may still continue.
 
-    The output file is opened without a lock for each request, and only completely written data are
-    read.  Therefore the requests do not disturb the running simulation.
+    Requests do not disturb the running simulation, because the output file is opened without a lock
+    for each request, and only completely written data are read.
     """
 
     def __init__(self, run: Run, make_film: Callable[[Run], dict]) -> None:

@@ -35,7 +35,7 @@ class SnapshotRun(Run):
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """The corners of the box with a margin beyond pistons."""
+        """The corners of the box, with an additional margin at each side that is a piston."""
         way = np.zeros(4)
         way[[*self.piston_positions]] = PISTON_MARGIN * self.edges.max()
         lower, upper = Run.bounds.func(self)
@@ -86,7 +86,7 @@ def observed(simulation: Simulation) -> dict[str, float]:
 def sampled(count: int, value: dict) -> tuple[float, ...]:
     """Return the quantities from which means are computed: time, energy, virial, area.
 
-    The observable `virial_pressure` follows from these quantities.
+    The observable `virial_pressure` follows from the time, the energy, the virial and the area.
     """
     time, kinetic, virial = (value[name] for name in ("time", "all/kinetic_energy", "virial"))
     whole = count * kinetic + (virial / (2 * time) if time else 0.0)
@@ -94,7 +94,7 @@ def sampled(count: int, value: dict) -> tuple[float, ...]:
 
 
 def pressure_between(samples: np.ndarray, count: int) -> SeriesMean:
-    """Return the mean pressure between the first and the last sample; sides may move."""
+    """Return the mean pressure between the first and the last sample, also if sides move."""
     (kinetic, virial, area), apart = samples[1:4], np.diff(samples[0])
     gain = count * kinetic[1:] * apart + np.diff(virial) / 2
     return correlated_mean(gain / area[1:], apart)
@@ -110,8 +110,9 @@ def means(run: Run, samples: Sequence[tuple[float, ...]], energy: float) -> list
     """Return mean, error and theory of the temperature, the mean speeds and the pressure.
 
     The means are over the samples in equilibrium, and their errors include the autocorrelation.
-    There are no means of a run that does not relax to equilibrium, or as long as there are too few
-    samples; there is no theory where none is known.  `energy` is the present energy of all disks.
+    Means are missing if the run does not relax to equilibrium or has too few samples yet;
+    theoretical values are missing if no theory is known.  `energy` is the present energy of all
+    disks.
     """
     titles = ["temperature"]
     titles += [f"mean speed of {name}" for name in run.names] if run.names[1:] else ["mean speed"]
@@ -142,8 +143,8 @@ def means(run: Run, samples: Sequence[tuple[float, ...]], energy: float) -> list
 def theory(run: Run, energy: float, measured: float | None) -> list[float | None]:
     """Return theoretical values of the quantities of `means` and of the pressure of an ideal gas.
 
-    The observable `temperature` is kT (1 - 1/n), because it is relative to the mean motion.
-    Without a theoretical value of kT the other values follow from the measured temperature.
+    The observable `temperature` of n disks is kT (1 - 1/n), because it excludes the mean motion.
+    If no theory predicts kT, the other theoretical values follow from the measured temperature.
     """
     count, alike = run.n_disks, [kind.alike for kind in run.by_species]
     law: list[float | None] = [None] * (len(alike) + 3)
@@ -188,14 +189,14 @@ def equilibrium_temperature(run: Run, energy: float) -> float | None:
 
 
 def conserved_drift(run: Run) -> tuple[float, int]:
-    """Return the energy of the conserved momentum, and the number of axes that conserve it."""
+    """Return the centre-of-mass energy along axes of conserved momentum, and their number."""
     free = run.periodic & (not run.nature & {"obstacles", "thermostatted"})
     momentum = np.sum(run.mass[:, None] * run.velocity[0], axis=0)
     return float(np.sum(momentum[free] ** 2) / 2 / np.sum(run.mass)), int(np.sum(free))
 
 
 def mean_speed(thermal: float, drift: float) -> float:
-    """Return the mean speed for kT/m and the square of the velocity of a common drift."""
+    """Return the mean speed of disks with kT/m = `thermal` and squared drift velocity `drift`."""
     x = drift / 4 / thermal
     bessel = (1 + 2 * x) * scipy.special.ive(0, x) + 2 * x * scipy.special.ive(1, x)
     return float(np.sqrt(np.pi * thermal / 2) * bessel)

@@ -3,7 +3,7 @@
 The worker process reads requests from standard input; each request is one line of JSON.  Each
 answer on standard output begins with a letter and with its length in four bytes.  An answer with
 the letter b is a frame, and an answer with the letter t is a JSON object.  The element "is" of each
-JSON object is the kind of the answer: "scene" (the constant part of the picture), "numbers",
+JSON object names the kind of the answer: "scene" (the constant part of the picture), "numbers",
 "events" (the next events), "state", "problems", "file" or "scan".  The page confirms with the
 request "got" that it has drawn a frame.  The worker process waits while two frames are unconfirmed.
 
@@ -74,7 +74,7 @@ class Session:
     """The simulation that a page shows, and the pace at which the simulation advances."""
 
     def __init__(self, describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
-        """Store the function that describes the constant part of a picture by values and arrays."""
+        """Store the function that converts the constant part of a picture to values and arrays."""
         self.describe_scene = describe_scene
         self.simulation: Simulation | None = None
         self.playing, self.ended, self.reason = False, False, ""
@@ -155,10 +155,10 @@ class Session:
         self.apply(name, (disk, value), lambda: set_row(self.simulation, name, disk, value))
 
     def hold(self, request: dict) -> None:
-        """Move a side at constant velocity to a position, or let it move as before.
+        """Move a side at constant velocity to a position, or restore the motion that the side had.
 
-        The side is not faster than the disks.  If its earlier motion is impossible from the present
-        position, the side stays there.
+        The speed of the side does not exceed the rms speed of the disks.  If the earlier motion of
+        a side is impossible from its present position, the side stays there.
         """
         number, target = int(request["side"]), request["to"]
         name, inwards = f"side.{SIDES[number]}.", 1 if number % 2 == 0 else -1
@@ -185,9 +185,10 @@ class Session:
         change: Callable[[], object] | None = None,
         refused: bool = True,
     ) -> bool:
-        """Apply a change at a time that a repeated run can reach exactly; return whether it acts.
+        """Apply a change at a time that a repeated run can reach exactly; return True on success.
 
-        Without `change` the value contains settings.  With `refused` the page is told of problems.
+        If `change` is None, `value` contains new settings of variables.  If `refused` is true and
+        the change fails, the page receives the reason.
         """
         try:
             now = self.simulation._settle()
@@ -237,7 +238,7 @@ class Session:
         self.goal = self.simulation.time + more, NEVER, NEVER
 
     def reach(self, request: dict) -> None:
-        """Advance to a time that several runs show together, and wait for the next such time."""
+        """Advance to a time at which the page compares several runs, and then await a request."""
         self.led, self.goal = True, (float(request["time"]), NEVER, NEVER)
 
     def event(self, request: dict) -> None:
@@ -287,7 +288,7 @@ class Session:
     # --- progress of the simulation, and messages to the page ---
 
     def is_advancing(self) -> bool:
-        """Return whether the simulation is to advance at this moment."""
+        """Return whether the simulation should advance now."""
         ready = self.simulation and not self.ended and self.unconfirmed < FRAMES_AHEAD
         return bool(ready and (self.goal or (self.playing and self.pace > 0 and not self.led)))
 
@@ -343,7 +344,7 @@ class Session:
             for when, what, values, _ in self.actions
             for name, value in (values.items() if what == "change" else [("", words(what, values))])
         ]
-        # Of successive changes with the same words, such as those of a dragged side, one is sent.
+        # Successive changes with the same description, such as drags of a side, are sent only once.
         changes = [
             one
             for k, one in enumerate(changes)
@@ -353,7 +354,7 @@ class Session:
         send_json({"is": "state", "changes": changes} | state)
 
     def send_numbers(self) -> None:
-        """Send the present energies, and mean values with errors since the last change."""
+        """Send the present energies, and means over the time since the last change, with errors."""
         self.numbers_sent = time.perf_counter()
         run, value = self.run, observed(self.simulation)
         now = value["time"]
@@ -407,7 +408,7 @@ def refuse(reason: Exception, change: bool = False) -> None:
 
 
 def words(what: str, value: object) -> str:
-    """Return the description of a change that is not a change of variables in the form."""
+    """Return the description of a change by the user that sets no variable in the form."""
     if what == "heat":
         return f"all speeds times {value:g}"
     if what == "hold":

@@ -41,9 +41,9 @@ def in_place(function: np.ufunc, name: str) -> Any:
 class Snapshot(np.ndarray):
     """Read-only copy of an array of a simulation, such as the velocities at one time.
 
-    The in-place operators return a new array.  Therefore the statement `box.velocity *= 2` has the
-    same effect as `box.velocity = box.velocity * 2`, which changes the velocities of the
-    simulation.  Expressions with such an array return ordinary arrays.
+    The in-place operators of this class return a new array.  Therefore the statement `box.velocity
+    *= 2` has the same effect as `box.velocity = box.velocity * 2`, which changes the velocities of
+    the simulation.  Expressions with such an array return ordinary arrays.
     """
 
     __iadd__ = in_place(np.add, "__iadd__")

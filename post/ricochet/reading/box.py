@@ -61,7 +61,7 @@ class BoxResults(Results):
 
     @property
     def _offsets(self) -> np.ndarray:
-        """Inward displacements (4,) of the sides from the edges of the box at the start."""
+        """Inward distance of each side (4,) from the corresponding edge of the box at the start."""
         ends = [end[axis] for axis in (0, 1) for end in (self.lower, self.upper)]
         starts = [side.get("position", end) for side, end in zip(self.sides, ends, strict=True)]
         return (np.array(starts, dtype=float) - ends) * [1, -1, 1, -1]

@@ -41,7 +41,7 @@ class Values(NDArrayOperatorsMixin):
         return np.asarray(self).mean(axis, **options)
 
     def std(self, axis: Any = None, **options: Any) -> Any:
-        """Return the standard deviation, of all values or along an axis; see `numpy.std`."""
+        """Return the standard deviation of all values, or along an axis; see `numpy.std`."""
         return np.asarray(self).std(axis, **options)
 
     def sum(self, axis: Any = None, **options: Any) -> Any:

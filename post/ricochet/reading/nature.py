@@ -6,7 +6,7 @@
     allow(run, "Haff's law", "inelastic", "mixture")   # an error for any other trait
 
 The function `nature_of` determines the traits from the parameters and the energy balance of a run.
-This function is used for output files and for simulations in memory.
+`nature_of` is used both for output files and for simulations in memory.
 """
 
 from collections.abc import Mapping
@@ -43,8 +43,8 @@ TRAITS = {
     "walls": "has walls",
     "mixture": "has disks of different mass or radius",
 }
-#: Physical properties (traits) of a run by which its energy changes other than by dissipation in
-#: collisions.
+#: Physical properties (traits) of runs whose energy also changes for reasons other than dissipation
+#: in collisions.
 SOURCES = {
     "changed",
     "sheared",
@@ -55,15 +55,15 @@ SOURCES = {
     "sliding_surfaces",
 }
 SOURCES |= {"thermostatted", "thermal_walls"}
-#: Physical properties (traits) of a run by which velocities also change between collisions.
+#: Physical properties (traits) of runs whose velocities also change between collisions.
 KICKED = {"noise_driven", "active", "thermostatted"}
-#: Physical properties (traits) of a run by which velocities do not relax to a Maxwell distribution.
+#: Physical properties (traits) of runs whose velocities do not relax to a Maxwell distribution.
 UNSETTLED = {*SOURCES, "unequal_temperatures", "inelastic", "soft_contacts", "round_container"} - {
     "thermostatted",
     "thermal_walls",
     "piston",
 }
-#: Physical properties (traits) of a run with which velocities relax to a Maxwell distribution.
+#: Physical properties (traits) that permit velocities to relax to a Maxwell distribution.
 SETTLED = TRAITS.keys() - UNSETTLED
 
 
@@ -214,7 +214,7 @@ def known(value: Any) -> bool:
 def allow(run: Any, law: str, *traits: str) -> None:
     """Raise an error if the run has a trait that is not in the list `traits`.
 
-    The text `law` is the end of the error message.
+    The error message ends with the text `law`.
     """
     for trait, reason in TRAITS.items():
         if trait in run.nature and trait not in traits:

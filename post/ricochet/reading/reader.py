@@ -381,7 +381,7 @@ class Run(BoxResults):
     def restitution(self) -> float:
         """Coefficient of restitution of two disks.
 
-        The value is NaN if the coefficient depends on the species or on the velocity of the disks.
+        `restitution` is NaN if the coefficient depends on the species or on the velocity.
         """
         return self.contact_law.xi if self.contact_law.law == "constant" else np.nan
 
@@ -389,7 +389,7 @@ class Run(BoxResults):
     def contact_law(self) -> Restitution:
         """Coefficient of restitution of two disks, and its dependence on the velocity.
 
-        The coefficient is NaN if it depends on the species.
+        The attribute `xi` is NaN if the coefficient depends on the species.
         """
         contact = self.parameters.get("contact", {})
         values = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))

@@ -74,8 +74,9 @@ class Species(NamedTuple):
 class Restitution(NamedTuple):
     """Coefficient of normal restitution of a pair of disks.
 
-    If `law` is "constant", the coefficient is `xi` for all impact velocities.  For any other `law`,
-    the coefficient depends on the impact velocity below `speed`, and is `xi` above `speed`.
+    If `law` is "constant", the coefficient is `xi` for all impact velocities.  If `law` is not
+    "constant", the coefficient is `xi` for impact velocities above `speed`, and depends on the
+    impact velocity below `speed`.
     """
 
     xi: float

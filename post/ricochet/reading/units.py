@@ -38,7 +38,7 @@ class Units(NamedTuple):
     def label(self, words: str, quantity: str = "") -> str:
         """Return the label of an axis, for example 'time (s)' or 'time (reduced units)'.
 
-        `quantity` is a key of `POWERS`.  If `quantity` is empty, `words` is a key of `POWERS`.
+        The unit is found in `POWERS` by the key `quantity` or, if `quantity` is empty, by `words`.
         """
         unit = self.name(quantity or words)
         return f"{words} ({unit})" if unit else words
