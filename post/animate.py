@@ -3,9 +3,9 @@
     python post/animate.py runs/gas.h5 -o gas.mp4              needs ffmpeg, see below
     python post/animate.py runs/crater.h5 --colour speed --count 500 --fps 30
 
-If the name of the film has no ending, the script appends .mp4 if ffmpeg is installed, and .gif
-otherwise.  Without -o the film has the name of the run.  The command `.venv/bin/pip install
-imageio-ffmpeg` installs ffmpeg if the system does not contain it.
+If the name of the film has no file name extension, the script appends .mp4 if ffmpeg is installed,
+and .gif otherwise.  Without -o the film has the name of the run.  The command `.venv/bin/pip
+install imageio-ffmpeg` installs ffmpeg if the system does not contain it.
 """
 
 from contextlib import suppress

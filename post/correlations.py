@@ -11,8 +11,8 @@ no observable drifts any longer.  Frames before equilibrium are used only for a2
 or flows, the script computes only a2 and the structure.  The structure is averaged over the frames
 after the first X collisions per disk, where X is the value of --equilibration.  Without
 --equilibration, the structure is averaged over the frames in which no observable drifts or, if the
-gas cools, over the frames later than 15 collisions per disk.  Dashed lines show the single species
-of a mixture.
+gas cools, over the frames later than 15 collisions per disk.  For mixtures, solid lines show the
+results for all disks, and dashed or dotted lines the results for single species.
 
 The time correlations are calculated by the module `ricochet.correlations`, whose docstring explains
 how pairs of frames are chosen.  The time correlations are the velocity autocorrelation <v(0) v(t)>,
@@ -77,8 +77,8 @@ from ricochet.script import by_packing, command_line, launch, measured, over_run
 import numpy as np
 
 PLAIN = {"walls"}  # the only special property allowed for Enskog's D
-#: Physical properties (traits) of runs that do not reach equilibrium, but of which the structure
-#: can be computed.
+#: Physical properties (traits) that prevent a run from reaching equilibrium, but that do not
+#: prevent the calculation of its structure.
 RESTLESS = (
     "inelastic",
     "soft_contacts",
@@ -258,7 +258,7 @@ LINES = ("-", "--", ":", "-.")  # line styles of all disks, and of species
 
 
 def parts(shown: dict[str, Curve], panel: str) -> dict[str, Curve]:
-    """Return the curves of a panel by species or pair of species; all disks have the key ""."""
+    """Return the curves of a panel by species or pair of species; the key "" means all disks."""
     names = [one for one in shown if one == panel or one.startswith(f"{panel}_")]
     return {one[len(panel) + 1 :]: shown[one] for one in names if one != "vacf_tail"}
 

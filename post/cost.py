@@ -38,7 +38,7 @@ def costs(runs: list[Run]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 
 def fits(measured: dict, low: float, high: float) -> dict[str, PowerLaw]:
-    """Return for each method a power law fitted to the points with N from `low` to `high`."""
+    """Return a power law for each method, fitted to the points with `low` <= N <= `high`."""
     laws = {}
     for search, (n, cost) in measured.items():
         inside = (n >= low) & (n <= high)

@@ -198,8 +198,8 @@ def fuller(share: np.ndarray) -> np.ndarray:
 
     The argument `share` contains the fractions of the disks in the left half of the box.  For
     frames in the first third of the run, the half with more disks is determined from the last
-    third, and vice versa.  If the half with more disks were determined from the frames whose
-    fractions are averaged, the mean fraction would exceed 1/2 by chance.  The middle third is not
+    third, and vice versa.  If the same frames determined the half with more disks and were
+    averaged, chance alone would make the mean fraction larger than 1/2.  The middle third is not
     used, because the first and last third must be statistically independent.
     """
     third = max(1, len(share) // 3)
@@ -256,8 +256,8 @@ def viscosity(run: Run) -> Curves:
 
 
 #: Each quantity that can be drawn, with the text and unit of its axis label and three functions.
-#: The functions return the measured curves, the prediction, and the values of which the mean is
-#: compared with the prediction.
+#: The functions return the measured curves, the prediction, and the values whose mean is compared
+#: with the prediction.
 QUANTITIES = {
     "width": (("width of the box", "length"), width, width_law, np.asarray),
     "temperature": (("kT", "energy"), temperature, temperature_law, np.asarray),

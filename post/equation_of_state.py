@@ -45,7 +45,7 @@ def likeness(runs: list[Run]) -> float:
 def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
     """Return a table row for each packing fraction, and warnings.
 
-    If a method of measuring Z does not apply to the runs, the cells of this method are empty.
+    If a method of measuring Z does not apply to the runs, the table cells of this method are empty.
     """
     rows, notes, alike = [], [], likeness(runs)
     for eta, same in by_packing(runs):

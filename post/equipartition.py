@@ -5,13 +5,14 @@
 Runs with the same width v0 of the initial velocity distribution are combined.  Energies are
 averaged over the runs, and over windows of time of the length --window.  The thermalisation time
 T_therm is the time at which the relative difference of the two energies falls below --within and
-stays below this value for three windows.  The error of T_therm is that of the jackknife: T_therm is
-determined again without each of the runs.  For a single run, the difference has an error, which is
-the fluctuation of the ratio of the energies in the second half of the run, and the limits of
-T_therm are the times for the difference minus and plus this error.  With 30 + 30 disks this error
-is 26 %, which is too large to determine T_therm: use many runs or many disks.  In the table,
-K_light and K_heavy are mean energies in equilibrium, which begins after --equilibration or, without
-that option, when no observable drifts any longer.
+stays below this value for three windows.  The error of T_therm is determined by the jackknife
+method: T_therm is calculated again after leaving out each run in turn.  For a single run, the error
+of the relative energy difference is the fluctuation of the ratio of the two energies in the second
+half of the run.  The limits of T_therm are then the values of T_therm for the difference minus this
+error and plus this error.  With 30 disks of each species, the error of the difference is 26 %,
+which is too large to determine T_therm; many runs or many disks are then required.  In the table,
+K_light and K_heavy are mean energies in equilibrium, which begins after the first X collisions per
+disk, where X is the value of --equilibration, or by default when no observable drifts any longer.
 """
 
 from collections.abc import Callable
@@ -83,7 +84,7 @@ def over_runs(of: Callable[[np.ndarray], float], both: list[np.ndarray]) -> Esti
     """Return a function of the mean energies (2, W) of R runs, with its error by the jackknife.
 
     `both` contains the energies (R, W) of the two species.  The result is NaN if the function is
-    NaN for all runs, or without one of them.
+    NaN for the mean energies of all runs, or for the mean energies of all runs except one.
     """
     tracks, count = np.array(both), len(both[0])
     whole = of(tracks.mean(axis=1))

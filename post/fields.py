@@ -14,9 +14,9 @@ neighbouring cells.  The averages include the frames after the first X collision
 is the value of --equilibration; by default they include the second half of each run.  Errors are
 determined from the differences between blocks of time, taken from all runs of one input
 (docs/theory.md).  If a cell contained disks in fewer than two blocks, only its density is
-calculated.  The table contains kT, stress and heat flux of a cell only if the cell contained at
-least three disks even when any one block of time is ignored.  With --species, the fields of one
-species are calculated, relative to the mean flow of that species.
+calculated.  For kT, stress and heat flux, the table contains only cells in which at least three
+disks remain, whichever block of time is left out.  With --species, the fields of one species
+are calculated, relative to the mean flow of that species.
 
 With --grid, the script also draws the stream function psi of the particle flux j = n u, where j_x =
 d psi / dy and j_y = -d psi / dx.  The contour lines of psi are the streamlines of the mean flow.
@@ -109,7 +109,7 @@ def draw_fields(axes: plt.Axes, units: Units, x: np.ndarray, found: dict, *names
 
 
 def with_ends(run: Run, axis: int, x: np.ndarray) -> np.ndarray:
-    """Return x with the smallest and the largest possible position of a disk centre at its ends."""
+    """Return x, extended at its ends by the smallest and largest possible centre position."""
     reach = run.radius[0]
     return np.concatenate([[run.lower[axis] + reach], x, [run.upper[axis] - reach]])
 

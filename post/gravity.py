@@ -17,10 +17,10 @@ species i by exp(-sum_j pi s_ij^2 n_j(h)).  The correction for the excluded area
 near the floor.  If sum_j pi s_ij^2 n_j(h), calculated for point particles, exceeds 0.5 at the
 floor, no dashed line is drawn for the heights.
 
-Slopes are the decay constants of greatest likelihood of exponential distributions that are fitted
-to the values from 0 to 5 kT of the kinetic energy and from 1 to 5 kT of m g h.  The heights below
-1 kT are left out, because the finite size of the disks flattens the distribution there.  The errors
-of the slopes follow from the jackknife over ten blocks of time.
+The slopes are maximum-likelihood estimates of the decay constants of exponential distributions.
+The fits use kinetic energies between 0 and 5 kT, and values of m g h between 1 and 5 kT.  The
+heights below 1 kT are left out, because the finite size of the disks flattens the distribution
+there.  The errors of the slopes follow from the jackknife over ten blocks of time.
 """
 
 from typing import NamedTuple
@@ -70,9 +70,10 @@ def samples(run: Run, kind: Species, frames: list[int]) -> Samples:
 def log_slope(values: np.ndarray, limits: tuple[float, float]) -> float:
     """Return the decay constant of values with an exponential distribution between two limits.
 
-    The decay constant is that of greatest likelihood, for which the mean of the values between the
-    limits is the mean of the truncated distribution.  A line fitted to the logarithm of a histogram
-    would depend on its bins: nearly empty bins would make the scatter larger by a third.
+    The result is the maximum-likelihood estimate of the decay constant: with this constant, the
+    truncated exponential distribution has the same mean as the values between the limits.  A line
+    fitted to the logarithm of a histogram would depend on its bins: nearly empty bins would make
+    the scatter larger by a third.
     """
     inside = values[(values >= limits[0]) & (values <= limits[1])]
     reach = limits[1] - limits[0]
@@ -87,11 +88,11 @@ def log_slope(values: np.ndarray, limits: tuple[float, float]) -> float:
 
 
 def slope_of(values: np.ndarray, reach: tuple[float, float], laws: np.ndarray) -> Estimate:
-    """Return `log_slope` of values (F, n) over the slope of the law, with its error.
+    """Return the ratio of `log_slope` of values (F, n) to the slope of the law, with its error.
 
-    `reach` is the range of the fit in units of kT.  The error follows from the jackknife: `laws`
-    (BLOCKS + 1,) contains the slope of the law for kT of all frames, and for kT without the frames
-    of each block.
+    `reach` is the range of the fit in units of kT.  The error is determined by the jackknife
+    method.  The first element of `laws` (BLOCKS + 1,) is the slope of the law for the mean kT of
+    all frames; each other element is the slope for the mean kT without the frames of one block.
     """
 
     def over(law: float, own: np.ndarray) -> float:
@@ -111,7 +112,10 @@ def blocks_of(frames: int) -> list[np.ndarray]:
 
 
 def warmth(species: list[Samples]) -> np.ndarray:
-    """Return 1, and the kinetic energy (BLOCKS + 1,) without each block over that of all frames."""
+    """Return ratios (BLOCKS + 1,) of kinetic energies to the mean kinetic energy of all frames.
+
+    The first ratio, for all frames, is 1; each other ratio leaves out the frames of one block.
+    """
     energy = np.sum([0.5 * s.mass * s.square.sum(axis=1) for s in species], axis=0)
     rests = [np.delete(energy, own) for own in blocks_of(len(energy))]
     return np.array([1.0, *(np.mean(rest if len(rest) else energy) for rest in rests)]) / np.append(
@@ -136,9 +140,9 @@ def crowded_heights(
 ) -> list[np.ndarray]:
     """Return the densities at the heights (H,), corrected to first order for the excluded area.
 
-    `width` is the width of the area that the centres of disks can reach, and `share` is the number
-    of disks that share a fixed total energy.  The area that a disk excludes does not affect the
-    disk itself.
+    `width` is the width of the area that the centres of disks can reach.  `share` is the number of
+    disks among which a fixed total energy is distributed, or infinity with a heat bath.  The area
+    that a disk excludes does not affect the disk itself.
     """
     numbers = [s.height.shape[1] for s in species]
     ideal = [sharing(s.mass * pull * height, kt, share) for s in species]
@@ -185,7 +189,7 @@ def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, li
 
 
 def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[dict]:
-    """Return the fitted slopes, divided by the slopes of the solid and of the dashed lines."""
+    """Return the ratios of the fitted slopes to the slopes of the solid and of the dashed lines."""
     temperature = kt[0]
     grid, crowded = heights(run, species, temperature)
     rows, warm = [], warmth(species)

@@ -48,7 +48,7 @@ def distance(one: Run, other: Run) -> np.ndarray:
 
 
 def divergence(time: np.ndarray, apart: np.ndarray, largest: float, begin: float) -> Divergence:
-    """Fit straight lines to the logarithms of the distances (P, T) of P pairs.
+    """Fit straight lines to the logarithms of the distances of P pairs of runs at T times.
 
     The fits end at the time at which the first distance reaches `largest`.  `begin` is the ratio of
     the start time to the end time of the fits.

@@ -55,7 +55,7 @@ def missed_share(q: np.ndarray) -> np.ndarray:
 
 
 def expected_share(run: Run, step: float, temperature: float) -> float:
-    """Return the mean of P over all collisions of a dilute gas in equilibrium."""
+    """Return the mean probability of missing a collision in a dilute gas in equilibrium."""
     shares, rates = [], []
     pull = float(np.linalg.norm(run.gravity))
     for a, b in combinations_with_replacement(kinds_of_disks(run), 2):

@@ -2,14 +2,15 @@
 
     python post/mixture.py runs/mixture/*.h5 -o mixture.png --csv mixture.csv
 
-Equilibrium begins after --equilibration or, without that option, when no observable drifts any
-longer.  Frames selected by --frames are used only if they are at least --min-separation collisions
-per disk apart.  Errors include the autocorrelation over the frames of each run.  If the runs
-scatter by more than these errors explain, the errors are determined from the scatter instead.  The
-theoretical values for each species are <K> = kT and <v> = sqrt(pi kT / 2 m).  In a periodic box <K>
-is smaller than kT by the fraction m / M, where M is the total mass of all disks.  If the kinetic
-energy is conserved, kT is known exactly.  With thermal walls, driving or rotation, kT is the
-measured mean over all disks in equilibrium, and has an error.
+Equilibrium begins after the first X collisions per disk, where X is the value of --equilibration,
+or by default when no observable drifts any longer.  Frames selected by --frames are used only if
+they are at least Y collisions per disk apart, where Y is the value of --min-separation.  Errors
+include the autocorrelation over the frames of each run.  If the scatter of the runs is larger than
+expected from the autocorrelation, the errors are determined from the scatter.  The theoretical
+values for each species are <K> = kT and <v> = sqrt(pi kT / 2 m).  In a periodic box <K> is smaller
+than kT by the fraction m / M, where M is the total mass of all disks.  If the kinetic energy is
+conserved, kT is known exactly.  With thermal walls, driving or rotation, kT is the measured mean
+over all disks in equilibrium, and has an error.
 """
 
 from ricochet import Run

@@ -344,8 +344,7 @@ def paged(film: dict | None, words: dict[str, str]) -> str:
 def lab_page(data: dict) -> str:
     """Return the page of the laboratory.
 
-    `data` contains the table of input variables, the input files, and a number that identifies the
-    laboratory.
+    `data` contains the table of input variables and the input files.
     """
     style, script = text_of("style.css") + text_of("lab.css"), text_of("lab.js")
     more = "connect-src 'self'", "img-src data:", "frame-src 'self'"
@@ -391,7 +390,7 @@ def enclosed(data: object) -> str:
 
 
 def policy(style: str, script: str, *more: str) -> str:
-    """Return a content security policy that allows only this style and script, and `more`."""
+    """Return a content security policy that allows only this style, this script and `more`."""
     rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'", *more]
     for tag, own in (("script", script), ("style", style)):
         digest = base64.b64encode(hashlib.sha256(own.encode()).digest()).decode()

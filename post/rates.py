@@ -11,16 +11,16 @@ all runs are scaled to the mean kT.  With thermal walls, with a thermostat of on
 for rotating disks, kT is a measured mean with an error.
 
 The pressure is measured from the virial of the pair collisions and from the momentum transfer to
-each side.  The pressure on the sides is slightly larger, because the centre of a disk cannot be
-closer to a side than the radius.  If the run has an event log, the script also analyses the free
-paths, and the table contains the collision rates w_ij.  The rate w_ij is the rate at which a disk
-of species i collides with disks of species j.  The free path of a disk in a frame is the distance
-that it travels between its last collision before the frame and its first collision after the frame.
-Because long paths occur in more frames than short paths, the weight of each path is the inverse of
-its duration.  The errors are determined from the scatter of the runs or, for a single run, from the
-scatter of blocks of frames.  The line shows the prediction for equal disks and molecular chaos
-(Boltzmann, Enskog).  Free paths are not defined for driven disks, whose velocities change between
-collisions.
+each side.  The pressure on the sides is slightly larger than the pressure from the virial, because
+the distance of the centre of a disk from a side cannot be smaller than the radius.  If the run has
+an event log, the script also analyses the free paths, and the table contains the collision rates
+w_ij.  The rate w_ij is the rate at which a disk of species i collides with disks of species j.  The
+free path of a disk in a frame is the distance that it travels between its last collision before the
+frame and its first collision after the frame.  Because long paths occur in more frames than short
+paths, the weight of each path is the inverse of its duration.  The errors are determined from the
+scatter of the runs or, for a single run, from the scatter of blocks of frames.  The line shows the
+prediction for equal disks and molecular chaos (Boltzmann, Enskog).  Free paths are not defined for
+driven disks, whose velocities change between collisions.
 
 If the disks lose energy, or if the walls have different temperatures, the script analyses only the
 free paths.  The analysis of free paths uses the frames after the first X collisions per disk, where
@@ -73,7 +73,7 @@ def scales(runs: list[Run]) -> np.ndarray:
 
 
 def over_all(runs: list[Run], skip: float | None, notes: list[str]) -> dict[str, SeriesMean]:
-    """Return all results with errors, scaled to one temperature."""
+    """Return all results with errors; each run is scaled to the mean temperature of all runs."""
     kts = scales(runs)
     found = [td.rates(run, skip) for run in runs]
     means = {}

@@ -4,14 +4,15 @@
 
 The left panel shows T = m <v^2> / 2 and T_rot = I <omega^2> against collisions per disk.  The
 dashed curves show a theory that assumes Maxwell distributions of the velocities (Luding et al.
-1998).  The right panel shows the ratio T_rot / T and two values for its steady state.  One of the
-two values is the prediction of the theory by Luding and others (1998).  The other value, which is
-up to 6 % lower, is the result of direct simulations of the Boltzmann equation and is not always
-available.  The prediction and the simulation result apply to a homogeneous dilute gas of equal
-disks without Coulomb friction.  In a cooling gas a flow develops, which contributes to T and
-therefore decreases the ratio.  The flow decreases the ratio by 3.8 to 4.6 % at a packing fraction
-of 0.02, and by 0.3 to 0.5 % at a packing fraction of 0.0025. If the gas cools faster, the flow
-decreases the ratio more.  All runs must have the same input, and the box must be periodic.
+1998).  The right panel shows the ratio T_rot / T, and at most two reference values of this ratio in
+the steady state.  The first reference value is the prediction of the theory by Luding and others
+(1998).  The second reference value is the result of direct simulations of the Boltzmann equation,
+if such a result is available; it is up to 6 % lower than the first reference value.  The prediction
+and the simulation result apply to a homogeneous dilute gas of equal disks without Coulomb friction.
+In a cooling gas a flow develops, which contributes to T and therefore decreases the ratio T_rot /
+T.  The flow decreases T_rot / T by 3.8 to 4.6 % at a packing fraction of 0.02, and by 0.3 to 0.5 %
+at a packing fraction of 0.0025. In a gas that cools faster, the flow causes a larger decrease of
+T_rot / T.  All runs must have the same input, and the box must be periodic.
 """
 
 from ricochet import Run, RunError, theory

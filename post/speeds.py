@@ -21,11 +21,11 @@ Kolmogorov-Smirnov (KS) and chi-square tests compare the speeds with the expecte
 Before the tests, the speeds in each frame are divided by the thermal speed in that frame.  If the
 kinetic energy is conserved, the expected distribution is that of N disks with a fixed total kinetic
 energy; otherwise the Maxwell distribution is expected.  The p-values are determined from random
-samples, whose speeds are also divided by their thermal speed (docs/theory.md).  Frames that are
-close in time contain correlated speeds; therefore the number of `independent` speeds is reduced by
-the statistical inefficiency.  The statistical tests do not apply to disks that conserve their
-angular momentum in a round container.  The last panel shows the second Sonine coefficient a2 =
-<v^4> / (2 <v^2>^2) - 1 against the number of collisions per disk.
+samples; the speeds in each sample are divided by the thermal speed of this sample (docs/theory.md).
+Frames that are close in time contain correlated speeds; therefore the number of `independent`
+speeds is reduced by the statistical inefficiency.  The statistical tests do not apply to disks that
+conserve their angular momentum in a round container.  The last panel shows the second Sonine
+coefficient a2 = <v^4> / (2 <v^2>^2) - 1 against the number of collisions per disk.
 """
 
 from typing import NamedTuple
@@ -59,8 +59,9 @@ from ricochet.script import command_line, grouped, late_frames, launch, measured
 import numpy as np
 
 BINS = np.linspace(0, 3, 51)  # u = 1 is the centre of a bin
-#: Panel titles for the possible states of the late frames.  In the states `EQUILIBRIUM` and
-#: `STEADY`, the average of kT does not change during the late frames.
+#: Panel titles, one for each possible state of the gas in the late frames (the frames after the
+#: initial relaxation).  The titles `EQUILIBRIUM` and `STEADY` are used if the average of kT does
+#: not change during the late frames.
 EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
 COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each frame at its own kT"
 UNSTEADY = "No steady kT yet: each frame at its own"
@@ -103,7 +104,7 @@ def temperature(
 def tracks_of(
     runs: list[Run], picked: list[list[int]], species: str | None, component: int | None = None
 ) -> list[np.ndarray]:
-    """Return for each run kT of all frames between the first and last selected frame."""
+    """Return kT in all frames between the first and the last selected frame of each run."""
     spans = [slice(frames[0], frames[-1] + 1) for frames in picked]
     return [
         kt_of_frames(run, own, species, component) for run, own in zip(runs, spans, strict=True)
@@ -211,7 +212,7 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
 
 
 def cooling(row: dict) -> str:
-    """Return the temperature change of a gas as text; under gravity, kT can also increase."""
+    """Return the change of kT as text; kT usually falls, but can increase under gravity."""
     goes = "falls" if row["kT_last"] < row["kT_first"] else "goes"
     if row["frames"] == row["runs"]:
         return f"kT is {row['kT_last']:.4g}"

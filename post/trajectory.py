@@ -38,7 +38,7 @@ def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
 
 
 def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return a path (T, 2) in the box, with each step across a side repeated on the other side."""
+    """Return a path (T, 2); each step across a side of the box is drawn at both opposite sides."""
     rows = [path[:1]]
     gap = np.full((1, 2), np.nan)
     for start, end, jump in zip(path[:-1], path[1:], np.diff(image, axis=0), strict=True):
