@@ -44,7 +44,7 @@ state() {
   input "$work/$name.nml" "placement = 'file', file = '$work/$name.h5', velocities = 'file'" "$@"
 }
 
-# gas DISKS PACKING: prepares a starting state of equal disks at this packing fraction.
+# gas DISKS PACKING: prepares a starting state of equal disks with the packing fraction PACKING.
 gas() { state "gas_$1_$2" "name = 'gas', count = $1, packing_fraction = $2"; }
 
 # polydisperse DISTRIBUTION DISKS PACKING: prepares a starting state of disks with different radii; the largest radius is up to 9.9
@@ -95,8 +95,8 @@ table() {
 # --- Rates with and without an additional option, measured alternately ------------------------------------
 
 # beside WHAT LEAST NAME OTHER COLLISIONS [OPTION...]: measures the rate of a run without options that begins from the starting
-# state NAME, and the rate of a run with the options that begins from the starting state OTHER. The function prints both rates, and
-# the ratio of the rate with the options to the rate without options.
+# state NAME, and the rate of a run with the options that begins from the starting state OTHER. The function prints the two rates,
+# and the ratio of the rate with options to the rate without options.
 beside() {
   local what=$1 least=$2 name=$3 other=$4 collisions=$5 k
   shift 5
@@ -229,7 +229,8 @@ instructions() {
   counted run "$name" "$collisions" "$@"
 }
 
-# counted COMMAND...: prints the number of instructions that the simulation program executes when COMMAND runs it through `run_by`.
+# counted COMMAND...: executes COMMAND, which runs the simulation program under valgrind, and prints the number of counted
+# instructions.
 counted() {
   run_by=(valgrind --tool=callgrind --callgrind-out-file=/dev/null)
   run_by+=(--toggle-collect=__{event_driven_MOD_{advance,start,renew},epochs_MOD_move_epoch,kicks_MOD_kick}'*')
@@ -271,8 +272,8 @@ piston() {
     >"$work/piston_$1.nml"
 }
 
-# kicked NUMBER: simulates a gas of 1000 disks in a periodic box with a thermostat. The thermostat changes all velocities at NUMBER
-# times, ten times per mean collision time.
+# kicked NUMBER: simulates a gas of 1000 disks in a periodic box with a thermostat. The thermostat changes all velocities NUMBER
+# times; the interval between these changes is a tenth of the mean free time of a disk.
 kicked() {
   local interval=8.5e-4
   "${run_by[@]}" "$program" "$work/gas_1000_0.3.nml" -o "$work/bench.h5" --force --quiet --set box.boundary=periodic,periodic \

@@ -59,8 +59,8 @@ fail() {
 
 die() { fail 2 "$@"; }
 
-# nearest WORD CHOICE...: prints a suggestion such as "; did you mean --seeds?" if WORD is similar to one of the choices. This
-# function requires Python.
+# nearest WORD CHOICE...: prints a suggestion such as "; did you mean --seeds?" if WORD is similar to one of the choices. Without
+# Python, this function prints nothing.
 nearest() {
   python3 -c 'import difflib, sys
 for near in difflib.get_close_matches(sys.argv[1], sys.argv[2:], 1): print(f"; did you mean {near}?")' \
@@ -177,7 +177,8 @@ put() {
   fi
 }
 
-# Sets `last_line` to the last line of the log of member NAME. No process is started, because there can be 100 000 members.
+# Sets `last_line` to the last line of the log of member NAME. The function starts no process, because there can be 100 000 member
+# runs.
 read_last_line() {
   local lines=()
   last_line=''
@@ -278,7 +279,8 @@ remember() {
   for name in "${found[@]}"; do
     [[ ! -e $folder/$name.h5 || -e $folder/$name.h5.part ]] || touch -- "$folder/$name.h5"
   done
-  # The file of a member that is being extended already is left as it is, because the program identifies it by its time.
+  # While a .part file exists, the program is extending the output file and identifies the output file by its modification time;
+  # this time is then not changed.
   for name in "${extended[@]}"; do
     [[ ! -e $folder/$name.h5 || -e $folder/$name.h5.part ]] || touch -d @1 -- "$folder/$name.h5"
   done
@@ -326,9 +328,9 @@ run_member() {
     [[ -n $resume && $(last_words "${names[$1]}") == *": its run broke off "* ]] || break
     resume= # the member starts from the beginning
   done
-  # If the script is being stopped, a negative exit status or an exit status of at least 127 means that the member run was stopped
-  # while it started, or while bash waited for it a second time. An exit status of -1 means that bash has lost the exit status of
-  # the member run.
+  # While the script is being stopped, a negative exit status or an exit status of at least 127 means that the member run was
+  # stopped, too: either while the member run started, or while bash waited for the member run a second time. An exit status of -1
+  # means that bash has lost the exit status of the member run.
   if [[ -n $stopping ]] && ((status >= 127 || status < 0)); then status=75; fi
   if ((status == 3)) && [[ -e $base.h5 && $(last_words "${names[$1]}") == *"$is_finished"* ]]; then
     touch -- "$base.h5" && status=0
@@ -395,7 +397,7 @@ clock() {
 }
 
 # tell MEMBER TEXT: prints a line about a member run if this script performs only a share of the member runs. The line contains the
-# name of the member run, the time and the host, because shares are processed on other computers or at other times.
+# name of the member run, the time and the host, because each share may be performed on another computer or at another time.
 tell() {
   [[ -z $task ]] || printf '%(%FT%T%z)T %s %s %s: %s\n' -1 "$task" "$host" "$1" "$2" >&2
 }
@@ -468,8 +470,8 @@ failure() {
   tell "$1" "failed$2: ${3:-no message in its log}"
 }
 
-# announce TEXT: prints a summary of all member runs that begins with TEXT. A share prints no summary, because it has already
-# printed a line for each member run.
+# announce TEXT: prints TEXT, followed by a summary of all member runs. If the script performs only a share of the member runs, it
+# prints no summary, because it has already printed a line for each of them.
 announce() {
   [[ -z $share ]] || return 0
   printf '%s: %s%d of %d members finished' "$folder" "$1" "$finished" "$total" >&2
@@ -491,8 +493,9 @@ summarise() {
 
 # --- engines (GNU parallel, Slurm): they start this script several times, each time for a share of the member runs ---
 
-# Sets two variables: `shares` is the number M of shares into which the member runs are divided, at most the value of the argument;
-# `share_command` is the command that performs a share if the text K/M is appended. Failed member runs do not belong to any share.
+# Sets two variables. `shares` is the number M of shares into which the member runs are divided; M does not exceed the argument of
+# this function. `share_command` is the command to which the text K/M is appended in order to perform share K. Finished and failed
+# member runs do not belong to any share.
 prepare_shares() {
   local most=$1 k here left=0
   here=$(cd -- "$folder" && pwd)
@@ -561,8 +564,8 @@ wait_for_locks() {
 }
 
 # Submits a job array to Slurm. Each task of the array forwards the signal TERM to its member runs. If a task reaches its time limit
-# and was not cancelled, it is added to the queue again. The task names itself by the numbers of array and task, because the job
-# number of the last task (SLURM_JOB_ID) is that of the whole array.
+# and was not cancelled, it is added to the queue again. A task identifies itself by the number of the job array and its own number
+# in the array, because SLURM_JOB_ID of the last task is equal to the job number of the whole array.
 submit_to_slurm() {
   local id='' here text site
   command -v sbatch >/dev/null || die "--engine slurm needs Slurm (no sbatch here)"

@@ -4,7 +4,7 @@
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 runs/ensemble.sh input/lab.nml -d "$data" --seeds 1 "$@"
-# Frame 50 shows the state after 5000 events. The following 500 frames contain 50 000 speeds.
+# Frame 50 shows the state after 5000 events. The 500 frames after frame 50 contain 50 000 speeds in total.
 "$python" post/speeds.py "$data/seed_1.h5" --frames 51: --equilibration 0 --min-separation 0 \
   -o "$figures/lab_speeds.png" --csv "$figures/lab_speeds.csv"
 runs/ensemble.sh input/lab.nml -d "$data/start" --seeds 1 --set stop.events=300 \

@@ -2,8 +2,9 @@
 # Properties of hard disks in a periodic box: equation of state, time correlations, order, and Haff's law; four seeds each.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# Runs for the pressure: the initial positions depend on the packing fraction. Up to 0.5 they are random, up to 0.7 they result from
-# Lubachevsky-Stillinger compression, and for 0.72 and above they form a crystal in a commensurate box.
+# Runs for the pressure: the initial positions depend on the packing fraction. The initial positions are random for packing
+# fractions up to 0.5, result from Lubachevsky-Stillinger compression between 0.5 and 0.7, and form a crystal in a commensurate box
+# for 0.72 and above.
 runs/ensemble.sh input/bulk.nml -d "$data/fluid" --seeds 1-4 \
   --scan species.disks.packing_fraction=0.05,0.1,0.15,0.2,0.25,0.3,0.35,0.4,0.45,0.5 "$@"
 runs/ensemble.sh input/bulk.nml -d "$data/dense" --seeds 1-4 --set species.disks.placement=dense \
