@@ -1,8 +1,8 @@
 """Cooling gases: energies averaged over runs, Haff's law, temperatures of rough disks.
 
 In this module, tau is the number of collisions per disk.  A dictionary of the type `Curves`
-contains arrays with the points of grids, and estimates of quantities that were measured at the
-points of a grid.
+contains the coordinates of points, as arrays, and the quantities measured at these points, as
+estimates with errors.
 """
 
 from collections.abc import Sequence
@@ -43,7 +43,7 @@ SETTLED = 0.005  # relative distance from its limit at which the ratio is regard
 
 
 def on_grid(x: Sequence[Any], y: Sequence[Any], points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Interpolate curves (K, T) of each run on a common grid, which ends at the shortest run."""
+    """Interpolate curves (K, T) of each run on a common grid up to the end of the shortest run."""
     grid = np.linspace(0, min(own[-1] for own in x), points)
     each = zip(x, y, strict=True)
     return grid, np.array([[np.interp(grid, own, k) for k in tracks] for own, tracks in each])

@@ -19,15 +19,15 @@ Along axes where the velocity of the centre of mass is conserved, or changed onl
 (drive.keep_momentum = .false.), displacements and velocities are relative to the centre of mass.
 
 Lags are spaced logarithmically: each power of ten is divided into twelve intervals, and from each
-interval the lag with the largest number of pairs of samples is used.  Lags that are selected by
-this rule are suitable for samples at equal intervals, at logarithmic intervals, in bursts, and for
-combinations of such samples.  A sample is an origin t0 for a lag if another sample is later by this
-lag.  If the sums over all origins would take too long, time is divided into intervals of one
-sixteenth of the lag, and only the first sample in each interval is an origin.  If fewer samples are
-origins, the correlations of displacements are equally accurate, but the correlations of velocities
-are less accurate at lags of many mean free times.  The method is the multiple-tau correlator of
-Ramirez et al., Journal of Chemical Physics 133, 154103 (2010), but without means over neighbouring
-samples, so that each lag is exact.
+interval the lag with the largest number of pairs of samples is used.  This choice of lags suits
+samples at equal intervals, samples at logarithmic intervals, samples in bursts, and combinations of
+these schedules.  A sample is an origin t0 for a lag if another sample is later by this lag.  If the
+sums over all origins would take too long, time is divided into intervals of one sixteenth of the
+lag, and only the first sample in each interval is an origin.  If fewer samples are origins, the
+correlations of displacements are equally accurate, but the correlations of velocities are less
+accurate at lags of many mean free times.  The method is the multiple-tau correlator of Ramirez et
+al., Journal of Chemical Physics 133, 154103 (2010), but without means over neighbouring samples, so
+that each lag is exact.
 
 Errors follow from the scatter of the runs.  For a single run, errors follow from the scatter of
 sixteen parts of the run.  Lags above an eighth of the duration of a single run have no error (NaN).
@@ -147,7 +147,7 @@ def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
 
 
 class Correlator:
-    """Time correlations of a run or a simulation, whose samples are added one after the other.
+    """Time correlations of a run or a simulation, accumulated from samples one after the other.
 
     The required memory is bounded, because a sample is stored only until all its pairs have been
     added.  In long runs, about 16 samples are stored for each lag.  A pickle contains the complete
@@ -162,7 +162,7 @@ class Correlator:
         reach: float | None = None,
         lags: np.ndarray | None = None,
     ):
-        """Set all sums to zero; `waves` are [1/length], and the default lags are from `lags_of`."""
+        """Set all sums to zero; `waves` has the unit 1/length; `lags_of` selects default lags."""
         cools = {"inelastic"} if source.nature.cooling else set()
         what = "time correlations require a steady state without flow"
         allow(source, what, *TRAITS.keys() - FLOWING - cools)
@@ -240,7 +240,7 @@ class Correlator:
         np.add.at(self.sums, where, np.moveaxis(np.array(values) @ self.shares, 0, 2))
 
     def amounts(self, name: str, species: int) -> np.ndarray:
-        """Return the sums (L, B) at L lags over the pairs that begin in each block of time."""
+        """Return sums (L, B) at L lags over the pairs that start in each of B blocks of time."""
         names = (*FIXED, *(f"F_s({k:g})" for k in self.waves))
         if name != "alpha2":
             return self.sums[:, :, species, names.index(name)]
@@ -259,8 +259,8 @@ class Correlator:
 def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield positions, which are not wrapped into the box, and velocities at the given times.
 
-    If `source` is a simulation, the iteration advances the simulation to the given times.  If
-    `source` is a run, the iteration ends after the last frame.
+    If `source` is a simulation, the generator advances the simulation to the given times.  If
+    `source` is a run, the generator ends after the last frame.
     """
     if isinstance(source, Simulation):
         box = source.parameters["box"]
@@ -387,7 +387,8 @@ def measured(runs: Sequence[Run], **options: Any) -> dict[str, dict[str, Curve]]
     Returns
     -------
     dict of str to dict of str to Curve
-        the functions by species, including "all", and by name; x contains lags, and y means
+        the functions by species, including "all", and by name; x of a curve contains the lags, and
+        y contains the means over pairs of samples
 
     Examples
     --------

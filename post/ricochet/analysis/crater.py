@@ -1,7 +1,8 @@
 """Craters: identify projectile and bed, and measure the size of the crater.
 
-The projectile is the disk of the species 'projectile'. If there is no such species, the projectile
-is the only disk that moves at the start.  All disks except the projectile form the bed.
+The projectile is the disk of the species 'projectile'. If the input contains no species
+'projectile', the projectile is the only disk that moves at the start.  All disks except the
+projectile form the bed.
 """
 
 from typing import Any, NamedTuple
@@ -43,8 +44,8 @@ class Crater(NamedTuple):
     side_collisions: int
 
 
-#: Properties (traits of `nature`) with which a run is accepted, because in spite of these
-#: properties only the projectile sets the bed in motion.
+# Properties (traits of `nature`) that a run may have: none of them sets the bed in motion, so that
+# only the projectile can do so.
 QUIET: tuple[str, ...]
 QUIET = (
     "inelastic",
@@ -63,7 +64,7 @@ BED_OVER_HIT = 2.2  # ratio of the disks of a sufficiently large bed to the disk
 
 
 def energy_fraction(run: Run) -> float:
-    """Return the fraction of the initial energy at which the input ends a run.
+    """Return the fraction of the initial energy at which the run ends according to the input.
 
     Parameters
     ----------
@@ -84,7 +85,7 @@ def energy_fraction(run: Run) -> float:
 
 
 def ended_by_time(run: Run, size: Crater) -> bool:
-    """Determine whether a run ended with more energy than `stop.energy_fraction`.
+    """Determine whether the energy left at the end exceeds the fraction `stop.energy_fraction`.
 
     Parameters
     ----------
@@ -134,9 +135,9 @@ def enough_disks(mass_ratio: float, restitution: float, fraction: float) -> floa
 
     In a sufficiently large bed, about n = 3.4 M (1/f - 1) / (1 - xi^2) disks are hit.  A bed is
     sufficiently large if it contains 2.2 n disks.  The factors 3.4 and 2.2 were measured for beds
-    in the lower half of a square box, at a packing fraction of 0.5.  In these measurements the mass
-    ratio M was between 10 and 50, the restitution xi between 0.3 and 0.8, the ratio of the radii
-    between 2 and 10, and the energy fraction f was 0.1.
+    in the lower half of a square box, at a packing fraction of 0.5.  The factors were measured for
+    mass ratios M between 10 and 50, restitutions xi between 0.3 and 0.8, ratios of the radii
+    between 2 and 10, and the energy fraction f = 0.1.
 
     Parameters
     ----------
@@ -302,7 +303,7 @@ def hole(run: Run) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        (P, 2) closed line [length]; empty if there is no such region
+        (P, 2) closed line [length]; empty if the bed has no hole
 
     Examples
     --------

@@ -1,8 +1,8 @@
 """Steady states of runs: when a run becomes steady, its thermal motion, and kT over time.
 
 The parameter `skip` of many functions is the duration of the equilibration, in collisions per disk;
-samples from the equilibration are left out.  If `skip` is None, the duration is determined from the
-data.
+samples from the equilibration are left out.  If `skip` is None, the duration of the equilibration
+is determined from the data.
 """
 
 from collections.abc import Sequence
@@ -214,7 +214,7 @@ def frames_from(
 
 
 def later(run: Run, skip: float | None = None) -> slice:
-    """Return the frames after `start_of_steady_state`, without the last frame.
+    """Return the frames in the steady state (see `start_of_steady_state`), except the last frame.
 
     The last frame is left out, because the last interval between frames may differ from the other
     intervals.
@@ -229,7 +229,7 @@ def later(run: Run, skip: float | None = None) -> slice:
 
 
 def motion_notes(runs: Sequence[Run]) -> list[str]:
-    """Return a note if noise moves the centre of mass, relative to which motion is measured."""
+    """Return a note that motion is relative to the centre of mass if noise moves this centre."""
     walks = any("random_walk" in run.nature for run in runs)
     note = "noise moves the centre of mass (drive.keep_momentum): motion is measured relative to it"
     return [note] * walks
@@ -238,10 +238,10 @@ def motion_notes(runs: Sequence[Run]) -> list[str]:
 def unforced(source: Run | Simulation) -> np.ndarray:
     """Return a mask (2,) of the axes along which no force except noise changes the total momentum.
 
-    The function ignores that walls parallel to an axis can exert forces along the axis.  Walls
-    exert tangential forces only in runs with a property (trait of `nature`) in `ALONG_WALLS`.  If
-    noise moves the centre of mass, and friction at walls may stop the motion of the centre of mass,
-    an error is raised.
+    The function `unforced` neglects forces along an axis from walls that are parallel to the axis.
+    Walls exert tangential forces only in runs with a property (trait of `nature`) in `ALONG_WALLS`.
+    If noise moves the centre of mass, and friction at walls may stop the motion of the centre of
+    mass, an error is raised.
     """
     box, nature = source.parameters.get("box", {}), source.nature
     if nature & (KICKED - {"noise_driven"}) or nature & {"obstacles", "changed"}:
@@ -309,7 +309,7 @@ def free_disks(run: Run) -> float:
 
 
 def drift(run: Run) -> np.ndarray:
-    """Return the velocity (2,) of the centre of mass, or 0 along axes where it is not conserved."""
+    """Return the velocity (2,) of the centre of mass; components that vary are set to 0."""
     centre = np.average(run.velocity[0], axis=0, weights=run.mass)
     return np.where(comoving(run), centre, 0.0)
 

@@ -41,7 +41,7 @@ FLOW_LEAST = -0.5  # smallest correlation of neighbouring blocks of the flow
 LONG = 1.5  # length of a block in units of the statistical inefficiency
 POINTS = 1 << 16  # used with obstacles to find the accessible area
 ACROSS = SIDES[:2], SIDES[2:]  # the two sides perpendicular to each axis
-#: Properties (traits of `nature`) of runs between two walls to which Enskog's theory applies.
+#: Properties (traits of `nature`) that a run between two walls may have if Enskog's theory applies.
 LAWFUL = {"walls", "thermal_walls", "unequal_temperatures", "sliding_surfaces"}
 Cells = tuple[int, int]
 
@@ -80,7 +80,10 @@ class Members(NamedTuple):
         return np.where(seen.sum(axis=0) > 1, mean, np.nan)
 
     def rests(self) -> np.ndarray:
-        """Return weighted deviations (G, ...); the sum of their squares is the squared error."""
+        """Return weighted deviations (G, ...) of the pseudo-values from their mean.
+
+        The sum of the squares of the weighted deviations is the squared error of the mean.
+        """
         seen = self.share > 0
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.sqrt(self.share / (1 - self.share) / seen.sum(axis=0))
@@ -165,9 +168,9 @@ def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
 def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[Block], float]:
     """Return the blocks of time of all runs, and an upper bound of the result of `kinship`.
 
-    The upper bound is the correlation of neighbouring blocks, as `kinship` defines it, that is
-    expected for a series with an exponential autocorrelation function.  If there are too few blocks
-    for an error, the upper bound is NaN.
+    The upper bound is the correlation of neighbouring blocks that would be expected if the
+    autocorrelation function were exponential; the function `kinship` defines this correlation.  If
+    there are too few blocks for an error, the upper bound is NaN.
     """
     refuse_others(runs)
     steady = [steady_frames(run, skip) for run in runs]
@@ -190,10 +193,11 @@ def kinship(members: Members, blocks: list[Block], most: float) -> np.ndarray:
     """Return, for each of F fields (G, F, C), the correlation (F,) of neighbouring blocks of time.
 
     A correlation is twice the sum of products of neighbouring deviations, divided by the sum of
-    squared deviations.  Both sums include all cells, because a single cell has too few blocks for
-    an estimate.  The correlations are limited to the range from 0 to `most`.  The lower limit for
-    the flow is `FLOW_LEAST`: the flow is the rate of change of a bounded displacement, so that
-    neighbouring blocks can be anticorrelated.
+    squared deviations.  The correlation of a field is computed from sums over all cells together,
+    because the blocks are too few for an estimate in a single cell.  The correlations are limited
+    to the range from 0 to `most`.  For the flow, the lower limit of the range is `FLOW_LEAST`
+    instead of 0, because neighbouring blocks of the flow can be anticorrelated: the flow is the
+    rate of change of a bounded displacement.
     """
     least = np.array([FLOW_LEAST if name.startswith("flow") else 0.0 for name in NAMES])
     size, same = len(blocks), [a.run is b.run for a, b in pairwise(blocks)]
@@ -208,7 +212,7 @@ def kinship(members: Members, blocks: list[Block], most: float) -> np.ndarray:
 
 
 def reach(run: Run, cells: Cells, axis: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return start and end, in each cell along an axis, of the range accessible to disk centres."""
+    """Return, for each cell along an axis, both ends of the range accessible to disk centres."""
     gap = 0 if run.periodic[axis] else radius
     sides = np.linspace(0, run.edges[axis], cells[axis] + 1)
     sides = run.lower[axis] + sides.clip(gap, run.edges[axis] - gap)
@@ -275,7 +279,7 @@ def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
 
 
 def sums(block: Block, cells: Cells, areas: list[np.ndarray], own: np.ndarray) -> np.ndarray:
-    """Return 12 sums (12, C) for each cell over the frames of a block and the disks in a mask (N,).
+    """Return 12 sums for each cell (12, C) over the frames of a block and the disks `own` (N,).
 
     The sums are the number of frames, the number of disks, disks per area, and the sums of m, m v,
     m v v (xx, xy, yy), m v^2 v / 2 and I omega^2.  In a sheared box v is relative to the shear
@@ -311,7 +315,7 @@ def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
     In cells with fewer than `FEWEST_DISKS` disks, kT, stress and heat flux are NaN.  If the flow
     velocity has the gradient g, the flow velocity changes by g h across a cell of width h.  The
     variation of the flow velocity within the cell contributes m (g h)^2 / 12 per disk to the sum of
-    m v v; `of_sums` subtracts this contribution.
+    m v v; the function `of_sums` subtracts this amount.
     """
     frames, n, dense, mass, mx, my, xx, xy, yy, qx, qy, turning = total
     u, v, density = mx / mass, my / mass, dense / frames
@@ -385,7 +389,8 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     weights = parts[:, np.where(BY_FRAMES, 0, 1)]
     values, share = jackknife(lambda total: of_sums(total, run, cells), parts, weights)
     # If the total momentum is conserved, the total thermal energy of N disks is smaller than N kT
-    # (docs/theory.md). The temperature is corrected for this difference.
+    # (docs/theory.md). Therefore the measured temperature is multiplied by the ratio of N to the
+    # effective number of disks.
     values[:, NAMES.index("temperature")] *= run.n_disks / free_disks(run)
     for axis, name in enumerate(("kT_x", "kT_y")):
         values[:, NAMES.index(name)] *= run.n_disks / (run.n_disks - comoving(run)[axis])
@@ -483,7 +488,7 @@ def has_theory(runs: list[Run], axis: int) -> bool:
     runs : list of Run
         (R,) runs
     axis : int
-        axis across the walls: 0 for x, 1 for y
+        axis perpendicular to the walls: 0 for x, 1 for y
 
     Returns
     -------
@@ -511,7 +516,7 @@ def prediction(
     measured : ricochet.fields.Fields
         fields in a row of cells along the axis
     axis : int
-        axis across the walls: 0 for x, 1 for y
+        axis perpendicular to the walls: 0 for x, 1 for y
     x : numpy.ndarray
         (P,) positions along the axis [length]
 

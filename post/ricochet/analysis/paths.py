@@ -18,7 +18,7 @@ class Turns(NamedTuple):
 
 
 def why_unknown(run: Run, log: EventLog) -> str:
-    """Return the reason why the event log does not determine the paths; '' if there is none."""
+    """Return why the event log does not determine the paths, or '' if it determines the paths."""
     if log.momentum_change is None:
         return "the log has no momentum_change"
     if run.nature & KICKED:

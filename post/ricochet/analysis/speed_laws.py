@@ -3,12 +3,13 @@
 The speeds of each frame are scaled by the energy of the frame, so that conserved and slowly
 fluctuating energies do not influence the test.  Scaled speeds deviate less from the expected
 distribution than independent values would (Lilliefors, Journal of the American Statistical
-Association 62, 399 (1967)).  The p-values therefore follow from random frames with the numbers of
-disks and the scaling of the measured frames.  The velocities in a random frame are uniformly
-distributed on the sphere of constant energy.  Along `comoving` axes, the velocities are relative to
-the centre of mass.  The statistics of correlated frames are divided by their statistical
-inefficiency.  The statistics of random frames are divided by random estimates of the inefficiency,
-so that the p-values include the noise of the estimate.
+Association 62, 399 (1967)).  To obtain p-values, the statistics are therefore compared with the
+statistics of random frames, which have as many disks as the measured frames and are scaled like the
+measured frames.  The velocities in a random frame are uniformly distributed on the sphere of
+constant energy.  Along `comoving` axes, the velocities are relative to the centre of mass.  If the
+frames are correlated, the measured statistics are divided by the statistical inefficiency of the
+series of frames.  The statistics of random frames are divided by random estimates of the
+inefficiency, so that the p-values include the uncertainty of the estimated inefficiency.
 """
 
 from collections.abc import Sequence
@@ -49,8 +50,8 @@ class SpeedTest(NamedTuple):
 def shares(run: Run, frames: Index, name: str) -> np.ndarray:
     """Return the energies (F, n) of the disks of a species, divided by the mean energy per disk.
 
-    For a run in equilibrium, the mean is over all disks in the frame.  For any other run, the mean
-    is over the disks of the species in the frame.
+    For a run in equilibrium, the mean energy is the mean over all disks in the frame.  For any
+    other run, the mean energy is the mean over the disks of the species.
     """
     energy, own = thermal_energy(run, frames), run.of_species(name)
     unit = energy if run.nature.in_equilibrium else energy[:, own]
@@ -58,7 +59,7 @@ def shares(run: Run, frames: Index, name: str) -> np.ndarray:
 
 
 class Sample(NamedTuple):
-    """Properties of frames in which the disks of a species share an energy with other disks."""
+    """Numbers of disks and frames in a sample of speeds, and constraints on energy and momentum."""
 
     sharing: int  # disks that share the energy
     own: int  # disks of the species
@@ -73,7 +74,7 @@ class Sample(NamedTuple):
         return finite_n_cdf(self.sharing, all(self.axes) and self.own == self.sharing)
 
     def smaller(self) -> "Sample":
-        """Return a sample of about `MOST` speeds that yields the same p-values as this sample."""
+        """Return a smaller sample, of about `MOST` speeds, that yields equal p-values."""
         most = self
         if self.sharing > MANY or not any(self.axes):
             own = min(self.own, MANY)
@@ -98,7 +99,7 @@ class Sample(NamedTuple):
 
 
 def sample_of(run: Run, name: str, frames: int) -> Sample:
-    """Return the `Sample` that describes the disks of a species in `frames` frames of a run."""
+    """Return a `Sample` that describes the disks of a species in a given number of frames."""
     own, axes = run.of_species(name), tuple(map(bool, comoving(run) | bool(run.shear_rate)))
     count = int(own.sum())
     mass = (*run.mass[own], *run.mass[~own]) if any(axes) and run.n_disks <= MANY else ()
@@ -132,10 +133,10 @@ def by_chance(sample: Sample) -> np.ndarray:
 def chance(found: float, drawn: np.ndarray) -> float:
     """Return the probability that a random statistic exceeds the measured statistic `found`.
 
-    The probability is the fraction of the sorted random statistics `drawn` (S,) that exceed
-    `found`.  If `found` is above the 95 % quantile of the random statistics, the probability
-    follows instead from an exponential distribution that is fitted to the random statistics above
-    this quantile.
+    The argument `drawn` (S,) contains random statistics in increasing order.  The probability is
+    the fraction of the values in `drawn` that are larger than `found`.  If `found` is above the 95
+    % quantile of the random statistics, the probability follows instead from an exponential
+    distribution that is fitted to the random statistics above this quantile.
     """
     first = int(len(drawn) * (1 - TAIL))
     if found <= drawn[first]:
@@ -145,10 +146,11 @@ def chance(found: float, drawn: np.ndarray) -> float:
 
 
 def memory(counts: Sequence[np.ndarray], cumulative: bool) -> float:
-    """Return the statistical inefficiency of counts in bins (F, B), as a mean over runs.
+    """Return the statistical inefficiency of the numbers of disks in bins, averaged over runs.
 
-    The Kolmogorov-Smirnov distance follows from the cumulative counts.  The inefficiency of a run
-    with fewer than three frames is 1.
+    `counts` contains the numbers (F, B) of disks in B bins in each of the F frames of a run.  If
+    `cumulative` is true, the numbers are first summed over bins, as in the Kolmogorov-Smirnov
+    distance.  For a run with fewer than three frames, the statistical inefficiency is set to 1.
     """
     series = [np.cumsum(own, axis=1)[:, :-1] if cumulative else own for own in counts]
     found = [statistical_inefficiency(own, LEAST) if len(own) > 2 else 1.0 for own in series]
@@ -157,11 +159,12 @@ def memory(counts: Sequence[np.ndarray], cumulative: bool) -> float:
 
 @lru_cache(maxsize=64)
 def noise(sizes: tuple[int, ...], true: float, cumulative: bool) -> np.ndarray:
-    """Return random estimates of `memory` (NOISES,) over its true value.
+    """Return random estimates (NOISES,) of a statistical inefficiency, divided by its true value.
 
-    For 20 frames the relative noise of the estimate is about a third.  `sizes` contains the numbers
-    of frames of the runs.  The random numbers of disks in bins have a correlation between frames
-    that decays exponentially such that its statistical inefficiency is the true value.
+    For 20 frames the relative noise of an estimated inefficiency is about a third.  `sizes`
+    contains the numbers of frames of the runs.  The function draws random series of the numbers of
+    disks in bins.  The autocorrelation of these series decays exponentially, with the statistical
+    inefficiency `true`.
     """
     if sum(sizes) > LONG:
         return np.ones(NOISES)
@@ -172,9 +175,11 @@ def noise(sizes: tuple[int, ...], true: float, cumulative: bool) -> np.ndarray:
 
 
 def correlated(values: np.ndarray, keep: float) -> np.ndarray:
-    """Turn independent values (F, ..., B) into frames that each keep a part of the last one.
+    """Convert independent values (F, ..., B) into an autoregressive series of F frames.
 
-    The sum over the last axis is zero, because the number of all disks in the bins is fixed.
+    Each frame is `keep` times the previous frame plus independent noise.
+
+    The values of the B bins in a frame add up to zero, because the total number of disks is fixed.
     """
     values = values - values.mean(axis=-1, keepdims=True)
     for k in range(1, len(values)):
@@ -185,7 +190,10 @@ def correlated(values: np.ndarray, keep: float) -> np.ndarray:
 def p_value(
     found: float, drawn: np.ndarray, counts: Sequence[np.ndarray], cumulative: bool
 ) -> float:
-    """Return the probability of a larger statistic, given statistics (DRAWN,) of free frames."""
+    """Return the probability that a random statistic exceeds the measured statistic `found`.
+
+    The argument `drawn` (DRAWN,) contains statistics of random samples of independent frames.
+    """
     own = memory(counts, cumulative)
     sizes, true = tuple(sorted(map(len, counts))), float(f"{max(1, own):.2g}")
     estimates = np.tile(noise(sizes, true, cumulative), DRAWN // NOISES)

@@ -106,8 +106,9 @@ def moment(members: Sequence[np.ndarray], power: int, independent: float) -> Est
     """Return the mean of u^power for speeds u that are first scaled to a mean square of 1.
 
     `members` contains the speeds (F, n) of n disks in F frames of each run.  The error follows from
-    the series of the means over the disks of a frame.  For a single run with too few frames the
-    error treats the frames as `independent` speeds.
+    the time series of the mean of u^power over the disks of each frame, corrected for the scaling
+    of the speeds.  If a single run has too few frames for a time series, the error is that of a
+    sample of independent speeds, whose number is the argument `independent`.
     """
     u = np.concatenate([one.ravel() for one in members])
     mean = np.mean(u**power)
@@ -173,8 +174,9 @@ def means(runs: Sequence[Run], frames: Sequence[Index], name: str) -> tuple[Esti
     Returns
     -------
     tuple of Estimate
-        mean speed and mean energy; the errors follow from the series of the frames or, if the runs
-        scatter more than these errors explain or have few frames, from the scatter of the runs
+        mean speed and mean energy; the errors follow from the means of successive frames or, if the
+        runs have few frames or differ by more than these errors explain, from the scatter of the
+        runs
 
     Examples
     --------

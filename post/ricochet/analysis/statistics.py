@@ -1,4 +1,4 @@
-"""Means of correlated series in time, with errors and warnings; all functions of `estimates`.
+"""Means of correlated time series, with errors and warnings; re-exports the module `estimates`.
 
 The functions `estimate` and `correlated_mean` compute a mean and its error.  The function
 `estimate` is for independent values, such as the results of runs that differ by their seed.  The
@@ -73,7 +73,7 @@ class SeriesMean(NamedTuple):
     freedom: float = np.inf  # degrees of freedom of the error
 
     def scaled(self, factor: float, offset: float = 0.0) -> "SeriesMean":
-        """Return the mean of the series offset + factor x, if this is the mean of the series x."""
+        """Return the mean of the series offset + factor x, where x is the series of this mean."""
         return self._replace(mean=offset + factor * self.mean, error=abs(factor) * self.error)
 
 
@@ -91,8 +91,8 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
     """Estimate the statistical inefficiency 1 + 2 tau of a series.
 
     tau is the integrated autocorrelation time, in samples.  The variance of the mean of correlated
-    samples is the variance for independent samples times the statistical inefficiency.  The largest
-    lag in the sum of autocorrelations, and the correction for the unknown mean, are those of Wolff,
+    samples is the variance for independent samples times the statistical inefficiency.  The sum of
+    autocorrelations is truncated, and corrected for the unknown mean, by the method of Wolff,
     Computer Physics Communications 156, 143 (2004), with the parameter S = 1.5.  A sum that ends at
     the first negative autocorrelation would underestimate the error of short series.
 
@@ -124,7 +124,7 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
 
 
 def summed_correlation(series: np.ndarray) -> tuple[float, int]:
-    """Return 1 + 2 tau of a series, uncorrected for the unknown mean, and the window of the sum."""
+    """Return 1 + 2 tau, uncorrected for the unknown mean, and the largest lag that is used."""
     count, rest = len(series), series - np.mean(series, axis=0)
     found, lag = 1.0, 0
     if not np.any(rest):
@@ -183,18 +183,19 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
     """Return standard error of the mean, degrees of freedom and drift of a series (T,).
 
     The means over parts of the series are transformed by a discrete cosine transform.  The squared
-    standard error is the mean square of the first coefficients after the constant, divided by the
-    number of parts.  The method is that of Lazarus, Lewis, Stock and Watson, Journal of Business
-    and Economic Statistics 36, 541 (2018).  Only cosine waves that are slower than the correlations
-    of the series are used.  If a is the first coefficient and b the root mean square of the
-    following coefficients, -a / b has Student's distribution for a series without a drift.  The
+    standard error is the mean square of the first coefficients except the constant coefficient,
+    divided by the number of parts.  This estimate of the error is from Lazarus, Lewis, Stock and
+    Watson, Journal of Business and Economic Statistics 36, 541 (2018).  Only cosine waves whose
+    period is longer than the correlation length of the series are used.  Let a be the first
+    coefficient of the cosine transform after the constant one, and b the root mean square of the
+    following coefficients.  If the series does not drift, -a / b has Student's distribution.  The
     returned drift is -a / b, converted to a Gaussian variable with variance 1.
 
     The correlation length is the estimated statistical inefficiency plus the standard deviation of
-    this estimate (Madras and Sokal, Journal of Statistical Physics 50, 109 (1988)).  Without this
-    addition, the error would be too small, and the degrees of freedom too many, for a series whose
-    inefficiency is underestimated by chance.  The error of an anticorrelated series is that of the
-    function `periodic_waves`.
+    this estimate (Madras and Sokal, Journal of Statistical Physics 50, 109 (1988)).  The standard
+    deviation is added because the statistical inefficiency may be underestimated by chance; the
+    error would then be too small, and the number of degrees of freedom too large.  For an
+    anticorrelated series, the function `periodic_waves` computes the error.
     """
     parts = cells(series, FINE)
     per_sample = statistical_inefficiency(parts, least=LEAST_INEFFICIENCY)
@@ -215,13 +216,16 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
 def periodic_waves(parts: np.ndarray, per_sample: float) -> tuple[float, int]:
     """Return standard error of the mean and degrees of freedom of an anticorrelated series (T,).
 
-    The sum of such a series contains a bounded part.  For example, the sum of the impulses on
-    opposite walls contains the momentum of the disks between the walls.  The values of the bounded
-    part at both ends of the series contribute to the variance of the mean.  Their contribution to
-    the coefficients of the cosine transform is twice as large, but the contribution to the
-    coefficients of the Fourier transform, averaged over sines and cosines, is equal.  The spectrum
-    of the bounded part increases as the square of the frequency; the number of waves decreases with
-    the inefficiency `per_sample` such that the relative bias is constant.
+    The running sum of an anticorrelated series contains a bounded part, which fluctuates but does
+    not grow with the length of the series.  For example, the running sum of the impulses on two
+    opposite walls contains the momentum of the disks between the walls, which is bounded.  The
+    values of the bounded part at the start and at the end of the series contribute to the variance
+    of the mean.  To the squared coefficients of a cosine transform, the bounded part contributes
+    twice as much as to the variance of the mean.  To the squared coefficients of a Fourier
+    transform, averaged over sines and cosines, the bounded part contributes exactly as much as to
+    the variance of the mean.  The spectrum of the bounded part increases as the square of the
+    frequency, so that more waves would cause a larger bias.  Therefore the number of waves is
+    reduced for a small inefficiency `per_sample`, such that the relative bias is constant.
     """
     most = min(MOST_WAVES, len(parts) // 2) // 2
     pairs = int(np.clip(round(len(parts) * per_sample**0.5 / (2 * PER_WAVE)), 1, max(1, most)))
@@ -232,9 +236,9 @@ def periodic_waves(parts: np.ndarray, per_sample: float) -> tuple[float, int]:
 def equilibration(series: np.ndarray) -> int:
     """Return the number of samples before a series becomes stationary.
 
-    The result is twice the number of samples that White's rule (MSER) leaves out (White, Simulation
-    69, 323 (1997)).  White's rule minimises the standard error of the mean of the remaining
-    samples.
+    The returned number is twice the number of initial samples that White's rule (MSER) discards
+    (White, Simulation 69, 323 (1997)).  White's rule minimises the standard error of the mean of
+    the remaining samples.
 
     Parameters
     ----------
@@ -274,8 +278,8 @@ def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
     Returns
     -------
     SeriesMean
-        the mean of the means; the attribute `samples` is the sum over the runs or, if the error
-        follows from the scatter, the number of runs
+        the mean of the means; its attribute `samples` is the sum of the attributes of the runs or,
+        if the error follows from the scatter, the number of runs
 
     Examples
     --------
@@ -346,7 +350,7 @@ def has_trend(series: np.ndarray) -> bool:
     Returns
     -------
     bool
-        whether the squared correlation coefficient with time exceeds 0.75
+        whether the squared correlation coefficient of the series and time exceeds 0.75
 
     Examples
     --------

@@ -18,8 +18,8 @@ def stream_function(run: Run, flux: np.ndarray) -> np.ndarray:
     """Fit a stream function to the flux of disks in cells.
 
     The fit minimises the sum of squared deviations between the measured flux and the flux that
-    follows from the stream function.  The fit thereby removes the part of the noise that has a
-    divergence.
+    follows from the stream function.  The flux that follows from a stream function has no
+    divergence, so that the fit removes the part of the noise that has a divergence.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def stream_function(run: Run, flux: np.ndarray) -> np.ndarray:
 
 
 def differences(terms: list[tuple[np.ndarray, float]], count: int) -> scipy.sparse.csr_array:
-    """Return a sparse matrix; each row sums corner values of one cell, multiplied by factors."""
+    """Return a sparse matrix with a row for each cell: a weighted sum of values at its corners."""
     cells = terms[0][0].size
     rows = np.tile(np.arange(cells), len(terms))
     columns = np.concatenate([corner.ravel() for corner, _ in terms])

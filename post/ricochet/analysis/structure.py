@@ -48,7 +48,8 @@ def pair_correlation(
     """Return the pair correlation function g(r) averaged over frames.
 
     g(r) is the density of disks at the distance r from a disk, divided by the mean density of the
-    box.  In a box with walls, which may move, only disks far from the walls are used as centres.
+    box.  In a box with walls, which may move, distances r are measured only from disks that are far
+    from the walls.
 
     Parameters
     ----------
@@ -336,7 +337,7 @@ def bond_correlation(
 ) -> np.ndarray:
     """Return the correlation function g6(r) = Re <psi6*(0) psi6(r)> of bond order.
 
-    If there are many disks, only a part of the disks is used as centres.
+    If there are many disks, distances r are measured only from a part of the disks.
 
     Parameters
     ----------

@@ -47,10 +47,10 @@ __all__ = [
 
 PER_FREE_TIME = 4  # sufficient number of samples of the moments
 SUMS = ("helfand_stress", "virial_tensor", "helfand_heat", "heat_virial")
-#: HEAT is the decay time of the heat flux in a dilute gas of equal disks, in mean free times. The
-#: decay time is longest in a dilute gas. MEMORY is the lag t, in mean free times, at which
-#: transport coefficients are evaluated. The mean slope of a mean square between the lags t / 2 and
-#: t is less than 0.2 % below its slope at infinite lag.
+# HEAT is the decay time of the heat flux in a dilute gas of equal disks, in mean free times; in a
+# denser gas this decay time is shorter. MEMORY is the lag t, in mean free times, at which
+# transport coefficients are evaluated. The mean square of a moment has a mean slope between the
+# lags t / 2 and t that is less than 0.2 % below the slope at infinite lag.
 HEAT, MEMORY = 2.06, 20.0
 CLOSE = 1e-6  # relative difference of steps that are regarded as equal
 UNLIKE = 0.05  # largest relative difference of Enskog's viscosity between runs of one group
@@ -94,8 +94,8 @@ def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
 def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
     """Return the lag, in numbers of frames, in which sound crosses the box.
 
-    At lags longer than this time, the size of the box influences diffusion.  The returned lag is at
-    most an eighth of the shortest run.
+    At lags longer than the time in which sound crosses the box, the size of the box influences
+    diffusion.  The returned lag is at most an eighth of the shortest run.
     """
     run, shortest = runs[0], min(f.stop - f.start for f in frames)
     kt = td.temperature(run).mean
@@ -109,8 +109,9 @@ def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean
 
     The first estimate is a quarter of the slope d<r^2>/dt of the mean square displacement, averaged
     over the lags from `lag` / 2 to `lag`.  The second estimate is the mean of I(t) / 2 over the
-    same lags t, where I(t) is the integral of <v(0) v> from 0 to t.  Each time origin contributes
-    one value to a series, so that the error of the mean of the series includes all correlations.
+    lags t from `lag` / 2 to `lag`, where I(t) is the integral of <v(0) v> from 0 to t.  For each
+    estimate, every frame at which an interval of the length `lag` can start yields one value of a
+    series; the error of the mean of the series includes the correlations between the values.
     Between frames, I(t) is interpolated by a cubic curve with the known slopes <v(0) v(t)>. If the
     velocity autocorrelation decays exponentially, the interpolation changes D by at most 0.2 %, and
     by far less at lags where D(t) is constant.
@@ -151,9 +152,9 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
         )
     flown, handed, heat, heat_handed = (part.value[first:-1] for part in parts)
     momentum = (flown + handed).reshape(-1, 2, 2)
-    # The energy moments are converted to the frame of the centre of mass by the subtraction of its
-    # velocity times the momentum moment. Further terms of the conversion grow linearly in time and
-    # are subtracted with the mean growth.
+    # To convert the energy moments to the frame of the centre of mass, the velocity of the centre
+    # of mass times the momentum moment is subtracted. All other terms of the conversion grow
+    # linearly in time, so that the subtraction of the mean growth removes these terms.
     heat = heat + heat_handed - np.einsum("a,tab->tb", drift(run), momentum)
     xx, xy, yy = momentum[:, 0, 0], momentum[:, 0, 1], momentum[:, 1, 1]
     groups = (xy, (xx - yy) / 2), ((xx + yy) / 2,), heat.T
@@ -170,23 +171,25 @@ def squares(moment: np.ndarray, lag: int) -> np.ndarray:
 
     The squares are averaged over the C components of the moment.  Because the subtracted mean
     growth was estimated from the same series, the squares are too small by the fraction lag / (T -
-    1).  The function corrects this bias.
+    1).  The returned squares are corrected for this fraction.
     """
     gain = moment[lag:] - moment[: len(moment) - lag]
     return np.mean(gain**2, axis=1) / (1 - lag / (len(moment) - 1))
 
 
 def running(moment: np.ndarray, step: float, at: np.ndarray) -> np.ndarray:
-    """Return half the slope of the mean square of a moment between successive lags in `at`."""
+    """Return half the slope of the mean squared increment of a moment between successive lags."""
     mean = np.array([squares(moment, lag).mean() for lag in at])
     return np.diff(mean, prepend=0) / np.diff(at, prepend=0) / (2 * step)
 
 
 def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
-    """Estimate half the slope of the mean square of a moment between `lag` / 2 and `lag`.
+    """Estimate a transport coefficient from the increments of a Helfand moment.
 
-    Each time origin contributes one value to a series, so that the error of the mean of the series
-    includes all correlations.
+    The estimate is half the slope of the mean squared increment, as a function of the lag, between
+    `lag` / 2 and `lag`.  Every sample at which an interval of the length `lag` can start yields one
+    value of a series; the error of the mean of the series includes the correlations between the
+    values.
     """
     half = lag // 2
     near, far = squares(moment, half), squares(moment, lag)
