@@ -34,7 +34,7 @@ OUTLINE = 0.12  # width of an outline divided by the diameter
 LEAST_POINTS = 4.0  # largest drawn diameter of enlarged disks
 WALL: dict[str, Any] = {"color": "0.25", "linewidth": 1.2}
 
-#: Quantities that can determine the colours of disks: label, and dimension of the unit.
+#: Quantities that can determine the colours of disks, each with its label and its dimension.
 COLOURINGS = {
     "speed": ("speed", "speed"),
     "displacement": ("displacement", "length"),
@@ -45,7 +45,7 @@ COLOURINGS = {
 
 
 def caption(runs: list[Run]) -> str:
-    """Return a caption with number of disks, restitution, seeds, and parameters that differ."""
+    """Return a caption: number of disks, restitution, seeds, parameters that differ among runs."""
     parts = [f"N = {listed({run.n_disks for run in runs})}"]
     restitutions = {run.restitution for run in runs}
     if all(map(np.isfinite, restitutions)):
@@ -101,7 +101,7 @@ def colours(count: int, first: int = 0) -> list[str]:
 
 
 def panel_grid(count: int, aspect: float) -> tuple[int, int]:
-    """Return the numbers of rows and columns for `count` panels with a given height / width."""
+    """Return numbers of rows and columns for `count` panels with height / width = `aspect`."""
     columns = int(np.clip(np.ceil(np.sqrt(count * aspect * 1.4)), 1, count))
     rows = int(np.ceil(count / columns))
     return rows, int(np.ceil(count / rows))
@@ -127,9 +127,9 @@ def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
 def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
     """Return the upper end of the colour scale of a film: the 99.5 % quantile of the values.
 
-    If the colours show displacements, which grow with time, the quantile is that of the values in
-    the last frame.  For all other quantities, the quantile is that of the values in about 40
-    frames.
+    If the colours show displacements, which grow with time, the quantile is computed from the
+    values in the last frame.  If the colours show any other quantity, the quantile is computed from
+    the values in about 40 frames.
     """
     some = [] if colour == "displacement" else frames[:: max(1, len(frames) // 40)]
     values = values_of(run, sorted({*some, frames[-1]}), colour)
@@ -148,7 +148,7 @@ def colour_map(colour: str) -> str:
 
 
 def chosen_colour(run: Run, wish: str | None) -> str:
-    """Return the quantity for the colours of disks: `wish`, or a default if `wish` is None."""
+    """Return the quantity that colours disks: `wish`, or the default quantity if `wish` is None."""
     known = ("species", *COLOURINGS)
     if wish is not None and wish not in known:
         hint = did_you_mean(wish, known)
@@ -293,7 +293,7 @@ def note_on_size(axes: Axes, run: Run) -> str:
 
 
 def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) -> EllipseCollection:
-    """Draw disks at `position` (N, 2), and their periodic images, with `drawn_diameters`.
+    """Draw disks at `position` (N, 2), and their periodic images, with enlarged small disks.
 
     In `style`, `array` (N,) contains values that a colour map converts to colours, and `facecolors`
     contains colours.  If disks are coloured by value, all species except the first have a black
@@ -360,7 +360,8 @@ def species_colours(run: Run) -> list[str]:
 def species_legend(figure: Figure, run: Run, by_outline: bool = False) -> None:
     """Add a legend of the species below all panels if there are several species.
 
-    Species are distinguished by colours or, with `by_outline`, by outlines as in `disk_collection`.
+    The legend distinguishes species by their colours or, if `by_outline` is true, by the outlines
+    that the function `disk_collection` draws.
     """
     styles = [{"color": COLOURS[k % len(COLOURS)]} for k in range(len(run.names))]
     if by_outline:
