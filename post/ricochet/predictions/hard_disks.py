@@ -51,8 +51,8 @@ FREEZING = np.array([
     (0.66, 8.875), (0.67, 9.350), (0.68, 9.839), (0.69, 10.234),
     (0.698, 9.16934 * math.pi / 4 / 0.698),
 ])  # fmt: skip
-# Coefficient c of the equation Z_N = Z + c / N for N disks in a periodic box, at the first ten
-# packing fractions of `FLUID`.
+# Coefficient c of the equation Z_N = Z + c / N, where Z_N is the value for N disks in a periodic
+# box, at the first ten packing fractions of `FLUID`.
 SHIFT = np.array(
     [-0.1036, -0.2152, -0.3361, -0.4680, -0.6131, -0.7741, -0.9549, -1.1605, -1.3981, -1.6776]
 )
@@ -117,8 +117,8 @@ def henderson(eta: Number) -> Number:
 def simulated(eta: ArrayLike) -> np.ndarray:
     """Return Z = P / (n kT) of the fluid, interpolated between simulations.
 
-    Between the packing fractions 0.648 and 0.698, Z is from unpublished simulations with Ricochet.
-    At all other packing fractions, Z is from published simulations.
+    Published simulations provide Z at packing fractions up to 0.648 and at 0.698; between these two
+    packing fractions, Z is from unpublished simulations with Ricochet.
 
     Parameters
     ----------
@@ -194,15 +194,15 @@ def adiabat(
 ) -> np.ndarray:
     """Return temperatures (W,) of a gas between two walls, one of which moves slowly.
 
-    `widths` (W,) are distances between the two walls.  The returned temperatures are divided by the
-    temperature at the first of these distances.  If `walled` is true, the two sides parallel to the
+    `widths` (W,) are distances between the two walls.  The returned temperatures are relative to
+    the temperature at the distance `widths[0]`.  If `walled` is true, the two sides parallel to the
     motion are walls, too.  If `walled` is false, the momentum along the moving wall is conserved,
     and the kinetic energy is (N - 1/2) kT instead of N kT.  If F is the force of the gas on the
     moving wall, a change dw of the width changes the kinetic energy by -F dw.  The force F is P h
     minus the tension of the two walls parallel to the motion, where h is the height.  The pressure
-    P follows from `simulated`.  According to scaled particle theory a wall has the tension kT n r /
-    (1 - eta) and a deficit of n r (1 - eta) / (1 + eta) disks per length (Helfand, Frisch and
-    Lebowitz, Journal of Chemical Physics 34, 1037 (1961)).
+    P follows from Z of the function `simulated`.  According to scaled particle theory a wall has
+    the tension kT n r / (1 - eta) and a deficit of n r (1 - eta) / (1 + eta) disks per length
+    (Helfand, Frisch and Lebowitz, Journal of Chemical Physics 34, 1037 (1961)).
     """
     area = count * math.pi * radius**2
     eta = np.geomspace(1e-12, FREEZING[-1, 0], 50001)  # far from the walls
@@ -506,9 +506,9 @@ def contact_values(z: float, density: np.ndarray, diameter: np.ndarray) -> np.nd
 
     The returned pair correlations have errors of about 1 %. The argument `z` is the compressibility
     factor Z of a system of equal disks that has the same packing fraction as the mixture.  The
-    formula is from Jenkins and Mancini, Journal of Applied Mechanics 54, 27 (1987).  As in Santos,
-    Yuste and Lopez de Haro, Journal of Chemical Physics 117, 5785 (2002), the formula is used with
-    an improved chi of equal disks, which follows from `z`.
+    formula is from Jenkins and Mancini, Journal of Applied Mechanics 54, 27 (1987).  The formula
+    requires chi of equal disks, for which the more accurate value that follows from `z` is used, as
+    in Santos, Yuste and Lopez de Haro, Journal of Chemical Physics 117, 5785 (2002).
     """
     eta = math.pi / 4 * np.sum(density * diameter**2)
     mean = np.sum(density * diameter) / np.sum(density * diameter**2)

@@ -24,15 +24,16 @@ __all__ = [
 Law = Callable[[np.ndarray], np.ndarray]
 
 # Relaxation of a dilute gas of disks that start with equal speeds, from Monte Carlo solutions of
-# the Boltzmann equation with 10^6 disks. The first list contains numbers of collisions per disk,
-# and the second list the second Sonine coefficient a2 after these collisions.
+# the Boltzmann equation with 10^6 disks. The first list of `RELAXATION` contains numbers of
+# collisions per disk, and the second list contains the second Sonine coefficient a2 after each of
+# these numbers of collisions.
 RELAXATION = np.transpose(
     [(0, 1, 2, 3, 4, 5, 6, 8), (-0.5, -0.370, -0.264, -0.184, -0.125, -0.0855, -0.0565, -0.025)]
 )
 # Relaxation of a dilute mixture, from Monte Carlo solutions of the Boltzmann equation: half of the
-# disks have the mass m, and half the mass 4 m. The first list contains numbers of collisions per
-# disk, and the second list the temperature of the heavy disks divided by the temperature of the
-# light disks after these collisions.
+# disks have the mass m, and half the mass 4 m. The first list of `EQUIPARTITION` contains numbers
+# of collisions per disk. The second list contains the temperature of the heavy disks divided by the
+# temperature of the light disks, after each of these numbers of collisions.
 EQUIPARTITION = np.transpose(
     [(0, 1, 2, 3, 4, 5, 6, 8), (4, 2.02, 1.455, 1.228, 1.115, 1.062, 1.031, 1.005)]
 )
@@ -264,7 +265,7 @@ def pushed_width(
     disks, H the enthalpy, and f the number of degrees of freedom including that of the piston.  The
     density is evaluated at equally spaced `widths` (W,), for which `places` contains ln Q and
     `energy` contains H - F w.  Where Q is unknown, `places` contains NaN and the density is set to
-    0.  The argument `squares` is f.
+    0.  The argument `squares` is the number f of degrees of freedom.
     """
     log = np.where(np.isnan(places), -np.inf, places) + (squares / 2 - 1) * np.log(energy)
     density = np.exp(log - log.max())
@@ -287,9 +288,10 @@ def demon_share(climb: float, layers: float, xi: float) -> float:
     Parameters
     ----------
     climb : float
-        g h / V^2
+        g h / V^2, where h is the height of the hole and V the velocity of the floor
     layers : float
-        N s / w for all N disks
+        N s / w, where N is the number of disks in both chambers, s their diameter and w the width
+        of a chamber
     xi : float
         restitution, below 1
 

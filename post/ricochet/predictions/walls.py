@@ -16,11 +16,12 @@ def virial_pressure(
 ) -> float:
     """Return the observable `virial_pressure` / kT of a fluid in equilibrium in a rectangular box.
 
-    The observable is the mean of the forces on the sides times the distances of the disks' centres
-    that touch opposite sides, divided by twice the area of the box.  A wall has a tension and a
-    deficit of disks: Helfand, Frisch and Lebowitz, J. Chem. Phys. 34, 1037 (1961), here for
-    mixtures.  The pressure far from the walls follows from Henderson's formula and, for mixtures,
-    from `of_sizes`.
+    The observable is (F_x L_x + F_y L_y) / (2 A), where A is the area of the box.  For each axis, F
+    is the force on a side perpendicular to the axis, and L is the mean distance between the centres
+    of two disks that touch opposite sides.  The tension of a wall and the deficit of disks at a
+    wall are from Helfand, Frisch and Lebowitz, Journal of Chemical Physics 34, 1037 (1961),
+    extended to mixtures.  The pressure far from the walls follows from Henderson's formula and, for
+    mixtures, from `of_sizes`.
 
     Parameters
     ----------
@@ -31,12 +32,13 @@ def virial_pressure(
     edges : array_like
         (2,) width and height of the box [length]
     walls : array_like of bool
-        (2,) whether the sides across x and those across y are walls; the others are periodic
+        (2,) whether the sides perpendicular to x, and those perpendicular to y, are walls; sides
+        that are not walls are periodic
 
     Returns
     -------
     float
-        P / kT [1/length^2]; NaN if the disks do not fit as a fluid
+        P / kT [1/length^2]; NaN if the box is too small for a fluid of these disks
 
     Examples
     --------
@@ -66,10 +68,11 @@ def virial_pressure(
 
 
 def deficit(density: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Return the disks of each species (S,) that are missing at a wall, per length of the wall.
+    """Return the deficit of disks of each species (S,) at a wall, per length of the wall.
 
     By Gibbs' adsorption equation the deficit is the derivative of the tension with respect to the
-    chemical potentials.  Both follow from the free energy of scaled particle theory.
+    chemical potentials.  The tension and the chemical potentials follow from the free energy of
+    scaled particle theory.
     """
     own = math.pi * radius**2
     free, total, sizes = 1 - density @ own, density.sum(), density @ radius
@@ -78,5 +81,6 @@ def deficit(density: np.ndarray, radius: np.ndarray) -> np.ndarray:
     mixed = np.outer(own, 2 * math.pi * sizes * radius / free**2)
     areas = np.outer(own, own) * (total / free**2 + 2 * math.pi * sizes**2 / free**3)
     potentials = np.add.outer(own, own) / free + lengths + mixed + mixed.T + areas
-    # The matrix is multiplied by the densities, so that a species without disks is allowed.
+    # The derivatives of the chemical potentials are multiplied by the densities, so that the matrix
+    # is regular even if a species has no disks.
     return np.linalg.solve(np.eye(len(own)) + density[:, None] * potentials, density * slope)
