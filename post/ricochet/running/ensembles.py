@@ -59,8 +59,8 @@ def sweep(
     Finished member runs are not repeated, and interrupted member runs are continued.  A sweep that
     was interrupted is continued by a repetition of the call with the same arguments.
 
-    If the input has changed only in variables that may change when a run is resumed, finished
-    member runs are extended.  Examples are a later end of the run or a different sampling schedule.
+    If the input has changed only in variables that may change when a run is resumed, such as the
+    end of the run or the sampling schedule, finished member runs are extended.
 
     Parameters
     ----------
@@ -153,7 +153,8 @@ def combinations(choices: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
 def check(text: str, members: Iterable[Mapping[str, Any]]) -> None:
     """Raise an error for values that the program refuses.
 
-    Each value is checked once, in the first member run with that value; seeds are not checked.
+    Each value of a variable is checked once, in the first member run that uses this value; seeds
+    are not checked.
     """
     known: set[str] = set()
     for settings in members:
@@ -514,8 +515,8 @@ def typed(value: str) -> object:
 def last_values(path: Path) -> dict[str, Any]:
     """Return seed, wall time and the last value of each scalar observable of a run.
 
-    A sweep can have 10^5 files.  Therefore functions of HDF5 are called directly, which takes half
-    of the time that the groups and datasets of h5py take.
+    Because a sweep can have 10^5 files, the file is read with the low-level functions of h5py,
+    which take half of the time of its high-level interface.
     """
     with open_file(path) as file:
         row = {"seed": plain(file["parameters/run"].attrs["seed"])}

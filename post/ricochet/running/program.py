@@ -26,7 +26,7 @@ from .starting import with_start
 STOPPED = 75
 PROGRESS = "\033[?7l"  # start of each update of the program's progress line on a terminal
 PAUSE = 30.0  # interval of progress lines without a terminal [s]
-#: Folders with the input files of Ricochet: in an installed package, and in a clone.
+#: Folder of the input files of Ricochet in an installed package, and their folder in a clone.
 INPUTS = (HERE / "input", HERE.parents[1] / "input")
 ESCAPES = re.compile(r"\033\[\??\d*[A-Za-z]")
 
@@ -70,7 +70,7 @@ def run(
         values of variables that replace those of the input, such as `{"species.gas.mass": 2}` or
         `{"contact": {"restitution": 0.9}}`; None stands for the default value of a variable
     output : str or Path, optional
-        the output file [a temporary file, which is deleted when no object can read the file]
+        the output file [a temporary file, which is deleted when no object uses the file any more]
     force, resume : bool
         whether the program is started with the option `--force` or `--resume`
     threads : int, optional
@@ -232,9 +232,9 @@ def tied(command: list[str]) -> list[str]:
     """Return a command that receives the signal SIGTERM when this Python process ends.
 
     When the program receives SIGTERM, the program writes a checkpoint and ends.  The returned
-    command starts the program with the tool setpriv of util-linux, if installed, which requests the
-    signal.  A Python function that requests the signal between fork and exec would not be safe in a
-    process with several threads.
+    command starts the program with the tool setpriv of util-linux, which requests the signal; if
+    setpriv is not available, the program does not receive the signal.  A Python function that
+    requests the signal between fork and exec would not be safe in a process with several threads.
     """
     setpriv = shutil.which("setpriv") if sys.platform == "linux" else None
     return [setpriv, "--pdeathsig", "TERM", "--", *command] if setpriv else command

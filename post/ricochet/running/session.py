@@ -65,7 +65,7 @@ class Held:
     """Context manager that locks a simulation, so that no other thread advances or closes it."""
 
     def __init__(self, simulation: Session):
-        """Store the simulation; the statement `with` acquires its lock and returns its handle."""
+        """Store the simulation, whose lock `with` acquires and whose handle `with` returns."""
         self.simulation = simulation
 
     def __enter__(self) -> int:

@@ -143,8 +143,8 @@ class Simulation(State):
         """Write an output file that the command `ricochet INPUT -o path --resume` can continue.
 
         The output file contains samples of the initial state and of the present state.  If
-        variables have been changed with `change`, INPUT must name the changed input, which `save`
-        writes to the file that the argument `input` names.
+        variables have been changed with `change`, INPUT must be a file with the changed values;
+        `save` writes this file if the argument `input` is given.
 
         Parameters
         ----------
@@ -185,10 +185,10 @@ class Simulation(State):
     def copy(self) -> Self:
         """Return an independent simulation in the same state.
 
-        If the same methods are called on the copy and on the original, their states remain
-        bit-identical.  The functions `copy.copy`, `copy.deepcopy` and `pickle.dumps` also copy a
-        simulation.  A pickle contains a checkpoint, so that another process can load the pickle.
-        If the input names a starting file, this file must exist when the pickle is loaded.
+        The copy and the original remain bit-identical if the same methods are called on both of
+        them.  The functions `copy.copy`, `copy.deepcopy` and `pickle.dumps` also copy a simulation.
+        A pickle contains a checkpoint, so that another process can load the pickle.  If the input
+        names a starting file, this file must exist when the pickle is loaded.
 
         Returns
         -------
@@ -231,8 +231,8 @@ class Simulation(State):
         All limits are counted from the start of the run.  Without limits, the stop rules of the
         input apply.  As in a run of the program, the simulation ends before a limit if no further
         event can occur, or if a gas that only loses energy has cooled to 1e-25 of its initial
-        temperature.  After an interrupt (Ctrl-C), the simulation is in the state at the moment of
-        the interrupt and can be continued.
+        temperature.  After an interrupt (Ctrl-C), the simulation is in the state at the time of the
+        interrupt and can be continued.
 
         Parameters
         ----------
@@ -381,8 +381,8 @@ class Simulation(State):
         have to shift its origin of time.  Therefore `_settle` advances to a slightly later time t
         that the engine reaches exactly, so that another simulation that advances to t reaches the
         same state.  The engine computes the time of a simulation as the sum of the origin of time
-        and the time since this origin.  Because some floating-point numbers cannot result from this
-        sum, `_settle` tries several values of t.
+        and the time since this origin.  Because not every floating-point number can be the sum of
+        these two numbers, `_settle` tries several values of t.
         """
         ulps = 0
         while self.time != self._settled:
@@ -395,8 +395,8 @@ class Simulation(State):
         """Change variables of the simulation at the present time.
 
         The variables that can change are gravity, the driving, the collision rules of disks and
-        boundaries, and the temperatures, velocities and motions of boundaries.  If the total energy
-        changes, the change of the energy counts as work.
+        boundaries, and the temperatures, velocities and motions of boundaries.  A change of the
+        total energy by this method is added to the observable `work`.
 
         Parameters
         ----------

@@ -17,7 +17,7 @@ SPECIES = re.compile(r"[1-9]\d*|[A-Za-z][A-Za-z0-9_-]{0,39}")  # as read by the 
 #: Columns of a starting file whose names differ from the names of the arrays.
 TURNING = {"angular_velocity": "omega", "orientation": "angle"}
 
-#: Variables of a species, other than position and velocity, that may be arrays over its disks.
+#: Variables of a species, except position and velocity, that may have a value for each disk.
 PER_DISK = ("radius", "mass", "angular_velocity", "orientation")
 NUMBERS = itertools.count(1)
 
@@ -25,8 +25,8 @@ NUMBERS = itertools.count(1)
 def with_start(group: Mapping[str, Any], place: Path | None) -> Mapping[str, Any]:
     """Write the arrays of a species to a starting file; return a species that names this file.
 
-    The name of the file begins with `place`.  If `place` is None, the file is temporary and exists
-    until this process ends.
+    The path of the starting file begins with the path `place`.  If `place` is None, the file is
+    temporary and exists until this process ends.
     """
     columns = {name: group[name] for name in PER_DISK if np.size(group.get(name, 0)) > 1}
     if not columns:
@@ -67,7 +67,7 @@ def write_start(
     The input determines the quantities that the starting file does not contain.  If a NumPy file
     contains arrays with the names of the parameters, the call `write_start("bed.txt",
     **np.load("a.npz"))` writes these arrays.  Numbers are written with 17 significant digits, so
-    that reading restores exactly the same values.
+    that a reader of the file obtains exactly the original values.
 
     Parameters
     ----------

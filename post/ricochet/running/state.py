@@ -76,7 +76,7 @@ class State(Session):
 
     @property
     def nature(self) -> Nature:
-        """Physical properties of the simulation until the present time; see `ricochet.nature`."""
+        """Physical properties that the simulation has had so far; see `ricochet.nature`."""
         energy = self.observable("all/kinetic_energy") * self.n_disks
         lost = self.observable("dissipated_energy")
         return nature_of(
@@ -130,7 +130,8 @@ class State(Session):
         """Positions of the disks, (N, 2) [length], as a read-only copy.
 
         Along a periodic axis, all positions are inside the box.  All positions can be set at once,
-        if no disks overlap at the new positions; the change of energy counts as work.
+        if no disks overlap at the new positions; the change of the total energy is then added to
+        the observable `work`.
         """
         return self._column("position")
 
@@ -143,7 +144,8 @@ class State(Session):
     def velocity(self) -> np.ndarray:
         """Velocities of the disks, (N, 2) [length/time], as a read-only copy.
 
-        All velocities can be set at once; the change of energy counts as work.
+        All velocities can be set at once; the change of the total energy is then added to the
+        observable `work`.
         """
         return self._column("velocity")
 
@@ -218,7 +220,7 @@ class State(Session):
 
     @property
     def observables(self) -> list[str]:
-        """Names of the observables, which are the names in an output file."""
+        """Names of the observables, as in an output file."""
         return list(self._observed())
 
     def observable(self, name: str) -> Any:
@@ -325,11 +327,11 @@ class State(Session):
 
 
 def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return a table of all obstacles or walls if a row of the input stands for several of them.
+    """Return a table of all obstacles or walls if a row of the input defines several of them.
 
-    A row stands for several obstacles or walls if the row contains the variable `file` or `points`.
-    In each such row, the coordinates are replaced by NaN.  If `rows` contains no such row, the
-    returned dictionary is empty.
+    A row defines several obstacles or walls if the row contains the variable `file` or `points`.
+    In a row that defines several obstacles or walls, the coordinates are replaced by NaN.  If each
+    row defines only one obstacle or wall, the returned dictionary is empty.
     """
     if not any({"file", "points"} & row.keys() for row in rows):
         return {}
