@@ -67,8 +67,6 @@ contains
         run%threads = int(group%integer_of("threads", 0_int64))
         if (run%dynamics == "steps" .and. .not. group%given("dt")) &
           call group%complain("dt", "is missing; dynamics = 'steps' needs it", problems)
-        if (run%dynamics == "events" .and. group%given("dt")) &
-          call group%complain("dt", "has no effect with dynamics = 'events'; it applies with 'steps'", problems)
       end associate
     end subroutine take_run
 

@@ -16,8 +16,8 @@ module run_variables
     variable_t("run", "dynamics", "text", 1, "default", "'events'", &
       "Method by which the simulation advances in time.", choices="events steps"), &
     variable_t("run", "dt", "real", 1, "optional", "0.001", &
-      "Length of a time step in time-stepped dynamics. dt must be given with run.dynamics = 'steps', and must not be given " &
-      //"with 'events'. Choose dt so small that no disk moves by more than half of the smallest radius in one step.", &
+      "Length of a time step in time-stepped dynamics. dt must be given with run.dynamics = 'steps', and has no effect with " &
+      //"'events'. Choose dt so small that no disk moves by more than half of the smallest radius in one step.", &
       positive, "time", &
       otherwise="none; needed with run.dynamics = 'steps'"), &
     variable_t("run", "search", "text", 1, "default", "'cells'", &

@@ -19,7 +19,7 @@ from whole_runs import environment, executable, ran
 ROOT = Path(__file__).resolve().parents[2]
 #: Files that the documentation mentions but that are not installed; they exist only in the source
 #: tree.
-SOURCES = {"src", "post", "runs", "tests", "CONTRIBUTING.md"}
+SOURCES = {"src", "post", "runs", "tests", "CONTRIBUTING.md", "Containerfile"}
 PFUNIT_DIR = os.environ.get("PFUNIT_DIR", "")
 SUITE = """module test_it
   use funit
