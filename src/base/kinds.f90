@@ -7,8 +7,8 @@ module kinds
 
   integer, parameter :: int128 = selected_int_kind(38)
 
-  !> Time that represents "no event"; it is later than the time of any event. The value is finite, because sums and products that
-  !> contain infinity could be NaN.
+  !> Time that represents "no event"; it is later than the time of any event. The value of `never` is finite, because sums and
+  !> products that contain infinity could be NaN.
   real(real64), parameter :: never = 1.0e150_real64
   !> 2**53; double-precision numbers represent every integer up to this value exactly.
   real(real64), parameter :: largest_exact = 2.0_real64**53

@@ -71,7 +71,8 @@ contains
     call draw_seed(state, key)
   end function key_of_draws
 
-  !> Like `seed_draw`, if the part of the key that is the same for all disks is known.
+  !> Starts a random stream in the same way as `seed_draw`, for callers that have already calculated the part of the key that is the
+  !> same for all disks.
   pure subroutine seed_disk(self, key, id, count)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(in) :: key           !! from `key_of_draws`

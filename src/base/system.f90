@@ -138,8 +138,8 @@ module system
   procedure(path_call), bind(C, name="system_synchronize") :: c_synchronize
   procedure(path_call), bind(C, name="system_find_folder") :: c_find_folder
   procedure(path_call), bind(C, name="system_make_folder") :: c_make_folder
-  procedure(path_call), bind(C, name="system_what_is") :: c_what_is   !! returns an index of `kinds_of_files`
-  procedure(path_call), bind(C, name="system_lock") :: c_lock  !! returns a file descriptor, or a negative number such as `taken`
+  procedure(path_call), bind(C, name="system_what_is") :: c_what_is   !! returns the position of the kind in `kinds_of_files`
+  procedure(path_call), bind(C, name="system_lock") :: c_lock  !! returns a file descriptor, or an error code < 0 such as `taken`
   procedure(path_call), bind(C, name="system_print") :: c_print
   procedure(path_call), bind(C, name="unlink") :: c_unlink
   procedure(size_call), bind(C, name="system_free_bytes") :: c_free_bytes  !! free space in the file system that contains a folder

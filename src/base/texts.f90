@@ -86,7 +86,8 @@ contains
     character(len=24) :: buffer
     integer :: exponent
 
-    if (.not. ieee_is_normal(number)) then          ! the number is NaN or infinite, or its power of ten underflows
+    ! the number is NaN, infinite or denormal; a denormal number would make 10**exponent underflow
+    if (.not. ieee_is_normal(number)) then
       write (buffer, "(es24.16e3)") number
       text = trim(adjustl(buffer))
     else if (number == 0 .or. (abs(number) >= 1.0e-3_real64 .and. abs(number) < 1.0e6_real64)) then
@@ -208,7 +209,7 @@ contains
   pure function suggestion(word, known, listed) result(advice)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
-    character(len=*), intent(in), optional :: listed(:)  !! if present, words that the advice lists in place of `known`
+    character(len=*), intent(in), optional :: listed(:)  !! words to list if no known word is similar; default: `known`
     character(len=:), allocatable :: advice
 
     advice = nearest_word(word, known)
@@ -222,7 +223,7 @@ contains
   end function suggestion
 
   !> The known word that a user probably meant by `word`: a known word that starts with `word`, or a known word in which at most a
-  !> third of the letters differ. The result is empty if no known word is so similar.
+  !> third of the letters differ. The result is empty if `word` resembles no known word.
   pure function nearest_word(word, known) result(nearest)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
