@@ -49,7 +49,7 @@ module h5md_layout
     event_counter = events_group//"committed"
 
   !> Names that a species must not have, because HDF5 groups that contain the names of species also contain objects with these
-  !> names. The names of observables are not allowed as names of species either.
+  !> names. The names of observables are also forbidden as names of species.
   character(len=*), parameter, public :: beside_species(3) = [character(len=9) :: "committed", "names", "counts"]
 
 end module h5md_layout

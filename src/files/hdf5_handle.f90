@@ -20,9 +20,9 @@ module hdf5_handle
   public :: hdf5_handle_t, hdf5_version
 
   integer(size_t), parameter :: sieve = 4096      !! size of the buffer that collects small writes [bytes]
-  !> The links of a group are in nodes with space for 8 links. The addresses of these nodes are in other nodes with space for
-  !> twice `half_tree_node` addresses. Most groups have three links. With HDF5's default of 16, almost empty nodes would be a
-  !> quarter of the file of a small run.
+  !> HDF5 stores the links of a group in nodes that have space for 8 links. The addresses of these nodes are stored in nodes of a
+  !> second kind, which have space for twice `half_tree_node` addresses. Most groups have three links. With HDF5's default, which is
+  !> `half_tree_node` = 16, almost empty nodes would make up a quarter of the file of a small run.
   integer, parameter :: half_tree_node = 2
   !> Half of the number of links in a node: the default of HDF5. The 7 links of the group `checkpoint` must fit into one node,
   !> because `hdf5_objects: remove_last` relies on the order of the last parts of a file.

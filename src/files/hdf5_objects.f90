@@ -154,8 +154,8 @@ contains
     if (status >= 0) call h5dclose_f(dataset, status)
   end function extents
 
-  !> Number of values in a dataset. The result is -1 if the dataset does not exist or claims to be larger than the largest possible
-  !> file.
+  !> Number of values in a dataset. The result is -1 if the dataset does not exist, or if its stated size exceeds the size of the
+  !> largest possible file.
   function length(self, name) result(n)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -383,7 +383,7 @@ contains
       call h5oclose_f(object, closed)
     else
       if (in_memory == h5t_native_double) then
-        call self%open_dataset(name, dataset, extents, status)      ! HDF5 may convert integers to reals
+        call self%open_dataset(name, dataset, extents, status)      ! integers are also accepted: HDF5 converts integers to reals
       else
         call self%open_dataset(name, dataset, extents, status, like=in_memory)
       end if

@@ -1,7 +1,7 @@
 !> Series: datasets to which samples are added along the last dimension. The whole storage of a dataset is allocated when the
 !> dataset is created, although the file system uses disk space only for the part that has been written. After a dataset has been
-!> created, only its values are written. The file is therefore consistent at any time, for other programs that read the file and
-!> after the program has been killed.
+!> created, only its values are written. Other programs can therefore read the file at any time, and the file is consistent even if
+!> the program is killed.
 module hdf5_series
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8, real32

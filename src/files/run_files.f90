@@ -10,16 +10,16 @@ module run_files
   private
   public :: output_of, is_file, source_of, check_name, check_places, check_replaced, take_final_name
 
-  ! Endings that are appended to the name of the output
+  ! Extensions that are appended to the name of the output
   character(len=*), parameter, public :: &
-    unfinished = ".part", &                       !! ending of the output during the run
-    unfinished_new = ".part_new", &               !! ending of a new output file until its contents are complete
-    lock = ".lock"                                !! ending of the lock file that prevents other runs from writing to this output
+    unfinished = ".part", &                       !! extension of the output file during the run
+    unfinished_new = ".part_new", &               !! extension of a new output file until its contents are complete
+    lock = ".lock"                                !! extension of the lock file that prevents other runs from writing to the output
   character(len=9), parameter :: endings(*) = [character(len=9) :: "", unfinished, unfinished_new, lock]
 
 contains
 
-  !> Path of the output to which an auxiliary file belongs; empty if the path is not the path of an auxiliary file.
+  !> Path of the output to which an auxiliary file belongs; empty if the argument is not the path of an auxiliary file.
   pure function output_of(path) result(output)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: output
@@ -33,7 +33,7 @@ contains
     end do
   end function output_of
 
-  !> Whether a file of this name exists.
+  !> Whether a path names an existing file, folder or other object.
   function is_file(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes

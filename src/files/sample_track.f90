@@ -96,8 +96,8 @@ contains
     end do
   end function enlarged
 
-  !> Changes the type of series to 64-bit integers if the given samples contain integers that are too large for 32 bits. The present
-  !> file keeps its types; the 64-bit integers are used in the next file that is created.
+  !> Changes the type of series to 64-bit integers if the given samples contain integers that are too large for 32 bits. The types
+  !> in the present file do not change; the 64-bit integers are used in the next file that is created.
   subroutine widen(self, samples, widened)
     class(track_t), intent(inout) :: self
     real(real64), intent(in) :: samples(:, :)           !! (width,count)

@@ -1,5 +1,5 @@
-!> Reads tables of numbers from HDF5 files that other programs have written. Each column of a table, or group of adjacent columns,
-!> is a dataset at the top level of the file.
+!> Reads tables of numbers from HDF5 files that other programs have written. Each column of a table, or each set of adjacent
+!> columns, is stored as a dataset at the top level of the file.
 module table_file
   use kinds, only: real64
   use errors, only: error_t
@@ -13,7 +13,8 @@ module table_file
     module subroutine read_table(path, names, widths, most, table, error)
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: names(:)                 !! names of the datasets
-      integer, intent(in) :: widths(:)  !! number of columns in each dataset, whose shape is (rows, width), or (rows)
+      !> Number of columns in each dataset; the shape of a dataset is (rows, width), or (rows) for a single column
+      integer, intent(in) :: widths(:)
       integer, intent(in) :: most                              !! largest number of rows
       real(real64), allocatable, intent(out) :: table(:, :)    !! (columns,rows)
       type(error_t), allocatable, intent(out) :: error
