@@ -145,7 +145,7 @@ contains
     end function is_positive
   end function misses_circle
 
-  !> Like `time_to_circle`, for a disk on a parabolic path. The function F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic
+  !> Like `time_to_circle`, but for a disk on a parabolic path. The function F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic
   !> polynomial, which is 0 at a contact. F is monotonic between the roots of its derivative F', and F' is monotonic between the
   !> roots of its derivative F''. Bisection therefore starts with an interval that contains exactly one root, and the first contact
   !> cannot be missed. F is calculated from the position at the time s and not from polynomial coefficients, because rounding errors
@@ -216,8 +216,8 @@ contains
   end function time_to_circle_falling
 
   !> A power of two that is larger than all roots of a cubic polynomial (Fujiwara's bound) and larger than the square root of
-  !> `time2`. The argument `time2` determines the bound if all roots are zero. The bound is a power of two, so that all results
-  !> scale exactly if a unit is changed by a power of two.
+  !> `time2`. The argument `time2` determines the bound if all roots are zero. Because the bound is a power of two, a change of
+  !> units by a factor that is a power of two scales all results exactly.
   pure function root_bound(cubic, time2) result(bound)
     real(real64), intent(in) :: cubic(0:3), time2
     real(real64) :: bound
@@ -249,7 +249,7 @@ contains
         right = s
       end if
     end do
-    s = left  ! `left` is the latest number at which `cubic` has the same sign as at lo
+    s = left  ! `left` is the largest number at which `cubic` has the same sign as at lo
   end function root_between
 
   !> Value of a cubic polynomial by Horner's method.

@@ -38,7 +38,7 @@ module images
 
 contains
 
-  !> Creates the images of a box; later calls pass times that are measured from `epoch`. At the time t of the run, the image above
+  !> Creates the images of a box. The procedures of the type measure times from `epoch`. At the time t of the run, the image above
   !> the box is displaced along x by velocity*t. The displacement is reduced modulo the period without rounding errors, so that the
   !> precision does not decrease at late times.
   pure function moving_images(period, velocity, epoch) result(images)
@@ -78,8 +78,8 @@ contains
     n = product(2*self%reach() + 1)
   end function count_around
 
-  !> Largest index, along each axis, of the images in which a search must look for collision partners. If no disk leaves the box
-  !> before the time `valid_until`, a disk in the box can until then touch only disks in images whose indices are at most `reach`.
+  !> Largest index, along each axis, of the images in which a search must look for collision partners. Until the time `valid_until`,
+  !> a disk in the box can touch only disks in images whose indices are at most `reach`, provided that no disk leaves the box.
   pure function reach(self)
     class(images_t), intent(in) :: self
     integer :: reach(2)
@@ -115,8 +115,8 @@ contains
   end function displacement
 
   !> Time at which the image above the box will have moved by `distance` from its present position; the result is `never` if the
-  !> images do not move. A search that allows for displacements of the images of up to `distance` can use the present result of
-  !> `around` until the image has moved by `distance`.
+  !> images do not move. Until the image has moved by `distance`, a search can use the present result of `around`, provided that the
+  !> search allows for displacements of the images of up to `distance`.
   pure function valid_until(self, now, distance) result(t)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: now             !! [time]
@@ -129,8 +129,8 @@ contains
     if (abs(self%velocity) > farthest/never) t = now + farthest/abs(self%velocity)
   end function valid_until
 
-  !> Indices of the image in which an object at the separation dx is nearest. In almost all calls the nearest image is the box
-  !> itself, and the result is (0, 0).
+  !> Indices of the image that contains the nearest copy of an object, where dx is the separation from the object itself. In almost
+  !> all calls the nearest image is the box itself, and the result is (0, 0).
   pure function nearest_image(self, dx, now) result(number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: dx(2)           !! [length]

@@ -45,8 +45,8 @@ contains
   end function new_segment
 
   !> Tangential velocity of the surface at a point of contact, if the surface moves along the wall with unit speed. The result is
-  !> the component of the unit vector along the wall that is perpendicular to the normal of the surface. At the rounded ends of the
-  !> wall the surface therefore moves more slowly than along the wall.
+  !> the unit vector along the wall without its component along the normal of the surface. At the rounded ends of the wall the
+  !> surface therefore moves more slowly than along the wall.
   pure function direction(self, normal) result(along)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: normal(2)
@@ -55,8 +55,8 @@ contains
     along = self%along - dot_product(self%along, normal)*normal
   end function direction
 
-  !> Vector to the point x from the middle of the nearest periodic image of the wall. If the wall is long, another image may have a
-  !> middle that is closer to x.
+  !> Vector to the point x from the middle of the nearest periodic image of the wall. The nearest image of a long wall is not always
+  !> the image whose middle is nearest to x.
   pure function from_nearest(self, x, images, heading) result(d)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: x(2)

@@ -1,5 +1,5 @@
-!> Interface of fixed obstacles of all shapes. Search, start, time-stepped dynamics and observables use only this interface and
-!> do not depend on centres, radii or ends.
+!> Interface of fixed obstacles of all shapes. The neighbour search, the placement of disks, time-stepped dynamics and the
+!> observables use only this interface, and therefore do not depend on whether an obstacle is a circle or a straight wall.
 module shapes
   use images, only: images_t
   use kinds, only: never, real64
@@ -100,8 +100,9 @@ contains
   end function magnitude
 
   !> Vector to the point x from the middle of the nearest periodic image of the obstacle. Obstacles that enclose disks have no
-  !> images. If x is at equal distances from two images, a disk at x may touch both images. In this case the vector `heading`
-  !> selects one of the two images: along the axis of the period, the components of the result and of `heading` have the same sign.
+  !> images. If x is at equal distances from two images, a disk at x may touch both images. To choose between two equally distant
+  !> images, the vector `heading` is used: along the axis of the period, the components of the result and of `heading` have the same
+  !> sign.
   pure function from_nearest(self, x, images, heading) result(d)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]

@@ -2,9 +2,9 @@
 !> accelerations are components along the inner normal of the side.
 !>
 !> In a time interval in which the acceleration of a disk relative to the side does not change its sign, the gap between disk and
-!> side is a convex or concave function of time. The first zero of such a function can be bracketed. A period of the motion consists
-!> of a few intervals in which the gap is convex or concave. No contact can therefore be missed, even if side and disk stay close
-!> together for a long time.
+!> side is a convex or concave function of time. The first zero of a convex or concave function can be enclosed in an interval
+!> without other zeros. A period of the motion consists of a few intervals in which the gap is convex or concave. No contact can
+!> therefore be missed, even if side and disk stay close together for a long time.
 module side_motion
   use free_flight, only: flight, flight_velocity, time_to_line
   use kinds, only: never, pi, real64
@@ -20,8 +20,8 @@ module side_motion
   !> Length of a negligible time interval, as a fraction of the period. An acceleration that acts only for a negligible time changes
   !> the gap by less than the rounding error of the gap.
   real(real64), parameter :: negligible = 1.0e-10_real64
-  !> Number of successive intervals, as returned by `curvature_interval`, that are sufficient to cover a period of the motion even
-  !> if some of the intervals are negligibly short.
+  !> Number of successive intervals from `curvature_interval` that together cover at least one period of the motion, even if some of
+  !> the intervals are negligibly short.
   integer, parameter :: intervals_in_reach = 6
 
   !> The state of a side that is a piston. Collisions with disks change the state of a piston.
@@ -195,13 +195,13 @@ contains
 
     if (self%kind == sine) then
       yes = s < small_angle*self%period/(2*pi)
-    else                                             ! the side must stay on one parabola from tau to tau + s
+    else                                             ! the motion of the side must follow a single parabola from tau to tau + s
       yes = s <= 0.5_real64*self%period - modulo(tau, 0.5_real64*self%period)
     end if
   end function is_short
 
   !> Displacement of the side between the times tau and tau + s, minus the displacement that the side would have if it kept its
-  !> velocity at the time tau. The difference is computed without cancellation.
+  !> velocity at the time tau. The formula avoids cancellation between the two displacements.
   elemental function excess_displacement(self, tau, s) result(distance)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -254,8 +254,8 @@ contains
     s = minval(bend)
   end function curvature_interval
 
-  !> Time until the side touches the boundary of a disk on a parabolic path; the result is `never` if there is no contact. Every
-  !> disk that stays within the range of motion of the side for a whole period is touched by the side, except a slow disk at the
+  !> Time until the side touches the boundary of a disk on a parabolic path; the result is `never` if there is no contact. If a disk
+  !> stays within the range of motion of the side for a whole period, the side touches the disk, unless the disk is slow and at the
   !> very end of the range. After a period without contact, the search therefore skips an increasing number of periods.
   pure function contact_time(self, tau, gap, v, g, state) result(s)
     class(side_motion_t), intent(in) :: self         !! a moving side
@@ -275,7 +275,7 @@ contains
       return
     end if
     above = gap + self%position(tau) - self%amplitude  ! distance of the disk from the range of motion of the side
-    entry = time_to_line(above, -v, -g)              ! time at which the disk enters the range of motion for the last time
+    entry = time_to_line(above, -v, -g)  ! time at which the disk enters the range of motion of the side for the last time
     s = never
     from = 0
     intervals = 0
