@@ -1,4 +1,4 @@
-!> Reads the command line, with file names of any length, and prints the answers to --help and similar options.
+!> Reads the command line, with file names of any length, and prints the information that --help and similar options request.
 module command_line
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use build_info, only: build_flags, git_commit
@@ -14,7 +14,7 @@ module command_line
   public :: command_t, read_command_line, parse_arguments, answer, help_text
 
   type :: command_t
-    !> Question to be answered: help, version, print-defaults, print-variables or explain; empty for a run.
+    !> Kind of information to be printed: help, version, print-defaults, print-variables or explain; empty for a run.
     character(len=:), allocatable :: question
     character(len=:), allocatable :: topic         !! variable or word to be explained by --explain
     character(len=:), allocatable :: input         !! path of the input file
@@ -48,8 +48,8 @@ contains
     call parse_arguments(arguments, command, error)
   end subroutine read_command_line
 
-  !> Converts the arguments to a command, or reports the first invalid argument. Arguments after a question such as --help are not
-  !> read.
+  !> Converts the arguments to a command, or reports the first invalid argument. Arguments after an option such as --help, which
+  !> only prints information, are not read.
   subroutine parse_arguments(arguments, command, error)
     type(text_t), intent(in) :: arguments(:)
     type(command_t), intent(out) :: command
@@ -182,7 +182,7 @@ contains
     output = "runs/"//output//".h5"
   end function default_output
 
-  !> Prints the answer to the question in `command%question`.
+  !> Prints the information that `command%question` selects.
   subroutine answer(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error

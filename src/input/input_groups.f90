@@ -13,15 +13,16 @@ module input_groups
   integer, parameter, public :: most_written = 100      !! largest number of values in an assignment; longer lists are truncated
 
   !> The value of one variable. Real numbers are stored in `reals`, and all other values in `texts`. An integer is stored as its
-  !> decimal digits, which represent all 64 bits. A logical value is stored as `.true.` or `.false.`. If the variable has no value,
-  !> neither `reals` nor `texts` is allocated.
+  !> decimal digits, which can represent every 64-bit integer. A logical value is stored as `.true.` or `.false.`. If the variable
+  !> has no value, neither `reals` nor `texts` is allocated.
   type :: value_t
     integer :: row = 0                         !! row of the variable in the table of variables
     character(len=name_length) :: name = ""
     character(len=8) :: kind = ""              !! type of the values: "integer", "real", "logical" or "text"
     logical :: given = .false.                 !! .true. if the user has set the variable
     logical :: faulty = .false.                !! .true. if the user has set an invalid value, which has been reported
-    integer :: line = 0                        !! line of the input file that sets the variable, or -k for override number k
+    !> Number of the line that sets the variable, or the negative integer -k if override number k sets the variable
+    integer :: line = 0
     integer :: elements = 0                    !! bit mask: bit i is 1 if element i has been set by name(i) = value
     real(real64), allocatable :: reals(:)
     character(len=text_length), allocatable :: texts(:)
@@ -33,11 +34,11 @@ module input_groups
     procedure :: json
   end type value_t
 
-  !> One group of the input, or one instance of a repeated group. Functions of this type that return the value of a variable return
-  !> the argument `otherwise` if the variable has no value.
+  !> One group of the input, or one instance of a repeated group. Each type-bound function that returns the value of a variable
+  !> returns the argument `otherwise` if the variable has no value.
   type :: group_t
     character(len=8) :: name = ""
-    character(len=text_length) :: instance = ""  !! `name` in a group that may occur several times; otherwise blank
+    character(len=text_length) :: instance = ""  !! name that distinguishes a group that may occur several times; otherwise blank
     integer :: number = 0                      !! number among the groups of the same name, starting at 1
     integer :: line = 0                        !! first line of the group in the file; 0 if the group is not in the file
     integer :: first = 0, last = 0             !! positions of the first character (&) and the last character (/) of the group
@@ -197,7 +198,7 @@ contains
     faulty = self%values(row_of(self%name, name))%faulty
   end function faulty
 
-  !> Stores the value of a variable, calculated from other variables, as a text.
+  !> Stores a text as the value of a variable, after the text has been calculated from other variables.
   pure subroutine put_text(self, name, text)
     class(group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -210,7 +211,7 @@ contains
     end associate
   end subroutine put_text
 
-  !> Stores real values of a variable that were calculated from other variables.
+  !> Stores real numbers as the values of a variable, after the numbers have been calculated from other variables.
   pure subroutine put_reals(self, name, numbers)
     class(group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -219,8 +220,8 @@ contains
     self%values(row_of(self%name, name))%reals = numbers
   end subroutine put_reals
 
-  !> Reports a problem of a variable. The report contains the line that sets the variable or, if the variable is not set, the first
-  !> line of its group.
+  !> Reports a problem of a variable. The report contains the number of the line that sets the variable or, if no line sets the
+  !> variable, the number of the first line of the group.
   pure subroutine complain(self, name, what, problems)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -244,11 +245,11 @@ contains
   end subroutine demand
 
   !> Sets choices (such as `placement = 'grid'`) that the user has not given but that follow from other variables. If the user has
-  !> given a variable that has an effect only with one choice (such as `grid`), this choice is set. If several given variables
-  !> determine a choice, the last variable in the table takes precedence.
+  !> given a variable that has an effect only with one choice (such as the variable `grid`), that choice is made. If several given
+  !> variables determine a choice, the last variable in the table takes precedence.
   pure subroutine infer_choices(self)
     class(group_t), intent(inout) :: self
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of another variable, and its values
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of a second variable, and values of the second variable
     integer :: k
 
     do k = 1, size(self%values)
@@ -258,13 +259,14 @@ contains
     end do
   end subroutine infer_choices
 
-  !> Checks the variables that have an effect only with certain choices. A variable that a choice requires must be given. If a
-  !> variable has no effect with the present choice, its value is removed. If the user has set a variable that has no effect, an
-  !> error is reported, because no part of an input may be ignored silently. Mutually exclusive variables are also reported.
+  !> Checks the variables that have an effect only with certain choices. If a choice requires a variable, the variable must be
+  !> given. If a variable has no effect with the choices in the group, the value of the variable is removed. If the user has set a
+  !> variable that has no effect, an error is reported, because no part of an input may be ignored silently. Mutually exclusive
+  !> variables are also reported.
   pure subroutine check_choices(self, problems)
     class(group_t), intent(inout) :: self
     type(problem_list_t), intent(inout) :: problems
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of another variable, and its values
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of a second variable, and values of the second variable
     character(len=len(table%goes_with)) :: word
     integer :: j, k
 

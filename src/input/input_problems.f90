@@ -10,7 +10,7 @@ module input_problems
   integer, parameter :: whole_file = 1000000000 !! rank of a problem of the whole file, larger than any line number
 
   type :: problem_t
-    integer :: line                             !! line of the input file (> 0), 0 for the whole file, or -k for override number k
+    integer :: line  !! line number in the input file, 0 for the whole file, or the negative integer -k for override number k
     character(len=:), allocatable :: text
   end type problem_t
 

@@ -35,7 +35,7 @@ contains
       call take_points(groups(k), problems)
       do v = 1, size(groups(k)%values)
         associate (value => groups(k)%values(v))
-          if (table(value%row)%status /= "example") cycle           ! a variable with another status need not be given
+          if (table(value%row)%status /= "example") cycle           ! only variables with the status "example" must be given
           if (.not. has_many(groups(k))) call groups(k)%demand(trim(value%name), problems)
           complete = complete .and. value%is_set()
         end associate
@@ -172,7 +172,7 @@ contains
         width = box%upper(axis) - box%lower(axis)
         call take_motion(sides(k), box%surface(side)%motion)
         if (.not. box%surface(side)%motion%moves()) cycle
-        ! Opposite sides must not touch each other for any phases of their two motions.
+        ! No combination of the phases of the two motions may let opposite sides touch each other.
         if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%innermost_position()) >= width) call sides(k)%complain( &
           culprit(box%surface(side)%motion), "lets the sides meet, which are "// &
           written(width)//" apart (box.upper)", problems)

@@ -36,11 +36,11 @@ module input_text
   end type token_t
 
   type :: assignment_t
-    integer :: line = 0                          !! line of the input file (> 0), or -k for override number k
+    integer :: line = 0                          !! line number in the input file, or the negative integer -k for override number k
     character(len=:), allocatable :: where       !! group.variable, for messages
     integer :: element = 0                       !! index of an element, such as 2 in name(2) = value; 0 without an index
     type(token_t), allocatable :: tokens(:)      !! tokens of the values of the assignment
-    logical :: sound = .true.                    !! .false. after a problem of this assignment has been reported
+    logical :: sound = .true.                    !! .false. if a problem of the assignment has been reported
   end type assignment_t
 
 contains

@@ -49,7 +49,7 @@ contains
     end do
     allocate (found(size(group_names) + n_sides + min(count([(text(k:k) == "&", k=1, len(text))]), &
       count(is_repeated(group_names))*most_instances)))
-    do k = 1, size(group_names)  ! groups that cannot be repeated exist even if the text lacks them
+    do k = 1, size(group_names)  ! each group that cannot be repeated exists, even if the text does not contain the group
       if (.not. is_repeated(group_names(k))) call add_group(group_names(k), 0, 1)
     end do
     call open_source(unix_lines(text))
@@ -116,7 +116,7 @@ contains
     subroutine assign_text(slot, text, line, element)
       type(value_t), intent(inout) :: slot
       character(len=*), intent(in) :: text
-      integer, intent(in) :: line                         !! -k for the value of override number k; 0 for a default
+      integer, intent(in) :: line  !! the negative integer -k if override number k contains the value; 0 for a default
       integer, intent(in) :: element                      !! index of the element; 0 for all values of the variable
       type(assignment_t) :: assignment
 
@@ -164,8 +164,8 @@ contains
       end do
     end subroutine read_text
 
-    !> Reads the text between groups, in which only `&name` is allowed. Any other text is reported and skipped up to the next line
-    !> that begins with &.
+    !> Reads the text between groups, in which only `&name` is allowed. Text other than the name of a group is reported, and skipped
+    !> up to the next line that begins with &.
     subroutine between_groups()
       character(len=:), allocatable :: problem
 
@@ -304,7 +304,7 @@ contains
         if (own%first <= own%last) return
         if (scan(next%kind, "'"""//unclosed) > 0 .and. next%first == own%first) then
           next%repeats = own%repeats
-          own%kind = ","                                  ! the kind `,` marks a repeat count that has been read
+          own%kind = ","                                  ! the kind `,` means that the repeat count in the token has been read
         else
           call complain(assignment, "a value is missing after the *")
         end if
@@ -395,7 +395,7 @@ contains
     !> `gravity(2)`. An empty VALUE restores the default.
     subroutine override(text, line)
       character(len=*), intent(in) :: text
-      integer, intent(in) :: line                         !! -k for override number k
+      integer, intent(in) :: line                         !! the negative integer -k, where k is the number of the override
       character(len=:), allocatable :: group, instance, name, advice
       integer :: equals, first, last, row, g, element
 
@@ -449,8 +449,8 @@ contains
       if (element > 0) name = name(:bracket - 1)
     end subroutine split_element
 
-    !> Removes a sampling interval that the file sets if an override sets a different kind of interval for the same samples, so that
-    !> the override replaces the interval in the file.
+    !> Removes the sampling interval that the file sets if an override sets an interval of a different kind for the same samples.
+    !> The override thus replaces the interval in the file.
     subroutine replace_cadence(group, name)
       type(group_t), intent(inout) :: group
       character(len=*), intent(in) :: name                !! name of the variable that the override sets
@@ -465,8 +465,8 @@ contains
       end do
     end subroutine replace_cadence
 
-    !> Finds the group to which an override refers. If the override refers to a side without a group, the group is created. If the
-    !> override refers to any other group that the input does not contain, the problem is reported and g is set to 0.
+    !> Finds the group to which an override refers. If the override refers to a side without a group, the group is created. In every
+    !> other case in which the override does not match exactly one group, the problem is reported and g is set to 0.
     subroutine find_group(group, instance, line, g)
       character(len=*), intent(in) :: group, instance
       integer, intent(in) :: line

@@ -35,7 +35,7 @@ module settings
     real(real64), allocatable :: table(:, :)          !! (column_names,n) data of each disk; deallocated when the disks are placed
     logical, allocatable :: there(:)                  !! (column_names) whether the file contains each column
     integer, allocatable :: rows(:)                   !! (n) line numbers in a text file, or row numbers in the last frame of a run
-    type(error_t), allocatable :: error               !! why the disks in the file cannot be used; not allocated if they can
+    type(error_t), allocatable :: error               !! reason why the file cannot be used; not allocated if the file can be used
   end type disks_in_file_t
 
   !> A species and its initial state.

@@ -1,5 +1,5 @@
-!> Texts about the input variables: the reference input file, the answers to `--explain`, and JSON for other programs. The first
-!> JSON text contains the table of variables, and the second JSON text contains an input as the program interprets the input.
+!> Texts about the input variables: the reference input file, the answers to `--explain`, and JSON for other programs. JSON is
+!> written in two forms: the table of variables, and an input with the values that the program has read.
 module variable_help
   use choices, only: meaning_of
   use errors, only: error_t, exit_usage, fail
@@ -102,7 +102,7 @@ contains
 
   !> Explanations of the variables in the given rows.
   pure function explanations(rows) result(text)
-    integer, intent(in) :: rows(:)                         !! rows of the table
+    integer, intent(in) :: rows(:)                         !! row numbers in the table of variables
     character(len=:), allocatable :: text
     integer :: k
 
@@ -169,7 +169,7 @@ contains
 
   !> The row of a variable in the table as a text with several lines, one for each property of the variable.
   pure function explanation(k) result(text)
-    integer, intent(in) :: k                               !! row of the table
+    integer, intent(in) :: k                               !! row number in the table of variables
     character(len=:), allocatable :: text
     character(len=*), parameter :: indent = eol//"    "
     integer :: c
@@ -250,10 +250,10 @@ contains
     text = text//eol//"}"
   end function variables_text
 
-  !> Converts a row of the table to JSON. The bounds of a number are called `from` and `to` if they are allowed values, or `above`
-  !> and `below` if they are not.
+  !> Converts a row of the table of variables to JSON. The bounds of a number are called `from` and `to` if they are allowed values,
+  !> or `above` and `below` if they are not.
   pure function row_text(k) result(text)
-    integer, intent(in) :: k                               !! row of the table
+    integer, intent(in) :: k                               !! row number in the table of variables
     character(len=:), allocatable :: text, value, meanings
     type(variable_t) :: row
     character(len=len(table%goes_with)) :: words(size(words_of(table(k)%goes_with)))
@@ -296,9 +296,10 @@ contains
       member("changeable", .true., trim(merge("true ", "false", row%may_change == in_motion)))
   end function row_text
 
-  !> Converts the groups of an input to JSON, in the order of the file. Each group contains the variables that the user has given.
-  !> `from` and `to` are the positions of the first and last byte of the group in the file, and null if the file does not contain
-  !> the group. Positions start at 0, and refer to the text without a byte order mark and with line feeds as line ends.
+  !> Converts the groups of an input to JSON, in the order of the file. The JSON object of a group contains only the variables that
+  !> the user has given. `from` and `to` are the positions of the first and last byte of the group in the file, and null if the file
+  !> does not contain the group. Positions start at 0, and refer to the text without a byte order mark and with line feeds as line
+  !> ends.
   pure function groups_text(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -365,7 +366,7 @@ contains
     text = growing%text()
   contains
 
-    !> A value that is not a real number, as in an input file. Texts are quoted.
+    !> The form in which an input file contains a value of kind "integer", "logical" or "text". Texts are quoted.
     pure function word(kind, value)
       character(len=*), intent(in) :: kind, value
       character(len=:), allocatable :: word
