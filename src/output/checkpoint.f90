@@ -65,7 +65,7 @@ contains
 
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
-        if (groups(g)%values(k)%name == "relative_to") cycle           ! mass and radius have their final values
+        if (groups(g)%values(k)%name == "relative_to") cycle           ! omitted, because mass and radius have their final values
         if (.not. groups(g)%values(k)%is_set() .or. table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add(groups(g)%value_line(k)//eol)
       end do
@@ -73,7 +73,7 @@ contains
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
         if (.not. allocated(groups(g)%values(k)%reals)) cycle
-        if (size(groups(g)%values(k)%reals) <= most_written) cycle      ! `value_line` has written all these values
+        if (size(groups(g)%values(k)%reals) <= most_written) cycle  ! `value_line` has already written all values of a short list
         if (table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add("checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
           //trim(groups(g)%values(k)%name)//" = "//checksum(transfer(groups(g)%values(k)%reals, [0_int8]))//eol)
@@ -89,7 +89,7 @@ contains
     !> Overrides in the form GROUP.VARIABLE=VALUE. In: the overrides of the present command line. Out: the overrides from the output
     !> file, followed by the overrides of the present command line.
     type(text_t), allocatable, intent(inout) :: overrides(:)
-    !> Error if another version of the program wrote the output, or if the input in the output is damaged.
+    !> Error if another version of the program wrote the output, or if the text of the input in the output file is damaged.
     type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
     type(text_t) :: override
@@ -505,12 +505,12 @@ contains
       end associate
       settled = merge(1, 0, sim%events_done)
       do k = 1, merge(1, 0, sim%features%rotation) + merge(2, 0, sim%features%orientation)
-        ! Additional copies of `settled` make the length of the record depend on whether the run has rotation and orientation.
+        ! `settled` is repeated so that the length of the record depends on whether the run has rotation and orientation.
         call record%exchange(file, settled)
       end do
       if (allocated(sim%extra)) call record%pass(file, c_loc(sim%extra(1)), size(sim%extra)*storage_size(sim%extra)/64)
       if (.not. sim%features%own_sizes) return
-      mass = sim%masses()                       ! stored even if each mass equals the mass of the species
+      mass = sim%masses()                       ! individual masses are stored even if each mass equals the mass of the species
       call record%exchange(file, mass)
       if (record%mode == reading) sim%own_mass = mass
     end subroutine exchange_disks

@@ -4,7 +4,8 @@
 !>
 !> The layout of an output file never changes after its creation. If the number of samples is known at the start, the file is
 !> created with space for exactly these samples. If the number of samples is unknown, the output file is replaced by a larger file,
-!> with an atomic renaming, whenever its space is used up. At the end of the run, a file without unused space replaces the file.
+!> with an atomic renaming, whenever its space is used up. At the end of the run, the output file is replaced by a copy without
+!> unused space.
 module output
   use kinds, only: int64, real64
   use sampling_schedule, only: frames, progress_t, values
@@ -86,7 +87,7 @@ contains
       if (problem /= "") call fail(error, exit_files, path//": "//problem)
     end if
     if (.not. allocated(error)) call check_places(path, error)
-    ! If a file with the ending `unfinished_new` exists, the file is incomplete, because its run was killed.
+    ! If a file with the extension `unfinished_new` exists, the file is incomplete, because the run that wrote the file was killed.
     if (.not. allocated(error)) call remove_file(path//unfinished_new)
     self%replaced = identity_of(path)
     if (is_file(path) .and. all(self%replaced == 0) .and. .not. allocated(error)) &
@@ -217,8 +218,8 @@ contains
     end associate
   end subroutine plan
 
-  !> Smallest possible size of the output of a run in bytes. If the number of samples is unknown, the size includes only the first
-  !> and the last sample.
+  !> Smallest possible size of the output of a run in bytes. If the number of samples is unknown, the result allows only for the
+  !> first and the last sample.
   function planned_bytes(input, sim) result(bytes)
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(inout) :: sim      !! unchanged on return
@@ -331,7 +332,8 @@ contains
     class(output_t), intent(inout) :: self
     integer(int64), intent(in) :: capacities(:)
     type(simulation_t), intent(inout) :: sim
-    integer, intent(in) :: checkpoints  !! treatment of the checkpoints: `kept`, `anew` or `dropped`
+    !> Treatment of the checkpoints: one of the constants `kept`, `anew` and `dropped` `kept`, `anew` or `dropped`
+    integer, intent(in) :: checkpoints
     type(hdf5_file_t), allocatable :: new
     integer(int64) :: needed
     integer :: k

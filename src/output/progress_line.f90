@@ -61,8 +61,8 @@ contains
     call self%show(trim(line))
   end subroutine report
 
-  !> Records the present counts and times. A later report shows rates averaged over the time since an earlier record of counts and
-  !> times.
+  !> Records the present time, the completed fraction of the run and the number of collisions. A report calculates average rates
+  !> from the difference between the latest record and an earlier record.
   subroutine remember(self, sim, stop_rule)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

@@ -155,8 +155,8 @@ contains
     if (name == "") name = "unknown"
   end function author
 
-  !> Whether the results of a run are independent of a variable. Results are independent only of `run.threads`; the parameters in
-  !> the output file therefore do not contain `run.threads`.
+  !> Whether the results of a run are independent of a variable. Only `run.threads` has no influence on the results; the parameters
+  !> in the output file therefore do not contain `run.threads`.
   pure function changes_nothing(variable) result(yes)
     character(len=*), intent(in) :: variable      !! name of the variable, or a text that begins with this name
     logical :: yes
@@ -235,7 +235,7 @@ contains
       associate (row => table(groups(1)%values(k)%row))
         path = parameters_group//trim(row%group)//"/"
         second = trim(row%choices(index(trim(row%choices), " ", back=.true.) + 1:))
-        ! The name of the file is not stored, because `describe_rows` stores the obstacles themselves.
+        ! The variable `file` is not stored, because `describe_rows` stores the obstacles that the file describes.
         if (row%name == "file") cycle
         if (row%kind == "text") then
           do g = 1, n
@@ -245,7 +245,8 @@ contains
           if (second /= "") call file%put(path//second, [n], merge(1_int32, 0_int32, texts == second))
         else
           if (.not. any([(groups(g)%values(k)%is_set(), g=1, n)])) cycle
-          if (row%size == 0) cycle                          ! `describe_rows` stores the obstacles that follow from lists of points
+          ! lists of any length are omitted: `describe_rows` stores the obstacles that follow from a list of points
+          if (row%size == 0) cycle
           values = spread(ieee_value(0.0_real64, ieee_quiet_nan), 1, row%size*n)     ! NaN if a group has no value
           do g = 1, n
             if (size(groups(g)%reals_of(trim(row%name))) /= row%size) cycle
@@ -259,8 +260,8 @@ contains
   end subroutine describe_table
 
   !> Writes a table of all obstacles in the groups of one name, in the order of their codes. The table contains the geometry of each
-  !> obstacle and the number of the group of the obstacle. The table is needed because a group can describe several obstacles by a
-  !> file or a polyline.
+  !> obstacle and the number of the group of the obstacle. A table of obstacles is needed in addition to the groups, because one
+  !> group can describe several obstacles by a file or a polyline.
   subroutine describe_rows(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -274,7 +275,7 @@ contains
     allocate (values(0))
     do k = 1, size(groups(1)%values)
       associate (row => table(groups(1)%values(k)%row))
-        if (row%status /= "example") cycle            ! `describe_table` stores variables with another status
+        if (row%status /= "example") cycle            ! `describe_table` stores the variables whose status is not "example"
         values = [(groups(g)%reals_of(trim(row%name)), g=1, size(groups))]
         n = [(size(groups(g)%reals_of(trim(row%name)))/row%size, g=1, size(groups))]
         if (row%size == 1) call file%put(path//trim(row%name), [size(values)], values)

@@ -66,7 +66,8 @@ contains
 
     too_far = .false.
     do i = 1, merge(sim%n_disks(), 0, any(sim%box%periodic))
-      ! The present number of periods must be smaller than `largest_exact`, because the number in a frame may be larger by one.
+      ! The number of periods that a disk has moved must be smaller than `largest_exact`, because a frame may contain this number
+      ! plus one.
       too_far = too_far .or. any(abs(sim%extra(i)%image) >= largest_exact)
     end do
     if (sim%tally%events > int(largest_exact, int64) .or. too_far) &

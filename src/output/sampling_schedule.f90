@@ -1,5 +1,5 @@
 !> Sampling schedules. Samples are due at multiples of a time, of a number of collisions or of a number of events, at given times,
-!> and at the start and the end of a run. The module also defines the progress of the output.
+!> and at the start and the end of a run. The module also defines the type that describes the progress of the output.
 module sampling_schedule
   use kinds, only: int64, never, real64
   use evolution, only: limits_t
@@ -99,9 +99,9 @@ contains
     call self%look_ahead(sim)
   end subroutine take
 
-  !> Finds the time and the counts at which the next samples are due, which are the next multiples of the intervals. The result does
-  !> not depend on the time of the last sample, except in one case: if further events may occur at the present time, and no sample
-  !> has been taken at the present time, a sample may still be due at the present time.
+  !> Finds the time and the counts at which the next samples are due, which are the next multiples of the intervals. The result
+  !> depends on the time of the last sample only in one respect: a sample may be due at the present time if further events may occur
+  !> and no sample has been taken at the present time.
   elemental subroutine look_ahead(self, sim)
     class(schedule_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -124,9 +124,9 @@ contains
   end subroutine tighten
 
   !> Time of the next sample: the first sampling time t with t >= `time` and t > `past`. Sampling times are the multiples of the
-  !> interval, the logarithmic sampling times, and the given times. Multiples are calculated as products, because sums would
-  !> accumulate rounding errors. If several sampling times differ only by rounding errors, a single sample is taken, at the last of
-  !> these times.
+  !> interval, the logarithmic sampling times, and the given times. Multiples of the interval are calculated as products, because
+  !> sums would accumulate rounding errors. If several sampling times differ only by rounding errors, a single sample is taken, at
+  !> the last of these times.
   pure function next_time(self, time, past) result(next)
     class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: time, past        !! [time]
@@ -158,7 +158,7 @@ contains
     end do
   contains
 
-    !> Whether t >= `time` and, with a tolerance for rounding errors, t > `past`.
+    !> Whether t is not before `time`, and is later than `past` by more than rounding errors.
     pure logical function is_ahead(t)
       real(real64), intent(in) :: t
 
@@ -186,7 +186,7 @@ contains
   end function next_time
 
   !> The smallest number of collisions (or events) above n at which a multiple of the interval `every` is reached. If the stop rule
-  !> of a run is a number of collisions (or events) equal to this multiple, the run ends at the number that is returned.
+  !> limits the number of collisions (or events) to that multiple of `every`, the run ends at the returned number.
   elemental function next_number(n, every) result(next)
     integer(int64), intent(in) :: n
     real(real64), intent(in) :: every
@@ -202,9 +202,10 @@ contains
     next = whole_collisions(multiple*every)
   end function next_number
 
-  !> Number of samples of a run if this number is known at the start, otherwise 0. The number is known if the schedule has at most
-  !> one interval and the run has only one stop rule, which limits the quantity (time, collisions or events) in which the interval
-  !> is measured. If the schedule contains given or logarithmic sampling times, the stop rule must limit the time.
+  !> Number of samples of a run if this number is known at the start, otherwise 0. The number of samples is known if two conditions
+  !> hold: the schedule has at most one interval, and the only stop rule of the run limits the quantity (time, collisions or events)
+  !> in which the interval is measured. If the schedule contains given or logarithmic sampling times, the stop rule must limit the
+  !> time.
   elemental function planned(self, limits) result(n)
     class(schedule_t), intent(in) :: self
     type(limits_t), intent(in) :: limits          !! limits of the run
