@@ -33,8 +33,8 @@ module dense_growth
   integer, parameter :: approaches = 6
   integer, parameter :: run_length = 2                  !! number of collisions per disk between two growth steps
   integer, parameter :: mixing_length = 10              !! number of collisions per disk after the growth
-  !> Number of growth steps between two checks of the growth. The growth has failed if the difference between the sizes and the full
-  !> sizes has decreased by less than a tenth since the previous check.
+  !> Number of growth steps between two checks of the growth. The growth has failed if the amount by which the disks must still grow
+  !> has decreased by less than a tenth since the previous check.
   integer, parameter :: jumps_per_check = 50
 
 contains
@@ -191,8 +191,8 @@ contains
       call evolution%start(sim)
       to_come = int(length, int64)*sim%n_disks()
       limits%collisions = sim%tally%collisions + (to_come + 1)/2
-      limits%events = sim%tally%events + 4*to_come            ! this limit ends the run if a disk is trapped between obstacles
-      limits%time = sim%time() + maxval(sim%box%edges())      ! this limit ends the run if the disks never collide
+      limits%events = sim%tally%events + 4*to_come  ! the limit on events ends the run if a disk is trapped between obstacles
+      limits%time = sim%time() + maxval(sim%box%edges())      ! the time limit ends the run if the disks never collide
       call advance(evolution, sim, limits, error)
       do i = 1, sim%n_disks()
         sim%disk(i)%x = sim%position(i)

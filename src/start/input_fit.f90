@@ -47,7 +47,7 @@ contains
     end do
     call settings%choose_features()
     call check_columns(settings, groups(place_of("output", groups%name)), problems)
-    if (settings%n_disks() > most_disks) return               ! another procedure reports that there are too many disks
+    if (settings%n_disks() > most_disks) return               ! another procedure reports an excessive number of disks
     before = problems%count
     call check_memory(settings, problems)
     if (problems%count > before) return
@@ -57,7 +57,7 @@ contains
     complete = .true.
   end subroutine complete_settings
 
-  !> Reports columns of frames that the disks of this run do not have. Whether disks rotate can follow from a starting file.
+  !> Reports columns of frames that the disks of this run do not have. A starting file can determine whether the disks rotate.
   subroutine check_columns(settings, group, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: group                        !! the group `output`
@@ -71,10 +71,10 @@ contains
 
   contains
 
-    !> Reports a column that requires something that this run does not have.
+    !> Reports a requested column of frames if the run lacks a property that the column requires.
     subroutine need(column, there, what)
       character(len=*), intent(in) :: column, what
-      logical, intent(in) :: there                            !! the run has what the column requires
+      logical, intent(in) :: there                            !! .true. if the run has the property that the column requires
 
       if (.not. there .and. any(settings%output%frame_columns == column)) &
         call group%complain("frame_columns", "'"//column//"' needs "//what, problems)
@@ -82,7 +82,7 @@ contains
   end subroutine check_columns
 
   !> Checks completed settings: whether the obstacles fit into the box, and whether the disks of each species fit into their region.
-  !> Species without a valid number and size of disks are skipped, because these problems have already been reported.
+  !> Species for which the number or the size of the disks is invalid are skipped, because these errors have already been reported.
   subroutine check_fit(settings, groups, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
@@ -95,7 +95,7 @@ contains
     s = range_of(groups, ["species"])
     associate (box => settings%box, species => settings%species)
       beyond = box%side_excursion()                           ! distance by which moving sides extend beyond the box
-      do k = 1, box%n_obstacles()                             ! `misfit` of each shape checks the position
+      do k = 1, box%n_obstacles()                             ! the function `misfit` of a shape checks the position of an obstacle
         misfit = box%obstacle(k)%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
         if (misfit /= "") call report_obstacle_problem(box, k, groups(o(1) + box%obstacle(k)%surface - n_sides - 1), misfit, &
           problems)
@@ -161,8 +161,8 @@ contains
   end subroutine check_strokes
 
   !> Reads from a starting file the number and the radii of the disks of a species, unless the input contains these values, and
-  !> determines whether the disks rotate. If neither the number nor the radii must be read, an unreadable file is reported only when
-  !> the disks are placed, because a resumed run, which places no disks, does not need the file.
+  !> determines whether the disks rotate. If the input contains the number and the radii of the disks, an unreadable file is
+  !> reported only when the disks are placed, because a resumed run places no disks and does not need the file.
   subroutine read_missing_values(species, k, box, group, problems)
     type(species_settings_t), intent(inout) :: species(:)
     integer, intent(in) :: k                                  !! index of the species
@@ -196,7 +196,7 @@ contains
     end associate
   end subroutine read_missing_values
 
-  !> Determines the largest of the radii that the run will draw, and the packing fraction of these radii.
+  !> Determines the largest of the radii that the run will draw, and the packing fraction of disks with the drawn radii.
   subroutine measure_radii(s, k, seed, group)
     type(species_settings_t), intent(inout) :: s
     integer, intent(in) :: k                                  !! index of the species

@@ -67,7 +67,7 @@ contains
     subroutine read_rows(first, last)
       integer, intent(in) :: first, last
       type(series_t) :: series
-      real(real64), allocatable :: values(:, :)             ! (number of rows, n)
+      real(real64), allocatable :: values(:, :)             ! shape (last - first + 1, number of disks)
       integer :: width
 
       width = last - first + 1

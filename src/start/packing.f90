@@ -121,7 +121,7 @@ contains
   pure subroutine find_blocker(self, centre, half, radius, blocker)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: centre(2), half(2)  !! [length]
-    !> Radius, at most the largest radius that was passed to `open_species` [length]
+    !> Radius of the disks; at most the largest radius that was passed to `open_species` [length]
     real(real64), intent(in) :: radius
     integer(int32), intent(out) :: blocker
     real(real64) :: rho

@@ -38,7 +38,7 @@ module placement
   integer(int32), parameter :: many_trials = 500000
   !> If an attempt has placed n disks, a new attempt is estimated to place at most nearly*n + few disks.
   integer(int32), parameter :: few = 5
-  real(real64), parameter :: nearly = 1.25_real64  !! factor in the estimate that the comment of `few` explains
+  real(real64), parameter :: nearly = 1.25_real64  !! factor in the estimate that is explained at `few`
   !> 'dense' reaches at least this multiple of the packing fraction that 'random' reaches
   real(real64), parameter :: denser = 1.5_real64
   integer, parameter :: most_reports = 5                    !! largest number of problems of one kind reported for one species
@@ -47,7 +47,7 @@ contains
 
   !> Sets the positions and radii of all disks, and the velocities of disks that are read from a file with velocities.
   subroutine place_disks(species, groups, seed, line, sim, problems)
-    !> Settings of the species. The procedure deallocates the tables of disks that these settings contain.
+    !> Settings of the species, in which the procedure deallocates the tables of disks.
     type(species_settings_t), intent(inout) :: species(:)
     type(group_t), intent(in) :: groups(:)                  !! groups of the species
     integer(int64), intent(in) :: seed
@@ -211,8 +211,8 @@ contains
       associate (me => species(s))
         call stream%seed(seed, [s, stream_number])
         call centre_range(me%region, packing%box, me%radius, lower, upper)
-        ! The number of disks that fit varies between attempts. The smaller the species, the larger is the relative variation of
-        ! this number; more attempts are therefore made if a species has few disks.
+        ! The number of disks that fit varies between attempts. For a species with few disks, the number of placed disks varies more
+        ! in relation to its mean; more attempts are therefore made.
         do trial = 1, merge(1, max(1, many_trials/me%count), me%polydispersity > 0)
           call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
           call insert_at_random(packing, int(s, int32), 1 + disks_before(species, s), radius, stream, line, placed)
@@ -269,7 +269,7 @@ contains
     end subroutine place_densely
   end subroutine place_disks
 
-  !> Creates the box for a compression, which is the region without the parts beyond displaced sides. Disks that were placed
+  !> Creates the box for a compression: the region, without any part that lies beyond a displaced side. Disks that were placed
   !> earlier, and their periodic images, become obstacles in this box if they extend into the box.
   function growth_box(packing, region) result(box)
     type(packing_t), intent(in) :: packing

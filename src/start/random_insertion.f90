@@ -104,8 +104,8 @@ contains
         voxels%column_row(:, k) = voxels%column_row(:, voxels%n)       ! the last voxel replaces the eliminated voxel
         voxels%n = voxels%n - 1
       end if
-      ! The division of a voxel requires four searches. The division therefore saves time only after the number of failed attempts
-      ! has exceeded about twice the number of voxels.
+      ! Dividing the voxels saves time only after the number of failed attempts has exceeded about twice the number of voxels,
+      ! because the division of a voxel requires four searches.
       if (failures > 2*voxels%n) then
         call halve(voxels, packing, radius)
         call line%show_share("placing disks", real(placed, real64)/count)
@@ -180,7 +180,7 @@ contains
     p = voxels%origin + (voxels%column_row(:, k) + 0.5_real64)*voxels%side
   end function middle
 
-  !> Divides each voxel into four voxels and keeps those that no single disk or obstacle excludes.
+  !> Divides each voxel into four voxels, and removes those new voxels that a single disk or obstacle excludes completely.
   pure subroutine halve(voxels, packing, radius)
     type(voxels_t), intent(inout) :: voxels
     type(packing_t), intent(in) :: packing
@@ -190,7 +190,7 @@ contains
 
     n = voxels%n
     if (maxval(voxels%column_row(:, :n)) >= ishft(huge(n), -1)) then
-      voxels%n = 0                                  ! 32-bit integers cannot number more columns and rows
+      voxels%n = 0                                  ! the columns and rows of smaller voxels would have numbers that exceed 32 bits
       return
     end if
     call move_alloc(voxels%column_row, parent)

@@ -87,7 +87,7 @@ contains
     found = distance
     fits = 0
     more = species%count
-    do while (more - fits > 1)                              ! bisection: more disks have a smaller distance
+    do while (more - fits > 1)  ! bisection is possible, because the distance decreases with the number of disks
       call choose_lattice(fits + (more - fits)/2)
       if (distance < closest) more = fits + (more - fits)/2
       if (distance >= closest) fits = fits + (more - fits)/2
@@ -108,7 +108,7 @@ contains
         ! Alternate rows are shifted; a periodic lattice must therefore have an even number of rows.
         if (periodic(2) .and. modulo(rows, 2) == 1 .and. rows > 1) cycle
         call measure_lattice(1 + (n - 1)/rows, rows, its_step, its_distance)
-        if (rows > 2 .and. 2*its_step(2) <= distance) exit                 ! more rows can only have a smaller distance
+        if (rows > 2 .and. 2*its_step(2) <= distance) exit                 ! with more rows, the distance could only be smaller
         if (its_distance <= distance) cycle
         distance = its_distance
         columns = 1 + (n - 1)/rows

@@ -83,8 +83,8 @@ contains
   end subroutine refuse
 
   !> Completes the table of disks with values from the input. The procedure reports each quantity that is missing in both the file
-  !> and the input. A quantity that both a text file and the input contain is also reported. If the output file of a run and the
-  !> input contain the same quantity, the value in the input is used, and no error is reported.
+  !> and the input. A quantity is also reported if both a text file and the input contain the quantity. If the output file of a run
+  !> and the input contain the same quantity, the value in the input is used, and no error is reported.
   subroutine join(me)
     type(species_settings_t), intent(inout) :: me
     logical :: wanted(radius_row:mass_row)
@@ -109,7 +109,7 @@ contains
 
   contains
 
-    !> Reports an error if both a column of a text file and the input contain the same quantity.
+    !> Reports an error if a quantity is given twice: in a column of a text file and in the input.
     subroutine refuse_both(row, variable)
       integer, intent(in) :: row
       character(len=*), intent(in) :: variable

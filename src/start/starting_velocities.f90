@@ -61,7 +61,7 @@ contains
 
     !> Draws the velocities of one species. If the total momentum must be zero, velocities of equal speed are drawn as opposite
     !> pairs, with three velocities at angles of 120 degrees if the number of disks is odd. In this way the total momentum is zero
-    !> although all disks have the same speed. For the other methods, `remove_drift` sets the total momentum to zero.
+    !> although all disks have the same speed. For 'uniform' and 'maxwell', `remove_drift` sets the total momentum to zero.
     subroutine draw_velocities()
       associate (species => settings%species(s), disk => sim%disk)
         select case (species%velocities)
@@ -86,7 +86,7 @@ contains
             ! If the input contains a single velocity, all disks have this velocity.
             disk(i)%v = species%velocity(:, min(i - first + 1, size(species%velocity, 2)))
           end do
-        case default                                        ! 'rest', or 'file', for which the velocities are already set
+        case default  ! 'rest': all velocities are zero; 'file': the velocities have already been set
         end select
       end associate
     end subroutine draw_velocities
