@@ -21,7 +21,8 @@ module variable_rows
 
   !> Groups that describe obstacles.
   character(len=8), parameter, public :: obstacle_groups(2) = [character(len=8) :: "obstacle", "wall"]
-  !> Groups that describe boundaries: sides of the box and obstacles. In the reference file, these groups are commented out.
+  !> Groups that describe boundaries: sides of the box and obstacles. In the reference file, the groups that describe boundaries are
+  !> commented out.
   character(len=8), parameter, public :: wall_groups(*) = [character(len=8) :: "side", obstacle_groups]
 
   type(range_t), parameter, public :: anything = range_t(-largest, largest, "")
@@ -42,9 +43,9 @@ module variable_rows
     character(len=8) :: group
     character(len=name_length) :: name
     character(len=8) :: kind                 !! type of the values: "integer", "real", "logical" or "text"
-    integer :: size                          !! number of values; 0 if any number is allowed
-    character(len=8) :: status               !! see below
-    character(len=24) :: value               !! default or example, as written in an input file; see below
+    integer :: size                          !! required number of values; 0 if any number of values is allowed
+    character(len=8) :: status               !! see the table at the end of this file
+    character(len=24) :: value  !! default or example, as written in an input file; see the table at the end of this file
     character(len=help_length) :: help       !! help text in full sentences; the first sentence names the quantity
     type(range_t) :: range = anything        !! range of numbers
     character(len=16) :: unit = ""

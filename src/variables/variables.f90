@@ -21,7 +21,7 @@ module variables
 
 contains
 
-  !> States when the value of a variable may differ from its value at the start of a run. The full name of the variable may contain
+  !> Says when the value of a variable may differ from its value at the start of a run. The full name of the variable may contain
   !> the name of a group, as in `side.left.velocity`.
   pure function change_of(name) result(when)
     character(len=*), intent(in) :: name
@@ -35,7 +35,7 @@ contains
     end do
   end function change_of
 
-  !> Whether a group may occur several times in an input file. Such groups are distinguished by their variable `name`.
+  !> Whether a group may occur several times in an input file. Groups of the same name are distinguished by their variable `name`.
   elemental function is_repeated(group)
     character(len=*), intent(in) :: group
     logical :: is_repeated
@@ -81,8 +81,8 @@ contains
     end do
   end function full_names
 
-  !> Whether two variables of a group must not be given together. Two variables that set intervals for the same kind of samples must
-  !> not be given together either.
+  !> Whether two variables of a group must not be given together. The result is also .true. if the two variables set intervals for
+  !> the same kind of samples.
   pure function excludes(one, other) result(yes)
     integer, intent(in) :: one, other        !! rows
     logical :: yes
