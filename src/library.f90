@@ -33,7 +33,7 @@ module library
   public :: advance_to, answer, begin, goal_of, renew_changed, session_of, session_t, text_of
 
   integer(c_int), parameter :: going_on = 1          !! result of `advance` if the simulation has not yet reached a limit
-  integer, parameter :: least_logged = 1000000        !! number of latest events that remain when a full log is shortened
+  integer, parameter :: least_logged = 1000000  !! number of the most recent events that are kept when a full event log is shortened
 
   type :: session_t
     type(run_input_t) :: input
@@ -70,7 +70,8 @@ contains
   !> Starts the engine of a new simulation and returns the handle of the simulation. After an error the simulation is deallocated.
   function begin(session, threads, error) result(handle)
     type(session_t), pointer, intent(inout) :: session
-    !> Number of threads. With 0 the number in the input applies or, if the input contains no number, one thread is used.
+    !> Number of threads. If the argument is 0, the number in the input is used or, if the input contains no number, a single
+    !> thread.
     integer(c_int), intent(in) :: threads
     type(error_t), allocatable, intent(in) :: error
     type(c_ptr) :: handle
@@ -258,8 +259,8 @@ contains
     type(session_t), intent(in) :: session
     type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
     character(len=10), parameter :: of_motion(4) = [character(len=10) :: "motion", "velocity", "start_time", "end_time"]
-    ! `at`: positions of the sides (axis, lower or upper) [length]; `x`: position of one side [length]; `start`, `passed`: time when
-    ! a motion starts, and time since then [time]
+    ! `at`: positions of the sides (axis, lower or upper) [length]; `x`: position of one side [length]; `start`: time when a motion
+    ! starts; `passed`: duration of the motion so far [time]
     real(real64) :: at(2, 2), x, start, passed
     integer :: g, k, old, side, inwards
     logical :: same

@@ -12,8 +12,8 @@ program main
 
 contains
 
-  !> Answers a question such as --help, or performs a run. The variables are declared in this procedure and not in the main program,
-  !> because variables of the main program would not be deallocated at its end.
+  !> Handles an option such as --help that only prints information, or performs a run. The variables are declared in this procedure
+  !> and not in the main program, because variables of the main program would not be deallocated at its end.
   subroutine serve()
     type(command_t) :: command
     type(run_input_t) :: input

@@ -28,7 +28,7 @@ module run
   private
   public :: perform_run
 
-  integer, parameter :: most_unwritten = 4096              !! capacity of the event log [collisions]
+  integer, parameter :: most_unwritten = 4096              !! capacity of the event log [events]
   !> If the output needs more space than this limit, the program prints the size of the output at the start of the run. [bytes]
   integer(int64), parameter :: much = 250000000
 
