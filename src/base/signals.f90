@@ -42,8 +42,8 @@ module signals
 
 contains
 
-  !> From this call on, a stop signal ends the program immediately, with the given message and exit status. A stop signal that was
-  !> recorded before this call ends the program in this call. The procedure is called before parts of the program that can be
+  !> From this call on, a stop signal ends the program immediately, with the given message and exit status. If a stop signal was
+  !> recorded before this call, the call ends the program. The procedure is called before parts of the program that can be
   !> interrupted without a loss of data.
   subroutine end_at_signals(message, code)
     character(len=*), intent(in) :: message
