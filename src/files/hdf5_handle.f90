@@ -24,8 +24,8 @@ module hdf5_handle
   !> second kind, which have space for twice `half_tree_node` addresses. Most groups have three links. With HDF5's default, which is
   !> `half_tree_node` = 16, almost empty nodes would make up a quarter of the file of a small run.
   integer, parameter :: half_tree_node = 2
-  !> Half of the number of links in a node: the default of HDF5. The 7 links of the group `checkpoint` must fit into one node,
-  !> because `hdf5_objects: remove_last` relies on the order of the last parts of a file.
+  !> Half of the number of links in a node; the value is the default of HDF5. The 7 links of the group `checkpoint` must fit into
+  !> one node, because `hdf5_objects: remove_last` relies on the order of the last parts of a file.
   integer, parameter :: half_link_node = 4
 
   type :: hdf5_handle_t
@@ -142,7 +142,8 @@ contains
   !> file, and the lock of a reader could stop a run. The storage of a dataset is allocated when the dataset is created. Datasets
   !> are not filled with a default value and have no time stamps, so that equal runs write equal bytes. Small datasets do not share
   !> a block of storage, because HDF5 releases a shared block in two steps, between which the header of the file contains a wrong
-  !> length. No dataset has attributes. Without space reserved for attributes, the file of a small run is a tenth smaller.
+  !> length. No space is reserved for attributes of datasets, because the program writes none; the file of a small run is therefore
+  !> a tenth smaller.
   subroutine prepare(self, access, status)
     class(hdf5_handle_t), intent(inout) :: self
     integer(hid_t), intent(out) :: access         !! HDF5 properties of the access to the file

@@ -43,7 +43,7 @@ module hdf5_objects
 contains
 
   !> Removes the dataset that was created last, so that the file ends after the values of the dataset `before`. The removal has
-  !> three steps, so that the file is valid at every moment. First the link to the dataset is deleted; the storage is not freed yet,
+  !> three steps, so that the file is valid at all times. First the link to the dataset is deleted; the storage is not freed yet,
   !> because the dataset is still open. Then the new length of the file is written into its header, because HDF5 would write the
   !> length only after the truncation of the file. Finally the dataset is closed, which frees the storage.
   subroutine remove_last(self, name, before)
@@ -98,7 +98,7 @@ contains
     integer(hid_t), intent(out) :: dataset
     integer(hsize_t), allocatable, intent(out) :: extents(:)
     integer, intent(out) :: status                !! error status: negative if the dataset does not exist or cannot be used
-    integer(hid_t), intent(in), optional :: like  !! an HDF5 type; the dataset must be of the same class: real, integer or text
+    integer(hid_t), intent(in), optional :: like  !! HDF5 type whose class (real, integer or text) the dataset must have
     integer, intent(out), optional :: bytes_each  !! size of one value [bytes]
     integer(hid_t) :: creation, space, type
     integer(hsize_t) :: most(32), shape(32), n, stored
