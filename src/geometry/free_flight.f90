@@ -1,5 +1,5 @@
 !> Kinematics of free flight: the position of a disk after a given time, and the time until a disk touches a line or a circle. All
-!> times are measured from the moment at which the disk has the position and velocity that are passed as arguments. The module
+!> times are measured from the time at which the disk has the position and velocity that are passed as arguments. The module
 !> `neighbour_search` predicts the contacts of two disks.
 module free_flight
   use kinds, only: never, real64

@@ -112,7 +112,7 @@ contains
       t = never
       if (away >= 0) then
         t = time_to_line(away, speed, fall)
-      else if (fall > 0 .and. speed < 0) then     ! the disk passes the wall beyond an end and may fall back onto the wall
+      else if (fall > 0 .and. speed < 0) then     ! the disk rises beyond an end of the wall and may fall back onto the wall
         disc = speed**2 + 2*fall*away
         if (disc >= 0) t = (sqrt(disc) - speed)/fall
       end if
