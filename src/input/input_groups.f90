@@ -40,7 +40,7 @@ module input_groups
     character(len=8) :: name = ""
     character(len=text_length) :: instance = ""  !! name that distinguishes a group that may occur several times; otherwise blank
     integer :: number = 0                      !! number among the groups of the same name, starting at 1
-    integer :: line = 0                        !! first line of the group in the file; 0 if the group is not in the file
+    integer :: line = 0  !! number of the first line of the group in the file; 0 if the file does not contain the group
     integer :: first = 0, last = 0             !! positions of the first character (&) and the last character (/) of the group
     type(value_t), allocatable :: values(:)
   contains
@@ -292,8 +292,8 @@ contains
     end do
   end subroutine check_choices
 
-  !> Indices of the first and the last group with one of the given names. If the input contains no group with one of these names,
-  !> the last index is smaller than the first index.
+  !> Indices of the first and the last group with one of the given names. If the input contains no group with one of the given
+  !> names, the last index is smaller than the first index.
   pure function range_of(groups, names) result(range)
     type(group_t), intent(in) :: groups(:)   !! groups in the order of the table
     character(len=*), intent(in) :: names(:)           !! names of groups that are adjacent in the table

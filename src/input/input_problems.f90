@@ -54,7 +54,7 @@ contains
     self%count = self%count + 1
   end subroutine add
 
-  !> Rank by which the problems of a line are sorted in the report.
+  !> Rank of a line number: the report contains the problems in the order of the ranks of their lines.
   pure function rank(line)
     integer, intent(in) :: line
     integer :: rank

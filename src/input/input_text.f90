@@ -135,7 +135,8 @@ contains
     lines = lines(:n)//eol
   end function unix_lines
 
-  !> Splits a text into tokens. Several tokens of kind `ending` follow, so that a parser can look ahead beyond the last token.
+  !> Splits a text into tokens. Several tokens of kind `ending` are added after the last token of the text, so that a parser can
+  !> look ahead beyond the last token.
   pure subroutine cut(text, tokens)
     character(len=*), intent(in) :: text         !! every line ends in a line feed
     type(token_t), allocatable, intent(out) :: tokens(:)

@@ -89,7 +89,7 @@ contains
       hint = ""
       associate (tokens => assignment%tokens)
         do k = 1, size(tokens), 2
-          if (tokens(k + 1)%first /= tokens(k)%last + 2) return     ! the two numbers are not separated by a comma alone
+          if (tokens(k + 1)%first /= tokens(k)%last + 2) return     ! no hint: more than a comma separates the two numbers
           if (verify(content(text, tokens(k + 1)), digits) > 0) return
         end do
         hint = "; did you mean "//content(text, tokens(1))//"."//content(text, tokens(2))// &
@@ -97,7 +97,7 @@ contains
       end associate
     end function decimal_hint
 
-    !> Checks one word and stores its value after the first n values.
+    !> Checks one word, and stores its value after the n values that have already been stored.
     subroutine store_token(token, word)
       type(token_t), intent(in) :: token
       character(len=*), intent(in) :: word

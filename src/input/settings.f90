@@ -25,7 +25,7 @@ module settings
     real(real64) :: dt                                !! time step if `dynamics` is 'steps' [time]
     character(len=:), allocatable :: search           !! method of the neighbour search: 'cells', 'pairs' or 'rescan'
     character(len=:), allocatable :: queue            !! kind of the event queue: 'calendar' or 'heap'
-    !> Number of threads. If the input contains 0, the number is taken from the environment when the threads are started.
+    !> Number of threads. If the input contains 0, the number of threads is taken from the environment when the threads are started.
     integer :: threads
     integer :: threads_asked = 1                      !! number of threads that the user requested
   end type run_settings_t
