@@ -4,8 +4,8 @@
 !> During a run the output file contains two slots, which are datasets with space for one checkpoint each. One of the slots is
 !> valid, and the next checkpoint is written to the slot that is not valid. After the new checkpoint has been stored on the disk, a
 !> number in the file is changed, which marks the slot of the new checkpoint as valid. The file therefore contains a complete
-!> checkpoint at every moment. Each checkpoint has a checksum. The output of a finished run contains one slot. The output of a run
-!> that broke off contains no valid checkpoint.
+!> checkpoint at all times. Each checkpoint has a checksum. The output of a finished run contains one slot. The output of a run that
+!> broke off contains no valid checkpoint.
 module checkpoint
   use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int8
@@ -38,9 +38,9 @@ module checkpoint
   integer, parameter :: none = 0
   character(len=*), parameter :: described = checkpoint_group//"input_checksum"
 
-  !> Path of a hard link to the first slot, which is created after all other links and never deleted. To delete the last link of a
-  !> group, HDF5 first overwrites the name of the link and then removes the link from a list. If the program were killed after the
-  !> overwriting and before the removal, h5dump could not list the file.
+  !> Path of a hard link to the first slot. The link is created after all other links of the file and is never deleted. To delete
+  !> the last link of a group, HDF5 first overwrites the name of the link and then removes the link from a list. If the program were
+  !> killed after the overwriting and before the removal, h5dump could not list the file.
   character(len=*), parameter :: kept = checkpoint_group//"kept"
 
 contains

@@ -16,7 +16,7 @@ module progress_line
     private
     real(real64) :: started = 0.0_real64           !! time when the program started [s]
     integer :: n = 0                               !! number of reports so far
-    ! The following circular buffers contain the values at the times of the last reports.
+    ! Circular buffers: clock time, completed fraction and number of collisions at each of the last reports
     real(real64) :: clock(0:window - 1) = 0.0_real64       !! [s]
     real(real64) :: share(0:window - 1) = 0.0_real64       !! completed fraction of the run
     integer(int64) :: collisions(0:window - 1) = 0_int64
