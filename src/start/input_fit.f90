@@ -1,5 +1,5 @@
 !> Checks the geometry of the system that an input describes: obstacles and regions must lie inside the box, and the disks must fit
-!> into their regions. Each problem is reported with the number of a line of the input file.
+!> into their regions. Each problem is reported with the number of the line of the input file that causes the problem.
 module input_fit
   use kinds, only: int32, int64, pi, real64
   use box_geometry, only: box_t

@@ -116,8 +116,8 @@ contains
   end subroutine add
 
   !> Finds a disk or an obstacle that excludes the centres of disks of the given radius from the whole rectangle `centre` +- `half`.
-  !> `blocker` is the index of the disk found or the code of the obstacle found (see `partners`); 0 if no such disk or obstacle
-  !> exists. With half = 0 the procedure tests whether a disk fits at the point `centre`.
+  !> The result `blocker` is the index of the disk, or the code of the obstacle (see `partners`), or 0 if neither a disk nor an
+  !> obstacle excludes the rectangle. With half = 0 the procedure tests whether a disk fits at the point `centre`.
   pure subroutine find_blocker(self, centre, half, radius, blocker)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: centre(2), half(2)  !! [length]

@@ -269,8 +269,8 @@ contains
     end subroutine place_densely
   end subroutine place_disks
 
-  !> Creates the box for a compression: the region, without any part that lies beyond a displaced side. Disks that were placed
-  !> earlier, and their periodic images, become obstacles in this box if they extend into the box.
+  !> Creates the box for a compression: the region, without any part that lies beyond a displaced side. If disks that were placed
+  !> earlier, or their periodic images, extend into the box, they become obstacles in the box.
   function growth_box(packing, region) result(box)
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: region(4)

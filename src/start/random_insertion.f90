@@ -158,8 +158,8 @@ contains
     k = 1 + int(voxels%n*attempt%voxel, int32)
   end function chosen
 
-  !> Sorts disks by decreasing radius, with a resolution of a thousandth of the range of radii. Disks whose radii are equal within
-  !> this resolution keep their relative order.
+  !> Sorts disks by decreasing radius, with a resolution of a thousandth of the range of radii. Disks whose radii are in the same
+  !> thousandth of the range keep their relative order.
   pure function largest_first(radius) result(order)
     real(real64), intent(in) :: radius(:)           !! [length]
     integer(int32), parameter :: classes = 1000

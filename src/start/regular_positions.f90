@@ -24,9 +24,9 @@ contains
     yes = box%periodic .and. region([1, 3]) <= box%lower .and. region([2, 4]) >= box%upper
   end function spans
 
-  !> Corners of the rectangle that the centre of a disk may occupy at the start. A disk whose centre is in this rectangle is
-  !> completely inside the region and does not overlap a side, even if the initial position of the side differs from its mean
-  !> position.
+  !> Corners of the rectangle that the centre of a disk may occupy at the start. If the centre of a disk is in the rectangle, the
+  !> disk is completely inside the region and does not overlap a side, even if the initial position of the side differs from its
+  !> mean position.
   pure subroutine centre_range(region, box, radius, lower, upper)
     real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box
