@@ -207,8 +207,8 @@ contains
     call run%line%start(run%sim, run%stop_rule, run%started)
     limits%time = run%sim%time()
     call run%output%tighten(limits)
-    ! If no further event can occur, the run ends with a last sample. If a run is resumed that was stopped just after its last
-    ! sample, the following call detects that no further event can occur.
+    ! If no further event can occur, the run ends with a last sample. The call of `advance_once` is needed if a run had been stopped
+    ! just after its last sample: the call detects that no further event can occur.
     if (run%sim%events_done .and. limits%sampled >= run%sim%time()) call advance_once(run%evolution, run%sim, limits, error)
     do while (.not. (run%stop_rule%is_over(run%sim, run%evolution) .or. allocated(error)))
       limits = run%stop_rule%limits
@@ -233,7 +233,8 @@ contains
         if (stopping .and. .not. allocated(error)) call fail(error, exit_stopped, "stopped at time "// &
           written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to continue")
         if (allocated(error)) exit
-        next_checkpoint = seconds() + run%input%settings%output%checkpoint_every  ! the time to the next checkpoint starts now
+        ! the interval until the next checkpoint starts now
+        next_checkpoint = seconds() + run%input%settings%output%checkpoint_every
       end if
       call run%line%report(run%sim, run%stop_rule)
     end do
