@@ -161,7 +161,7 @@ contains
   end subroutine check_strokes
 
   !> Reads from a starting file the number and the radii of the disks of a species, unless the input contains these values, and
-  !> determines whether the disks rotate. If the input contains the number and the radii of the disks, an unreadable file is
+  !> determines whether the disks rotate. If the input determines the number and the radii of the disks, an unreadable file is
   !> reported only when the disks are placed, because a resumed run places no disks and does not need the file.
   subroutine read_missing_values(species, k, box, group, problems)
     type(species_settings_t), intent(inout) :: species(:)
