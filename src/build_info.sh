@@ -1,6 +1,7 @@
 #!/bin/sh
 # Writes a Fortran module with the origin of the program (commit, compiler and flags), which `--version` prints.
-# Arguments: the flags of the compiler. shellcheck disable=SC2016 # `make dist` puts the commit here
+# Arguments: the flags of the compiler.
+# shellcheck disable=SC2016 # `make dist` puts the commit here
 commit='$Format:%h$'
 case $commit in
 *Format*)
