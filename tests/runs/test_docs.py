@@ -541,7 +541,7 @@ def test_each_cell_shows_what_it_promises(program, monkeypatch):
     drawn = [output for source, output in cells if "plt.subplots" in source]
     assert len(drawn) == 6 and all("image/png" in output for output in drawn)
     assert "next: [(" in showing(cells, "heated.next_events")
-    assert "Animation(frames" in showing(cells, "animate(run")
+    assert "<iframe" in showing(cells, "Film(run")
     assert float(showing(cells, "largest relative").split(":")[1]) < 1e-12
     assert "contact.restitution" in showing(cells, "except ricochet.ProgramError")
     assert [source for source, output in cells if "Warning" in output] == []
