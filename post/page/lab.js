@@ -275,12 +275,13 @@ function run() {
   tell('');
   state.paused = false;
   const begin = () => {
+    box.frame.onload = null;
     if (!box.run) dress();
     if (state.boxes.length > 1 && !box.run) filmOf(box).choices(filmOf(state.boxes.at(-2)).choices());
     box.wished = { ...wish(), words: settingsInWords(), run: ++state.runs };
     filmOf(box).start(box.wished);
   };
-  if (isThere(box)) begin(); else box.frame.addEventListener('load', begin, { once: true });
+  if (isThere(box)) begin(); else box.frame.onload = begin;  // the newest request replaces an earlier request that waits for the frame
 }
 
 // If a running simulation allows the change of a variable, the change takes effect while the slider moves. If a change cannot take
@@ -336,7 +337,7 @@ function showProblems(problems) {
   sync();
   tell(before.length ? IMPOSSIBLE : problems[0].text, true);
   toAddress();
-  again ||= before.length > 0 && (changes().length > 0 || !state.started);
+  again ||= before.length > 0 && (changes().length > 0 || !state.started || !current().run);
 }
 
 // ---------- earlier runs that remain visible for comparison ----------
@@ -427,6 +428,7 @@ function conducts(source) {
   if (!isComparing()) return false;
   if (source !== filmOf(current())) return true;
   const all = films(), now = performance.now();
+  if (all.some(one => one.isStarting())) return true;  // such a film still has the time of its previous run
   if (clock.next === null) request(all, 1 / 60);
   if (clock.next === null || !all.every(one => one.hasReached(clock.next))) return true;
   for (const one of all) one.show(clock.next);
@@ -526,6 +528,7 @@ const keys = { r: 'run', p: 'pause', k: 'keep', s: 'settings', l: 'larger' };
 // for films apply to the film with the focus, or to all films if no film has the focus.
 function typed(event) {
   const { key, target } = event, own = target.ownerDocument === document;
+  if (key === 'Enter' && target.matches('input:not([type])')) target.blur();  // the text is complete: the next keys are shortcuts
   if (target.matches('input:not([type=range]), select') || event.ctrlKey || event.metaKey || event.altKey || $('inputs').open) return;
   if (keys[key]) actions[keys[key]]();
   else if (own && !(target.matches('input') && /^(Arrow|Home|End|Page)/.test(key)) && !(key === ' ' && target.matches('input, button, summary'))) {

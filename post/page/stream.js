@@ -18,7 +18,7 @@ function talk(wish, heard) {
 }
 
 function starts(on) { document.documentElement.classList.toggle('starting', on); }
-const isStarting = () => document.documentElement.classList.contains('starting');
+function isStarting() { return document.documentElement.classList.contains('starting'); }
 
 // Starts the run that the user of the laboratory requests. All runs of this film use the same connection to a worker process.
 function start(run) {
@@ -34,7 +34,7 @@ function start(run) {
 }
 
 // Stops the worker process if the placement of disks takes too long. The next run is then performed by a new worker process.
-function leave() { stream.socket.leave(); }
+function leave() { stream.socket?.leave(); }
 
 const hear = {
   scene({ facts, blocks, run, changed }) {

@@ -419,6 +419,67 @@ def test_compared_runs_show_one_time_and_go_on_alone(opened):
     assert len(opened.run(TIMES)) == 1
 
 
+#: Scripts that keep a run and change the next run while the frame of the next run loads.
+#: Each script comes with the settings and the number of the run that starts in the end.
+WHILE_LOADING = {
+    "a possible value": ("keep(); set(key, '2');", {"species.gas.speed": "2"}, 3),
+    "an impossible value": ("keep(); busy -= PLACING; set(key, '-1');", {}, 3),
+    "a value after a long wait": (
+        "keep(); busy -= PLACING; set(key, '2');",
+        {"species.gas.speed": "2"},
+        2,
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WHILE_LOADING)
+def test_a_run_beside_a_kept_run_starts_whatever_is_changed_meanwhile(opened, case):
+    """Each request starts one run; the last run has the newest possible values, and moves."""
+    script, settings, number = WHILE_LOADING[case]
+    opened.run(f"const key = 'species.gas.speed'; {script}")
+    wait_for(lambda: opened.run("return !busy && !again && current().run === state.runs"))
+    moving(opened, number - 1)
+    assert opened.run("return [state.has, state.runs]") == [settings, number]
+    reached = inside(opened, "moment.time")
+    wait_for(lambda: inside(opened, "moment.time") > reached)
+
+
+#: Two texts for the first slider of each input of the lesson.
+LESSON = {
+    "crater": ("50", "30"),
+    "mixture": ("25", "9"),
+    "cooling": ("0.8", "0.7"),
+    "gas": ("2", "3"),
+}
+
+
+@pytest.mark.parametrize("name", LESSON)
+def test_a_value_typed_beside_a_kept_run_starts_both_from_their_start(opened, name):
+    """Shortcuts act after Enter, and no worker is asked for the time of the previous run."""
+    before = opened.run("return current().run")
+    opened.run("choose(arguments[0])", name)
+    moving(opened, before)
+    wait_for(lambda: opened.run("return document.querySelectorAll('.slider').length") == 5)
+    key = opened.run("return state.input.sliders[0].key")
+    for kept, text in enumerate(LESSON[name], 1):
+        opened.press("k")
+        wait_for(lambda count=kept: opened.run("return state.boxes.length") == count + 1)
+        type_at(opened, 0, text)
+        wait_for(lambda now=text: opened.run("return state.has[arguments[0]]", key) == now)
+        moving(opened, kept)
+    asked = """const film = filmOf(current()), { reach } = film, times = [];
+        film.reach = time => { times.push(time); reach(time); };
+        run();
+        clock.next = null;  // as when a message of the new run has arrived, but not its first frame
+        clock.shown = -Infinity;  // the next picture is due
+        conducts(film);
+        return times"""
+    before = opened.run("return current().run")
+    assert opened.run(asked) == []
+    moving(opened, before)
+    assert opened.run("return films().map(one => one.inside().past[0].time)") == [0, 0, 0]
+
+
 def test_compared_runs_have_numbers_and_histograms_side_by_side(opened):
     opened.press("k")
     moving(opened, 1)
