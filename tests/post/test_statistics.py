@@ -5,6 +5,8 @@ import pytest
 from scipy.signal import lfilter
 
 from ricochet import statistics, theory
+from ricochet.analysis import cooling
+from ricochet.predictions.hard_disks import haff_rate
 
 
 def remembering(rng, length: int, memory: float) -> np.ndarray:
@@ -185,3 +187,23 @@ def test_windows_are_means():
     np.testing.assert_allclose(mean, [0.95, 2.95, 4.95, 6.95, 8.95])
     some = statistics.windows(time[::50], time[::50], 2.0)
     np.testing.assert_allclose(some, [[1, 5], [0, 5]], err_msg="no window without samples")
+
+
+def test_a_propagated_error_belongs_to_the_value_at_the_mean():
+    """The middle of the two limits would be biased for a curved function; no limit, no value."""
+    curve = statistics.Estimate(np.array([1.0, 2.0]), np.array([0.1, 0.5]))
+    assert statistics.propagate_error(lambda y: y[1] ** 2, curve) == pytest.approx((4.0, 2.0))
+    known = statistics.propagate_error(lambda y: y[1] if y[1] > 1.8 else np.nan, curve)
+    assert np.isnan(known.mean) and np.isnan(known.error)
+
+
+def test_the_end_of_the_homogeneous_state_is_that_of_the_mean_rate():
+    """The printed number is the place from which the curves of the figure are pale."""
+    tau = np.linspace(0, 40, 401)
+    tracks = []
+    for factor in (0.925, 0.975, 1.025, 1.075):
+        rate = factor * haff_rate(0.8) * (1 - 0.3 * np.sqrt(tau / 40))
+        fallen = np.concatenate([[0], np.cumsum(np.diff(tau) * (rate[1:] + rate[:-1]) / 2)])
+        tracks.append((tau, tau, np.exp(-fallen)))
+    _, _, end, with_error = cooling.haff(tracks, 0.8)
+    assert with_error.mean == end and with_error.error > 0

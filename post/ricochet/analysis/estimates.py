@@ -185,9 +185,9 @@ def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estim
     Returns
     -------
     Estimate
-        let a and b be the numbers that `of` returns for the curve plus its error and for the curve
-        minus its error; the mean is (a + b) / 2 and the error |a - b| / 2; mean and error are NaN
-        if a or b is NaN, or if the curve has no error
+        the mean is the number that `of` returns for the curve; the error is |a - b| / 2, where a
+        and b are the numbers for the curve plus its error and for the curve minus its error; mean
+        and error are NaN if a or b is NaN, or if the curve has no error
 
     Examples
     --------
@@ -198,7 +198,8 @@ def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estim
     (2.0, 0.5)
     """
     first, last = (of(curve.mean + sign * curve.error) for sign in (-1, 1))
-    return Estimate((first + last) / 2, abs(last - first) / 2)
+    error = abs(last - first) / 2
+    return Estimate(of(curve.mean) + 0 * error, error)
 
 
 def binned(values: np.ndarray, bins: np.ndarray, independent: int | None = None) -> Estimate:
