@@ -9,7 +9,7 @@ module cell_faces
   use box_sides, only: side_time
   use disks, only: disk_t
   use free_flight, only: flight, flight_velocity, slowest, time_to_line
-  use neighbour_search, only: prospect_t
+  use neighbour_search, only: prediction_t
   use partners, only: crossing, is_wall, n_sides, nothing, sense_of, side_crossed
   use shapes, only: spare
   use side_motion, only: piston
@@ -367,7 +367,7 @@ contains
     integer(int16), intent(in) :: cell(2)
     real(real64), intent(in) :: now
     logical, intent(in) :: falling
-    type(prospect_t), intent(inout) :: near        !! the procedure sets the time and partner of the earliest event
+    type(prediction_t), intent(inout) :: near        !! the procedure sets the time and partner of the earliest event
 
     if (falling) then
       call self%next_falling(box, self%column(:, cell(1)), self%row(:, cell(2)), disk, now, near)
@@ -384,7 +384,7 @@ contains
     type(line_t), intent(in) :: column(0:1), row(0:1)
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
-    type(prospect_t), intent(inout) :: near        !! the procedure sets the time and partner of the earliest event
+    type(prediction_t), intent(inout) :: near        !! the procedure sets the time and partner of the earliest event
 
     if (self%falling) then
       call self%next_falling(box, column, row, disk, now, near)
@@ -434,7 +434,7 @@ contains
     type(line_t), intent(in) :: column(0:1), row(0:1)
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
-    type(prospect_t), intent(inout) :: near        !! the procedure sets the time and partner of the earliest event
+    type(prediction_t), intent(inout) :: near        !! the procedure sets the time and partner of the earliest event
     real(real64) :: t_x, t_y
     integer(int32) :: code_x, code_y
 

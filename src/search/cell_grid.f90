@@ -12,9 +12,9 @@ module cell_grid
   use free_flight, only: time_to_circle
   use images, only: images_t
   use neighbour_lists, only: neighbour_lists_t
-  use neighbour_search, only: earliest_contact, latest_clock, no_gravity, prospect_t
+  use neighbour_search, only: earliest_contact, latest_clock, no_gravity, prediction_t
   use partners, only: axis_of, is_wall, looks_again, nothing, sense_of, side_crossed
-  use reach_lists, only: place_t, reach_lists_t
+  use object_lists, only: place_t, object_lists_t
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -31,7 +31,7 @@ module cell_grid
     type(cell_faces_t), public :: faces                    !! faces of the cells, and sides
     logical, public :: roomy = .false.             !! whether cells overlap, so that a disk can change its cell in a collision
     type(cell_contents_t), public :: cells                 !! disks in each cell; a ring of empty cells surrounds the patch
-    type(reach_lists_t), public :: reach           !! obstacles, and disks that are too large for the width of the cells
+    type(object_lists_t), public :: reach           !! obstacles, and disks that are too large for the width of the cells
     type(images_t) :: images                       !! periodic images of the box
     integer(int32) :: n_listed = 0                 !! number of disks inserted into cells
     type(neighbour_lists_t), public :: lists       !! neighbour lists of the small disks, used if cells contain many disks
@@ -390,7 +390,7 @@ contains
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
-    type(prospect_t) :: near_i, near_j
+    type(prediction_t) :: near_i, near_j
 
     call survey_list(self, sim%box, sim%disk(i), sim%now, i, near_i)
     call survey_list(self, sim%box, sim%disk(j), sim%now, j, near_j)
@@ -410,7 +410,7 @@ contains
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
     integer(int32), intent(in) :: i
-    type(prospect_t), intent(out) :: near
+    type(prediction_t), intent(out) :: near
 
     associate (region => self%lists%neighbourhood(i))
       call self%faces%next_within(box, region%column, region%row, disk, now, near)
@@ -429,7 +429,7 @@ contains
     real(real64), intent(in) :: now
     integer(int32), value :: known
     integer(int32), intent(in) :: pair(2)
-    type(prospect_t) :: first, second
+    type(prediction_t) :: first, second
 
     first%disk = pair(1)
     second%disk = pair(2)
@@ -447,7 +447,7 @@ contains
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
     integer(int32), value :: known, i
-    type(prospect_t) :: near
+    type(prediction_t) :: near
 
     near%disk = i
     call survey(self, box, disk(i), tag(i), now, known, near)
@@ -462,7 +462,7 @@ contains
     type(tag_t), intent(in) :: tag
     real(real64), intent(in) :: now
     integer(int32), value :: known
-    type(prospect_t), intent(inout) :: near        !! earliest event and candidates of the disk `near%disk`
+    type(prediction_t), intent(inout) :: near        !! earliest event and candidates of the disk `near%disk`
 
     call self%faces%next(box, disk, tag%cell, now, iand(known, no_gravity) == 0, near)
     near%cell = self%cells%number(tag%cell)
@@ -476,7 +476,7 @@ contains
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
     integer(int32), value :: known
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
 
     call earliest_contact(disk, tag, near, now, gravity, known)
     disk(near%disk)%event_time = near%time
@@ -504,7 +504,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     logical, intent(in) :: has_collided            !! whether disk i has just collided, so that no other disk has a later clock
-    type(prospect_t) :: near
+    type(prediction_t) :: near
     integer(int32) :: known                        ! as in `earliest_contact`
 
     near%disk = i
@@ -549,7 +549,7 @@ contains
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
 
     associate (i => near%disk, cell => sim%tag(near%disk)%cell)
       if (self%lists%used) then
@@ -578,7 +578,7 @@ contains
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
     real(real64) :: t
 
     associate (cell => sim%tag(near%disk)%cell)

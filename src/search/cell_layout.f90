@@ -2,7 +2,7 @@
 module cell_layout
   use kinds, only: int32, never, real64
   use cell_faces, only: all_cells, patch_t
-  use reach_lists, only: largest_small_radius
+  use object_lists, only: largest_small_radius
   use shapes, only: spare
   use simulation_state, only: simulation_t
   implicit none

@@ -7,8 +7,8 @@ module cell_scans
   use cell_faces, only: patch_t
   use images, only: image_t, images_t
   use neighbour_lists, only: neighbour_lists_t
-  use neighbour_search, only: earliest_contact, latest_clock, list_capacity, no_gravity, prospect_t
-  use reach_lists, only: place_t, reach_lists_t
+  use neighbour_search, only: earliest_contact, latest_clock, list_capacity, no_gravity, prediction_t
+  use object_lists, only: place_t, object_lists_t
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -21,7 +21,7 @@ contains
   subroutine test_list(sim, known, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
 
     if (near%n == 0) return
     select case (known)
@@ -42,7 +42,7 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known
     type(image_t), intent(in) :: image
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
 
     select case (known)
     case (latest_clock + no_gravity)
@@ -63,7 +63,7 @@ contains
     integer(int32), intent(in) :: disks(:)
     type(image_t), intent(in) :: image             !! periodic image of the box that contains the candidates
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
     integer(int32) :: first
 
     do first = 1, size(disks, kind=int32), list_capacity
@@ -75,12 +75,12 @@ contains
 
   !> Finds contacts of a small disk with the obstacles and big disks that reach into its cell.
   subroutine scan_reach(reach, cell, sim, images, known, near)
-    type(reach_lists_t), intent(in) :: reach
+    type(object_lists_t), intent(in) :: reach
     integer(int16), intent(in) :: cell(2)          !! cell of the small disk
     type(simulation_t), intent(in) :: sim
     type(images_t), intent(in) :: images
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
     integer(int32) :: e, last(2)                   ! index of a list entry; periodic image that contains the candidates in `near`
     real(real64) :: number(2), shift(2)            ! index of the image of an obstacle; shift to this image [length]
     logical :: falling                             ! whether gravity acts on the disks
@@ -124,7 +124,7 @@ contains
     type(simulation_t), intent(in) :: sim
     type(images_t), intent(in) :: images
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
     integer(int32) :: j, k
     real(real64) :: image(2)
 
@@ -151,7 +151,7 @@ contains
     type(images_t), intent(in) :: images
     real(real64), intent(in) :: number(2)          !! index of the image to which the cells belong
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
     integer(int64) :: n
     integer(int32) :: k
 
@@ -174,7 +174,7 @@ contains
     type(images_t), intent(in) :: images
     real(real64), intent(in) :: number(2)          !! index of the image to which the cell belongs
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
     integer(int32) :: j
 
     j = cells%chain(c)
@@ -195,7 +195,7 @@ contains
     type(place_t), intent(in) :: rim(:)
     type(images_t), intent(in) :: images
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
     integer(int32) :: m, n, c(9)
 
     n = 0
@@ -216,7 +216,7 @@ contains
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
     integer(int32) :: row, c, j
 
     do row = near%cell - cells%stride, near%cell + cells%stride, cells%stride
@@ -243,7 +243,7 @@ contains
     type(simulation_t), intent(in) :: sim
     type(images_t), intent(in) :: images
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
     integer(int32) :: own(2), row(-1:1), above(-1:1), column(-1:1), beside(-1:1), low, high, left, right, k
 
     if (abs(images%velocity) > 0) then
@@ -320,7 +320,7 @@ contains
     type(simulation_t), intent(in) :: sim
     type(images_t), intent(in) :: images
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
     real(real64) :: displacement, periods
     integer(int32) :: own(2), row(-1:1), above(-1:1), column(6), beside(6), columns, first, x, y, k, m, c(9), n
 

@@ -16,7 +16,7 @@ module neighbour_lists
   use cell_faces, only: cell_faces_t, line_t, patch_t
   use disks, only: disk_t, tag_t
   use memory_hints, only: prefetch
-  use neighbour_search, only: list_capacity, prospect_t
+  use neighbour_search, only: list_capacity, prediction_t
   use partners, only: is_wall, looks_again
   implicit none
   private
@@ -406,7 +406,7 @@ contains
   !> Copies the neighbour list of a disk to the list of candidates. The list must not contain neighbours across a periodic side.
   pure subroutine copy_list(self, near)
     class(neighbour_lists_t), intent(in) :: self
-    type(prospect_t), intent(inout) :: near
+    type(prediction_t), intent(inout) :: near
     integer(int32) :: at, k
 
     at = self%first(near%disk)

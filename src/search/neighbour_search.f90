@@ -7,7 +7,7 @@ module neighbour_search
   use free_flight, only: flight, flight_velocity
   implicit none
   private
-  public :: event_t, prospect_t, earliest_contact, event_of, list_capacity, latest_clock, no_gravity, wins
+  public :: event_t, prediction_t, earliest_contact, event_of, list_capacity, latest_clock, no_gravity, wins
 
   integer(int32), parameter :: list_capacity = 64
   !> Flags for conditions that the caller of `earliest_contact` guarantees. The sum of the two flags means that both conditions
@@ -26,14 +26,14 @@ module neighbour_search
 
   !> The state of a prediction for one disk: the earliest event that is known so far, and the candidates that the disk may touch
   !> before this event. The components have no initial values, because the initialisation would take time in each prediction.
-  type :: prospect_t
+  type :: prediction_t
     real(real64) :: time                      !! time of the earliest event [time]
     integer(int32) :: partner                 !! partner in the earliest event
     integer(int32) :: disk                    !! disk for which the prediction is made
     integer(int32) :: cell                    !! number of the cell of the disk
     integer(int32) :: n                       !! number of candidates
     integer(int32) :: list(list_capacity)     !! (n) indices of the candidates, counted from 0
-  end type prospect_t
+  end type prediction_t
 
 contains
 
@@ -61,7 +61,7 @@ contains
   pure subroutine earliest_contact(disk, tag, near, now, gravity, known, image)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, with indices that start at 0
     type(tag_t), intent(in) :: tag(*)
-    type(prospect_t), intent(inout) :: near   !! the disk itself may be among the candidates
+    type(prediction_t), intent(inout) :: near   !! the disk itself may be among the candidates
     real(real64), value :: now                !! [time]
     real(real64), intent(in) :: gravity(2)
     integer(int32), value :: known            !! 0, `latest_clock`, `no_gravity`, or their sum

@@ -10,7 +10,7 @@ module test_systems
   use event_driven, only: event_driven_t
   use evolution, only: limits_t
   use initial_state, only: create_simulation
-  use neighbour_search, only: earliest_contact, prospect_t, no_gravity
+  use neighbour_search, only: earliest_contact, prediction_t, no_gravity
   use partners, only: n_sides
   use random_stream, only: random_stream_t
   use run_setup, only: input_from_text
@@ -324,7 +324,7 @@ contains
     integer, intent(in) :: i
     real(dp), intent(in) :: known
     real(dp) :: t
-    type(prospect_t) :: near
+    type(prediction_t) :: near
     type(tag_t) :: tag(2)
     tag%id = [1, 2]
     near%time = known

@@ -145,7 +145,7 @@ def chance(found: float, drawn: np.ndarray) -> float:
     return TAIL * float(np.exp((drawn[first] - found) / mean))
 
 
-def memory(counts: Sequence[np.ndarray], cumulative: bool) -> float:
+def inefficiency(counts: Sequence[np.ndarray], cumulative: bool) -> float:
     """Return the statistical inefficiency of the numbers of disks in bins, averaged over runs.
 
     `counts` contains the numbers (F, B) of disks in B bins in each of the F frames of a run.  If
@@ -171,7 +171,7 @@ def noise(sizes: tuple[int, ...], true: float, cumulative: bool) -> np.ndarray:
     rng, keep = np.random.default_rng(2), (true - 1) / (true + 1)
     counts = [correlated(rng.normal(size=(size, NOISES, BINS)), keep) for size in sizes]
     drawn = ([own[:, k] for own in counts] for k in range(NOISES))
-    return np.array([memory(own, cumulative) for own in drawn]) / true
+    return np.array([inefficiency(own, cumulative) for own in drawn]) / true
 
 
 def correlated(values: np.ndarray, keep: float) -> np.ndarray:
@@ -194,7 +194,7 @@ def p_value(
 
     The argument `drawn` (DRAWN,) contains statistics of random samples of independent frames.
     """
-    own = memory(counts, cumulative)
+    own = inefficiency(counts, cumulative)
     sizes, true = tuple(sorted(map(len, counts))), float(f"{max(1, own):.2g}")
     estimates = np.tile(noise(sizes, true, cumulative), DRAWN // NOISES)
     return chance(found / own, np.sort(drawn / estimates))
@@ -235,7 +235,7 @@ def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> Speed
         bins = np.minimum((one * BINS).astype(int), BINS - 1)
         counts.append(np.stack([np.bincount(row, minlength=BINS) for row in bins]))
     total = sample.own * sample.frames
-    free = total / max(1.0, memory(counts, cumulative=True))
+    free = total / max(1.0, inefficiency(counts, cumulative=True))
     if not known:
         return SpeedTest("none", free, *[np.nan] * 4)
     found = statistics_of(np.concatenate(values).reshape(1, -1))[:, 0]
@@ -246,6 +246,6 @@ def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> Speed
         free,
         float(np.sqrt(found[0] / total)),
         p_value(found[0], drawn[0], counts, cumulative=True),
-        found[1] / max(1.0, memory(counts, cumulative=False)) / (BINS - 1),
+        found[1] / max(1.0, inefficiency(counts, cumulative=False)) / (BINS - 1),
         p_value(found[1], drawn[1], counts, cumulative=False),
     )

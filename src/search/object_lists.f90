@@ -6,7 +6,7 @@
 !> position for which the entries were made. A prediction for a small disk finds big disks in the list of the cell of the small
 !> disk. A prediction for a big disk tests the small disks in the cells along the boundary of the big disk. The cost of a prediction
 !> for a disk depends only on the sizes of nearby disks.
-module reach_lists
+module object_lists
   use kinds, only: int16, int32, real64
   use cell_faces, only: cell_faces_t, patch_t
   use circles, only: new_circle
@@ -16,7 +16,7 @@ module reach_lists
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: largest_small_radius, place_t, reach_lists_t
+  public :: largest_small_radius, place_t, object_lists_t
 
   integer(int32), parameter :: most_big_disks = 256    !! largest number of big disks; each is tested against all other big disks
 
@@ -40,7 +40,7 @@ module reach_lists
     integer(int32), allocatable :: obstacles(:)  !! codes of the obstacles that the big disk may touch, in descending order
   end type big_disk_t
 
-  type :: reach_lists_t
+  type :: object_lists_t
     type(big_disk_t), allocatable :: big(:)
     real(real64) :: margin = 0.0_real64          !! margin around the reference positions of big disks [length]
     !> (columns,rows) first entry in the list of each cell; 0 for an empty list. The array is not allocated if there are neither
@@ -59,7 +59,7 @@ module reach_lists
     procedure :: has_any
     procedure :: number_of
     procedure :: follow
-  end type reach_lists_t
+  end type object_lists_t
 
 contains
 
@@ -81,7 +81,7 @@ contains
 
   !> Whether the lists of obstacles have already been made for the cells of the given patch.
   pure function serves(self, patch, faces) result(yes)
-    class(reach_lists_t), intent(in) :: self
+    class(object_lists_t), intent(in) :: self
     type(patch_t), intent(in) :: patch
     type(cell_faces_t), intent(in) :: faces
     logical :: yes
@@ -102,7 +102,7 @@ contains
 
   !> Makes the lists of obstacles and big disks. Big disks are disks for which the cells are not wide enough.
   subroutine renew(self, sim, patch, faces)
-    class(reach_lists_t), intent(out) :: self
+    class(object_lists_t), intent(out) :: self
     type(simulation_t), intent(in) :: sim
     type(patch_t), intent(in) :: patch
     type(cell_faces_t), intent(in) :: faces
@@ -125,7 +125,7 @@ contains
 
   !> Renews the lists of big disks, because the indices of the disks may have changed.
   subroutine renew_big(self, sim, patch, faces)
-    class(reach_lists_t), intent(inout) :: self
+    class(object_lists_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(patch_t), intent(in) :: patch
     type(cell_faces_t), intent(in) :: faces
@@ -149,7 +149,7 @@ contains
 
   !> The cells in which small disks may touch big disks.
   pure function rims(self) result(places)
-    class(reach_lists_t), intent(in) :: self
+    class(object_lists_t), intent(in) :: self
     type(place_t), allocatable :: places(:)
     integer :: k
 
@@ -161,7 +161,7 @@ contains
 
   !> Whether any obstacle or big disk reaches into a cell.
   pure function has_any(self, cell) result(yes)
-    class(reach_lists_t), intent(in) :: self
+    class(object_lists_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)          !! column and row, counted from 1
     logical :: yes
 
@@ -171,7 +171,7 @@ contains
 
   !> Index of disk i among the big disks; 0 if disk i is not a big disk.
   pure function number_of(self, i) result(k)
-    class(reach_lists_t), intent(in) :: self
+    class(object_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i
     integer(int32) :: k
 
@@ -182,7 +182,7 @@ contains
 
   !> Makes the present position of the k-th big disk its reference position, and renews the entries of this disk in the lists.
   subroutine follow(self, sim, k, patch, faces)
-    class(reach_lists_t), intent(inout) :: self
+    class(object_lists_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: k
     type(patch_t), intent(in) :: patch
@@ -200,7 +200,7 @@ contains
   !> Codes of the obstacles that reach into the given cells, in descending order. If a big disk touches an obstacle, the point of
   !> contact is in a cell into which both the big disk and the obstacle reach.
   pure function obstacles_along(self, places) result(codes)
-    class(reach_lists_t), intent(in) :: self
+    class(object_lists_t), intent(in) :: self
     type(place_t), intent(in) :: places(:)
     integer(int32), allocatable :: codes(:)
     integer(int32) :: e, m, code
@@ -276,7 +276,7 @@ contains
   !> Appends an obstacle or a big disk to the lists of some cells. In each list obstacles come first, in ascending order of their
   !> indices.
   pure subroutine enter(self, code, places)
-    class(reach_lists_t), intent(inout) :: self
+    class(object_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: code
     type(place_t), intent(in) :: places(:)
     type(entry_t), allocatable :: more(:)
@@ -308,7 +308,7 @@ contains
 
   !> Removes a big disk from the lists of some cells.
   pure subroutine leave(self, code, places)
-    class(reach_lists_t), intent(inout) :: self
+    class(object_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: code
     type(place_t), intent(in) :: places(:)
     integer(int32) :: e, before, m
@@ -329,4 +329,4 @@ contains
     end do
   end subroutine leave
 
-end module reach_lists
+end module object_lists
