@@ -188,14 +188,15 @@ def correlated(values: np.ndarray, keep: float) -> np.ndarray:
 
 
 def p_value(
-    found: float, drawn: np.ndarray, counts: Sequence[np.ndarray], cumulative: bool
+    found: float, drawn: np.ndarray, own: float, sizes: tuple[int, ...], cumulative: bool
 ) -> float:
     """Return the probability that a random statistic exceeds the measured statistic `found`.
 
     The argument `drawn` (DRAWN,) contains statistics of random samples of independent frames.
+    `own` is the statistical inefficiency of the measured frames, and `sizes` are the numbers of
+    frames of the runs in increasing order.
     """
-    own = inefficiency(counts, cumulative)
-    sizes, true = tuple(sorted(map(len, counts))), float(f"{max(1, own):.2g}")
+    true = float(f"{max(1, own):.2g}")
     estimates = np.tile(noise(sizes, true, cumulative), DRAWN // NOISES)
     return chance(found / own, np.sort(drawn / estimates))
 
@@ -235,17 +236,18 @@ def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> Speed
         bins = np.minimum((one * BINS).astype(int), BINS - 1)
         counts.append(np.stack([np.bincount(row, minlength=BINS) for row in bins]))
     total = sample.own * sample.frames
-    free = total / max(1.0, inefficiency(counts, cumulative=True))
+    summed, single = inefficiency(counts, cumulative=True), inefficiency(counts, cumulative=False)
+    free = total / max(1.0, summed)
     if not known:
         return SpeedTest("none", free, *[np.nan] * 4)
     found = statistics_of(np.concatenate(values).reshape(1, -1))[:, 0]
-    drawn = by_chance(sample.smaller())
+    drawn, sizes = by_chance(sample.smaller()), tuple(sorted(map(len, counts)))
     fixed = runs[0].nature.keeps_kinetic_energy
     return SpeedTest(
         "fixed_energy" if fixed else "Maxwell",
         free,
         float(np.sqrt(found[0] / total)),
-        p_value(found[0], drawn[0], counts, cumulative=True),
-        found[1] / max(1.0, inefficiency(counts, cumulative=False)) / (BINS - 1),
-        p_value(found[1], drawn[1], counts, cumulative=False),
+        p_value(found[0], drawn[0], summed, sizes, cumulative=True),
+        found[1] / max(1.0, single) / (BINS - 1),
+        p_value(found[1], drawn[1], single, sizes, cumulative=False),
     )

@@ -117,24 +117,21 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
     >>> bool(4 < statistical_inefficiency(np.repeat(noise, 5)) < 6)
     True
     """
+    return inefficiency_and_lag(series, least)[0]
+
+
+def inefficiency_and_lag(series: np.ndarray, least: float) -> tuple[float, int]:
+    """Return the statistical inefficiency and the largest lag in the sum of autocorrelations."""
     if np.max(np.ptp(series, axis=0)) <= 1e-12 * np.max(np.abs(series), initial=0):
-        return 1.0
-    found, lag = summed_correlation(series)
-    return max(least, found) * (1 + (2 * lag + 1) / len(series))
-
-
-def summed_correlation(series: np.ndarray) -> tuple[float, int]:
-    """Return 1 + 2 tau, uncorrected for the unknown mean, and the largest lag that is used."""
+        return 1.0, 0
     count, rest = len(series), series - np.mean(series, axis=0)
     found, lag = 1.0, 0
-    if not np.any(rest):
-        return found, lag
     for lag in range(1, count // 2):
         found += 2 * np.mean(rest[lag:] * rest[:-lag]) / np.mean(rest**2)
         tau = 1.5 / np.log((found + 1) / (found - 1)) if found > 1 else 1e-9
         if np.exp(-lag / tau) < tau / np.sqrt(lag * count):
             break
-    return found, lag
+    return max(least, found) * (1 + (2 * lag + 1) / count), lag
 
 
 def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
@@ -198,8 +195,8 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
     anticorrelated series, the function `periodic_waves` computes the error.
     """
     parts = cells(series, FINE)
-    per_sample = statistical_inefficiency(parts, least=LEAST_INEFFICIENCY)
-    doubt = np.sqrt(2 * (2 * summed_correlation(parts)[1] + 1) / len(parts))
+    per_sample, lag = inefficiency_and_lag(parts, LEAST_INEFFICIENCY)
+    doubt = np.sqrt(2 * (2 * lag + 1) / len(parts))
     most = min(MOST_WAVES, len(parts) // 2)
     waves = int(len(parts) / (PER_WAVE * per_sample * (1 + doubt)))
     waves = int(np.clip(waves, LEAST_WAVES, most))
