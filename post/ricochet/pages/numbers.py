@@ -10,7 +10,7 @@ import scipy
 
 from ..analysis.statistics import SeriesMean, correlated_mean, equilibration
 from ..predictions.walls import virial_pressure
-from ..reading.nature import Nature, known, rows_of
+from ..reading.nature import Nature, bath_temperatures
 from ..reading.reader import Run, Series, obstacles_of, walls_of
 from ..running.simulation import Simulation
 
@@ -173,14 +173,9 @@ def theory(run: Run, energy: float, measured: float | None) -> list[float | None
 
 def equilibrium_temperature(run: Run, energy: float) -> float | None:
     """Return kT of a run in equilibrium from its heat bath or from its conserved energy."""
-    nature, parameters = run.nature, run.parameters
-    if "thermostatted" in nature:
-        return float(parameters["drive"]["temperature"])
-    surfaces = [*parameters.get("side", {}).values()]
-    surfaces += [row for name in ("obstacle", "wall") for row in rows_of(parameters.get(name, {}))]
-    for one in surfaces:
-        if known(one.get("temperature")):
-            return float(one["temperature"])
+    nature = run.nature
+    if baths := bath_temperatures(run.parameters):
+        return baths[0]
     if not nature.keeps_energy or "gravity" in nature:
         return None
     drift, axes = conserved_drift(run)

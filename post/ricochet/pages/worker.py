@@ -143,10 +143,10 @@ class Session:
 
     def push(self, request: dict) -> None:
         """Double the kinetic energy of a disk; a disk at rest gets a typical velocity upwards."""
-        disk, velocity = int(request["disk"]), self.simulation.velocity
-        own = np.sqrt(2) * velocity[disk]
-        typical = float(np.sqrt(np.mean(np.sum(velocity**2, axis=1)))) or 1.0
-        self.set_disk("velocity", disk, own.tolist() if own.any() else [0.0, typical])
+        disk = int(request["disk"])
+        own = np.sqrt(2) * self.simulation.velocity[disk]
+        upwards = [0.0, typical_speed(self.simulation)]
+        self.set_disk("velocity", disk, own.tolist() if own.any() else upwards)
 
     def set_disk(self, name: str, disk: int, value: list[float]) -> None:
         """Set the position or the velocity of one disk."""
@@ -172,8 +172,7 @@ class Session:
         old = {key: value_text(key, value) for key in rest if (value := known.get(key)) is not None}
         self.held.setdefault(number, {**rest, name + "motion": "still", **old})
         way = float(target) - float(self.run.corners_at(now)[number % 2][number // 2])
-        typical = float(np.sqrt(np.mean(np.sum(self.simulation.velocity**2, axis=1)))) or 1.0
-        taken = max(self.pace * HOLD, abs(way) / typical, 1e-9)
+        taken = max(self.pace * HOLD, abs(way) / typical_speed(self.simulation), 1e-9)
         wish = {"motion": "constant_velocity", "velocity": repr(inwards * way / taken)}
         wish |= {"start_time": repr(now), "end_time": repr(now + taken)}
         self.apply("hold", rest | {name + word: value for word, value in wish.items()})
@@ -414,6 +413,11 @@ def words(what: str, value: object) -> str:
     if what == "hold":
         return f"the {next(iter(value)).split('.')[1]} side is dragged"
     return f"disk {value[0] + 1} {'is moved' if what == 'position' else 'gets energy'}"
+
+
+def typical_speed(simulation: Simulation) -> float:
+    """Return the rms speed of the disks of a simulation, or 1 if all disks are at rest."""
+    return float(np.sqrt(np.mean(np.sum(simulation.velocity**2, axis=1)))) or 1.0
 
 
 def set_row(simulation: Simulation, name: str, disk: int, value: list[float]) -> None:

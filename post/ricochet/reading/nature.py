@@ -55,6 +55,7 @@ SOURCES = {
     "sliding_surfaces",
 }
 SOURCES |= {"thermostatted", "thermal_walls"}
+THERMOSTATS = ("andersen", "brownian")  # kinds of driving with a heat bath
 #: Physical properties (traits) of runs whose velocities also change between collisions.
 KICKED = {"noise_driven", "active", "thermostatted"}
 #: Physical properties (traits) of runs whose velocities do not relax to a Maxwell distribution.
@@ -124,16 +125,8 @@ def nature_of(
     """
     contact, drive = parameters.get("contact", {}), parameters.get("drive", {})
     box, kind = parameters.get("box", {}), drive.get("kind", "none")
-    surfaces = [
-        *parameters.get("side", {}).values(),
-        *rows_of(parameters.get("obstacle", {})),
-        *rows_of(parameters.get("wall", {})),
-    ]
+    surfaces = surfaces_of(parameters)
     motions = {one.get("motion", "still") for one in surfaces}
-    baths = {float(one["temperature"]) for one in surfaces if known(one.get("temperature"))}
-    thermal = bool(baths)
-    if kind in ("andersen", "brownian"):
-        baths.add(float(drive["temperature"]))
     beta = float(contact.get("tangential_restitution", -1.0))
     pairs = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
     # If collisions of two disks dissipate energy, the run has the trait "inelastic" from the start.
@@ -154,9 +147,9 @@ def nature_of(
         "moving_sides": bool(motions - {"still", "piston"}),
         "piston": "piston" in motions,
         "sliding_surfaces": any(one.get("surface_velocity", 0.0) != 0 for one in surfaces),
-        "unequal_temperatures": len(baths) > 1,
-        "thermostatted": kind in ("andersen", "brownian"),
-        "thermal_walls": thermal,
+        "unequal_temperatures": len(set(bath_temperatures(parameters))) > 1,
+        "thermostatted": kind in THERMOSTATS,
+        "thermal_walls": any(known(one.get("temperature")) for one in surfaces),
         "gravity": bool(np.any(box.get("gravity", 0.0))),
         "inelastic": inelastic or lost > ROUNDING,
         "soft_contacts": contact.get("restitution_law", "constant") != "constant"
@@ -179,6 +172,22 @@ def nature_of(
     )
     found["round_container"] = held_round(parameters) and not any(found[name] for name in torques)
     return Nature(name for name, there in found.items() if there)
+
+
+def surfaces_of(parameters: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the input variables of each side, obstacle and wall."""
+    return [
+        *parameters.get("side", {}).values(),
+        *rows_of(parameters.get("obstacle", {})),
+        *rows_of(parameters.get("wall", {})),
+    ]
+
+
+def bath_temperatures(parameters: Mapping[str, Any]) -> list[float]:
+    """Return kT of each heat bath: a driving that is a thermostat, and the thermal surfaces."""
+    drive, surfaces = parameters.get("drive", {}), surfaces_of(parameters)
+    baths = [float(drive["temperature"])] if drive.get("kind") in THERMOSTATS else []
+    return baths + [float(one["temperature"]) for one in surfaces if known(one.get("temperature"))]
 
 
 def drifts(parameters: Mapping[str, Any]) -> bool:
