@@ -354,7 +354,7 @@ contains
     type(disk_t), intent(in) :: disk
     integer(int32), intent(in) :: obstacle      !! code of the obstacle
     real(real64), intent(in) :: shift(2)        !! shift from the obstacle to its image [length]
-    real(real64), intent(in) :: t               !! time since the epoch [time]
+    real(real64), intent(in) :: t               !! time relative to the time origin `box%epoch` [time]
     logical, intent(in) :: falling              !! whether gravity acts on the disk
     logical :: yes
     real(real64) :: d(2)
