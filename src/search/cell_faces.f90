@@ -254,8 +254,8 @@ contains
   end subroutine set
 
   !> Finds the columns and rows in which a piston may touch disks before the piston has moved by the width of a cell. A disk outside
-  !> of all cells is assigned to an outermost cell. A piston outside of all cells can therefore touch disks that are assigned to the
-  !> outermost cells.
+  !> of all cells is assigned to an outermost cell. A piston outside of all cells, beyond its own or the opposite side of the box, can
+  !> therefore touch disks that are assigned to the outermost cells.
   pure subroutine find_strips(self, box, small, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -281,6 +281,7 @@ contains
 
       high = 1 - modulo(k, 2)
       x = merge(box%upper(axis) - self%centre(k), box%lower(axis) + self%centre(k), high == 1)
+      x = min(max(x, box%lower(axis)), box%upper(axis))
       room = (self%width(axis) + small)*(1 + spare)
       line(high, :)%struck = (line(0, :)%place <= x + room .and. line(1, :)%place >= x - room) .or. line(high, :)%code == 1 - k
     end subroutine mark

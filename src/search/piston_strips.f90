@@ -2,7 +2,7 @@
 !> piston has moved by the width of a cell, the piston can touch only disks in a strip of adjacent columns or rows of cells
 !> (`cell_faces: find_strips`). Only the disks in its strip are tested against a piston.
 module piston_strips
-  use kinds, only: int16, int32
+  use kinds, only: int16, int32, real64
   use cell_grid, only: cell_grid_t
   use partners, only: n_sides
   use side_motion, only: piston
@@ -66,14 +66,16 @@ contains
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), allocatable, intent(out) :: disks(:)
+    real(real64) :: now                            ! a copy, because `find_strips` changes the component `due`
     integer(int32) :: i
     integer :: k
 
+    now = self%faces%due
     allocate (disks(0))
     do k = 1, n_sides
       if (sim%box%surface(k)%motion%kind == piston) disks = [disks, near_piston(self, k)]
     end do
-    call self%faces%find_strips(sim%box, self%patch%small, self%faces%due)
+    call self%faces%find_strips(sim%box, self%patch%small, now)
     do k = 1, n_sides
       if (sim%box%surface(k)%motion%kind == piston) disks = [disks, near_piston(self, k)]
     end do

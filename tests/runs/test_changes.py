@@ -472,3 +472,21 @@ def test_a_changed_simulation_whose_start_would_not_fit_is_saved(program, tmp_pa
     run = read_run("gas.h5")
     assert run.time[0] == 0.7 and run.time[-1] == 2
     assert np.array_equal(run.position[-1], gas.advance(time=2).position)
+
+
+def test_a_piston_pushes_disks_beyond_the_opposite_side_of_the_box():
+    """Gravity pulls the disks to the right, and the left piston follows and overtakes them."""
+    disks = {"name": "a", "count": 100, "packing_fraction": 0.1, "speed": 1}
+    pistons = [
+        {"name": "left", "motion": "piston", "mass": 10, "force": 50},
+        {"name": "right", "motion": "piston", "mass": 1, "force": 0},
+    ]
+    gas = Simulation({"species": disks, "side": pistons, "box": {"gravity": [1, 0]}})
+    position, followed = 0.0, 0
+    while position < 5:
+        gas.advance(events=gas.events + 1)
+        position = gas.observable("sides/left/position")
+        gaps = gas.position[:, 0] - gas.radius - position
+        assert gaps.min() > -1e-12 * max(1, position)
+        followed += position > 1
+    assert followed > 100
