@@ -18,7 +18,7 @@ module memory
   !> upper bounds, because the length of the Verlet lists depends on the time step.
   integer(int64), parameter :: per_process = 10000000, per_obstacle = 580
   !> `record`: state and next event of a disk; `cell`: a cell of the neighbour search
-  real(real64), parameter :: record = 110, cell = 32
+  real(real64), parameter :: record = 103, cell = 32
   !> `extra`: image indices, contact time and rotation of a disk; `own_size`: individual mass of a disk
   real(real64), parameter :: extra = 40, own_size = 8
   real(real64), parameter :: sampled = 8.8_real64            !! memory for each value of a disk in a frame
@@ -27,7 +27,7 @@ module memory
   real(real64), parameter :: kicked = 16, stepped = 100
   !> Additional memory per disk if the box is divided into domains: the first number applies to a box with walls, the second number
   !> to a periodic box.
-  real(real64), parameter :: divided(2) = [143, 205]
+  real(real64), parameter :: divided(2) = [152, 212]
   !> Additional memory per disk if a run uses both domains and neighbour lists
   real(real64), parameter :: listed_twice = 80
   ! Total memory per disk during the placement of disks, for four methods in this order: given positions, random positions,

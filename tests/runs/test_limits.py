@@ -144,9 +144,16 @@ placement = 'lattice' velocities = 'maxwell' /
     ],
 )
 def test_a_run_takes_the_memory_that_is_assumed(memory_of, ricochet, count, length, words):
-    """The memory agrees with the estimate in runs with and without domains."""
-    measured = memory_of(LATTICE.format(count=count, length=length), *words)
-    assert measured == pytest.approx(assumed_memory(ricochet, *words), rel=0.05)
+    """The memory of the disks agrees with the estimate in runs with and without domains.
+
+    The memory of a run of 100 disks is subtracted from both, because the libraries of one system
+    need twice as much memory as those of another.
+    """
+    measured, assumed = [], []
+    for disks in (count, 100):
+        measured.append(memory_of(LATTICE.format(count=disks, length=length), *words))
+        assumed.append(assumed_memory(ricochet, *words))
+    assert measured[0] - measured[1] == pytest.approx(assumed[0] - assumed[1], rel=0.05)
 
 
 def test_the_size_of_the_output_is_told_before_it_is_written(ricochet, tmp_path):
@@ -155,7 +162,7 @@ def test_the_size_of_the_output_is_told_before_it_is_written(ricochet, tmp_path)
     grid = ["--set", "species.gas.count=", "--set", "species.gas.grid=1000,1000"]
     run = ricochet("gas.nml", "--check", *grid)
     assert run.stdout == (
-        "gas.nml: valid; 1000000 disks; the run needs about 316 MB of memory, "
+        "gas.nml: valid; 1000000 disks; the run needs about 318 MB of memory, "
         "the output at least 240 MB\n"
     )
     assert run.stderr == ""
