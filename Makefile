@@ -140,7 +140,7 @@ $(BUILD)/hints.mk: src/base/memory_hints.c Makefile
 $(BUILD)/unit_tests: $(driver) $(T)/tests.inc $(test_objects) $(shared_objects) $(objects) $(BUILD)/runner
 	$(call link,$(test_flags),$< $(filter %.o,$^) $(PFUNIT_LIBRARIES))
 
-# The engine of docs/how-it-works.md.
+# The engine of docs/tutorials/how-it-works.md.
 $(BUILD)/four_disks: docs/four_disks.f90 $(objects)
 	$(call link,-I$(BUILD),$^)
 
@@ -224,7 +224,7 @@ lab:  ## sets up, builds, opens the laboratory in your browser
 notebook:  ## sets up, and opens the tour in JupyterLab
 	@.ci/set-up demo notebook
 	@$(MAKE) $(jobs) all && $(MAKE) library
-	$(venv) -m jupyterlab $(if $(filter 0,$(shell id -u)),--allow-root) docs/tour.ipynb
+	$(venv) -m jupyterlab $(if $(filter 0,$(shell id -u)),--allow-root) docs/tutorials/tour.ipynb
 
 figures:  ## draws the figures of all systems in runs/figures/ (long)
 	@.ci/set-up demo

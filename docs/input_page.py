@@ -1,6 +1,6 @@
-"""Write the page docs/input.md from the table of input variables that the program prints.
+"""Write the page docs/reference/input.md from the table of input variables that the program prints.
 
-python docs/input_page.py build/ricochet > docs/input.md
+python docs/input_page.py build/ricochet > docs/reference/input.md
 """
 
 import json
@@ -21,9 +21,9 @@ GROUPS = {
     "are not given, the `wall_...` variables of [`&contact`](#contact) apply.",
     "species": "Disks of one kind; repeated for each species. At least one is needed.",
     "contact": "Collision rules of disks, and of boundaries that have none of their own "
-    "([theory](theory.md#contact)).",
+    "([theory](../explanation/theory.md#contact)).",
     "drive": "Driving: changes of velocities (kicks) at fixed intervals "
-    "([theory](theory.md#kicks)).",
+    "([theory](../explanation/theory.md#kicks)).",
     "stop": "End of the run, at the first of these rules that is met. At least one is needed. If "
     "no further event can occur and no `time` is given, the run ends at the last collision, or "
     "at the sample that is due after it.",
@@ -36,9 +36,9 @@ GROUPS = {
 HEAD = """\
 # Input: every variable
 
-This page is the reference for all variables of an input file. [input/README](../input/README.md)
+This page is the reference for all variables of an input file. [input/README](../../input/README.md)
 explains the rules of the format and shows how to describe a system;
-[input/reference.nml](../input/reference.nml) is a file with all variables. The same text for one
+[input/reference.nml](../../input/reference.nml) is a file with all variables. The same text for one
 variable is printed by `ricochet --explain VARIABLE`; `--explain WORD` searches names, choices and
 explanations. `docs/input_page.py` generates this page from the table in the program.
 
@@ -139,7 +139,7 @@ def plain(text: str) -> str:
 
 
 def page(program: Path) -> str:
-    """Return the text of the page docs/input.md."""
+    """Return the text of the page docs/reference/input.md."""
     lines = [HEAD]
     for group, entries in variables(program).items():
         lines += [f"## {group}" if group == LAW else f"## &{group}", "", GROUPS[group], ""]

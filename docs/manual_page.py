@@ -5,6 +5,7 @@ python docs/manual_page.py build/ricochet PREFIX > ricochet.1
 The version number is taken from the program `ricochet` in the folder that contains the command.
 """
 
+import posixpath
 import re
 import sys
 from pathlib import Path
@@ -21,7 +22,7 @@ SECTIONS = {
     "exit": "EXIT STATUS",
     "examples": "EXAMPLES",
 }
-LINK = r"\[\w+\]\(([\w.]+)[^)]*\)"  # a link to another page of docs/
+LINK = r"\[\w+\]\(([\w./]+)[^)]*\)"  # a link from docs/reference/input.md to another page
 FILES = """\
 .SH FILES
 .ad l
@@ -65,6 +66,11 @@ def section(paragraph: str) -> list[str]:
     return [f".SH {heading}", ".nf", roff(dedent(paragraph).strip("\n")), ".fi"]
 
 
+def installed(link: re.Match) -> str:
+    """Return the path of the installed page to which a link leads."""
+    return f"PREFIX/share/doc/ricochet/{posixpath.normpath(f'docs/reference/{link[1]}')}"
+
+
 def inputs(program: Path) -> list[str]:
     """Return a list of all input groups and their variables in roff format."""
     lines = [
@@ -74,7 +80,7 @@ def inputs(program: Path) -> list[str]:
         "with lines variable = value; only what differs from the default is needed.",
     ]
     for group, entries in variables(program).items():
-        purpose = re.sub(LINK, r"PREFIX/share/doc/ricochet/docs/\1", GROUPS[group])
+        purpose = re.sub(LINK, installed, GROUPS[group])
         title, prefix = (LAW, "") if group == LAW else (f"&{group}", f"{group}.")
         lines += [f'.SS "{title}"', roff(purpose)]
         for name, entry in entries.items():

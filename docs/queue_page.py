@@ -1,7 +1,7 @@
-"""Print the event queues shown in docs/how-it-works.md, and draw them with the disks.
+"""Print the event queues shown in docs/tutorials/how-it-works.md, and draw them with the disks.
 
     python docs/queue_page.py build/tests/four_disks                   the queues
-    python docs/queue_page.py build/tests/four_disks docs/queue.png    and the figure
+    python docs/queue_page.py build/tests/four_disks docs/tutorials/queue.png    and the figure
 
 The event queues come from the program docs/four_disks.f90, which `make test` builds.  This program
 performs a real simulation of four disks, one event at a time.

@@ -1,4 +1,4 @@
-"""Write the results of the textbook exercises into the page docs/getting-started.md.
+"""Write the results of the textbook exercises into the page docs/tutorials/getting-started.md.
 
     make figures                     or runs/mixture.sh, cooling.sh, crater.sh, gravity.sh alone
     python docs/tasks_page.py        reads runs/figures into docs/tasks.json, and writes the page
@@ -139,7 +139,7 @@ def main() -> None:
     found = mixture() | cooling() | crater() | gravity()
     numbers = {name: found[name] for name in BLANK.findall("".join(TEXTS.values()))}
     (DOCS / "tasks.json").write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
-    page = DOCS / "getting-started.md"
+    page = DOCS / "tutorials" / "getting-started.md"
     page.write_text(filled(page.read_text(encoding="utf-8"), numbers), encoding="utf-8")
 
 

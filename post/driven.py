@@ -17,9 +17,10 @@ fluctuations.
 
 --show width: width of a box with a piston (motion = 'piston').  For equal elastic disks, the dashed
 lines show the predicted mean width and the range of one standard deviation around it.  The
-prediction follows from the equation of state at constant enthalpy (docs/theory.md).  The script
-also prints the measured standard deviation of the width, and the largest relative changes of two
-conserved quantities: the enthalpy, and the total momentum of the disks and the piston.
+prediction follows from the equation of state at constant enthalpy (docs/explanation/theory.md).
+The script also prints the measured standard deviation of the width, and the largest relative
+changes of two conserved quantities: the enthalpy, and the total momentum of the disks and the
+piston.
 
 --show share: fraction of the disks in the left half of the box.  The dashed lines show predicted
 steady fractions for a dilute gas above a vibrating floor, in a box whose two halves are connected

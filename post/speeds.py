@@ -21,11 +21,12 @@ Kolmogorov-Smirnov (KS) and chi-square tests compare the speeds with the expecte
 Before the tests, the speeds in each frame are divided by the thermal speed in that frame.  If the
 kinetic energy is conserved, the expected distribution is that of N disks with a fixed total kinetic
 energy; otherwise the Maxwell distribution is expected.  The p-values are determined from random
-samples; the speeds in each sample are divided by the thermal speed of this sample (docs/theory.md).
-Frames that are close in time contain correlated speeds; therefore the number of `independent`
-speeds is reduced by the statistical inefficiency.  The statistical tests do not apply to disks that
-conserve their angular momentum in a round container.  The last panel shows the second Sonine
-coefficient a2 = <v^4> / (2 <v^2>^2) - 1 against the number of collisions per disk.
+samples; the speeds in each sample are divided by the thermal speed of this sample
+(docs/explanation/theory.md). Frames that are close in time contain correlated speeds; therefore the
+number of `independent` speeds is reduced by the statistical inefficiency.  The statistical tests do
+not apply to disks that conserve their angular momentum in a round container.  The last panel shows
+the second Sonine coefficient a2 = <v^4> / (2 <v^2>^2) - 1 against the number of collisions per
+disk.
 """
 
 from typing import NamedTuple

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Benchmarks: cost of collisions, of the start of a run and of the output. docs/performance.md explains the results.
+# Benchmarks: cost of collisions, of the start of a run and of the output. docs/explanation/performance.md explains the results.
 #
 #   runs/bench.sh            1e3 to 1e5 disks at four packings; gravity, restitution, sizes, samples
 #   runs/bench.sh --full     1e6 disks as well: rates, random start, memory; runs and threads on two cores

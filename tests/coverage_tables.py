@@ -1,6 +1,7 @@
 """Tables of the validation page: coverage of error bars, and uniformity of p-values.
 
-    python tests/coverage_tables.py            writes docs/coverage.json and docs/validation.md
+    python tests/coverage_tables.py            writes coverage.json and validation.md
+                                               in docs/explanation
     python tests/coverage_tables.py --only gravity         repeats the rows of some systems
     python tests/coverage_tables.py --seeds 40 --print     a quick look
 
@@ -478,7 +479,7 @@ def main() -> int:
                         flush=True,
                     )
     if not args.print:
-        base = ROOT / "docs"
+        base = ROOT / "docs" / "explanation"
         tables = merged(tables, base / "coverage.json")
         missing = unmeasured(tables)
         data = json.dumps(tables | {"missing": missing}, indent=1, ensure_ascii=False)

@@ -18,14 +18,21 @@ from ricochet import Run, packages
 from synthetic_run import ROOT, write_run
 from whole_runs import differences, environment, ran
 
-PLACES = ("*.md", "docs/*.md", "*/README.md", "src/*/README.md")
+PLACES = ("*.md", "docs/**/*.md", "*/README.md", "src/*/README.md")
 PAGES = sorted(page for place in PLACES for page in ROOT.glob(place))
+TOUR = ROOT / "docs" / "tutorials" / "tour.ipynb"
 ELSEWHERE = ("http://", "https://", "mailto:", "#")
 
 
+def path_of(page):
+    """Return the path of a page in the root of the project, or anywhere in docs/."""
+    (path,) = [*ROOT.glob(f"{page}.md"), *ROOT.glob(f"docs/**/{page}.md")]
+    return path
+
+
 def section(page, heading):
-    """Return the text below a heading of a page in docs/, including subheadings."""
-    text = (ROOT / "docs" / f"{page}.md").read_text()
+    """Return the text below a heading of a page, including subheadings."""
+    text = path_of(page).read_text()
     level = len(heading) - len(heading.lstrip("#"))
     return re.search(rf"^{heading}$(.*?)(?=^#{{1,{level}}} |\Z)", text, re.M | re.S)[1]
 
@@ -40,8 +47,8 @@ def script_in_docs(name):
 
 def test_the_input_page_is_current(program):
     page = script_in_docs("input_page").page(program)
-    message = "make it anew: python docs/input_page.py build/ricochet > docs/input.md"
-    assert (ROOT / "docs" / "input.md").read_text() == page, message
+    message = "make it anew: python docs/input_page.py build/ricochet > docs/reference/input.md"
+    assert path_of("input").read_text() == page, message
 
 
 def test_the_queues_on_the_page_are_those_of_the_engine(program):
@@ -50,7 +57,7 @@ def test_the_queues_on_the_page_are_those_of_the_engine(program):
         pytest.skip("make test builds it")
     pages = script_in_docs("queue_page")
     tables = [pages.table(*state) for state in pages.states(engine)]
-    page = textwrap.dedent((ROOT / "docs" / "how-it-works.md").read_text()).replace("\n    ", "\n")
+    page = textwrap.dedent(path_of("how-it-works").read_text()).replace("\n    ", "\n")
     assert [table for table in tables[:-1] if table not in page] == []
 
 
@@ -77,7 +84,7 @@ def test_what_a_page_leads_to_and_names_is_there(page):
 
 def test_the_readme_leads_to_every_page():
     readme = (ROOT / "README.md").read_text()
-    assert [p.name for p in ROOT.glob("docs/*.md") if f"(docs/{p.name})" not in readme] == []
+    assert [p for p in ROOT.glob("docs/*/*.md") if f"({p.relative_to(ROOT)})" not in readme] == []
 
 
 @pytest.mark.parametrize(
@@ -110,8 +117,8 @@ def procedures_of(module):
 
 
 def test_procedures_that_are_named_exist():
-    """Each name `folder/file: procedure` in docs/inside.md is the name of a procedure in src/."""
-    page = (ROOT / "docs" / "inside.md").read_text()
+    """Each name `folder/file: procedure` on the page `inside` names a procedure in src/."""
+    page = path_of("inside").read_text()
     named = re.findall(r"`((?:\w+/)?\w+): (\w+)`", page)
     assert len(named) > 30
     missing = [f"{module}: {name}" for module, name in named if name not in procedures_of(module)]
@@ -194,7 +201,7 @@ def test_options_that_are_named_exist(program):
 
 def test_the_numbers_of_the_tasks_are_those_of_their_tables():
     pages = script_in_docs("tasks_page")
-    page = (ROOT / "docs" / "getting-started.md").read_text()
+    page = path_of("getting-started").read_text()
     numbers = json.loads((ROOT / "docs" / "tasks.json").read_text())
     assert pages.filled(page, numbers) == page, "make it anew: python docs/tasks_page.py"
     other = {name: (mean + 1, error) for name, (mean, error) in numbers.items()}
@@ -241,7 +248,7 @@ def test_workflows_take_fixed_actions_and_may_only_read():
 
 
 def test_every_script_of_post_is_in_the_list():
-    page = (ROOT / "docs" / "getting-started.md").read_text()
+    page = path_of("getting-started").read_text()
     scripts = [p.name for p in ROOT.glob("post/*.py") if "def main()" in p.read_text()]
     assert [name for name in scripts if not re.search(rf"^\|.*`{name}`.*\| ", page, re.M)] == []
 
@@ -275,7 +282,7 @@ def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path):
 def test_the_code_that_the_page_on_output_shows_runs_the_program(program, tmp_path):
     code = []
     for page, title in (
-        ("../README", "## In Python"),
+        ("README", "## In Python"),
         ("output", "## Running it from Python"),
         ("output", "## In Python's own process"),
         ("output", "## Many runs in Python"),
@@ -443,7 +450,7 @@ def test_the_recipes_work(tmp_path):
     for name in ("src", "post", "Makefile", "tests"):
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, tmp_path / name)
-    assert carry_out_recipes((ROOT / "docs" / "inside.md").read_text(), tmp_path) > 30
+    assert carry_out_recipes(path_of("inside").read_text(), tmp_path) > 30
     ran("git", "init", "-q", cwd=tmp_path, check=True)
     said = ran(sys.executable, "tests/support/check_style.py", cwd=tmp_path)
     assert (said.returncode, said.stdout) == (0, "")
@@ -511,17 +518,17 @@ def test_one_command_installs_what_the_notebook_needs():
     installed = {line.split("==")[0] for line in lines if re.search(r"==.*#.*\bnotebook\b", line)}
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert installed == set(extras["optional-dependencies"]["notebook"]) == wanted
-    cells = json.loads((ROOT / "docs" / "tour.ipynb").read_text())["cells"]
+    cells = json.loads(TOUR.read_text())["cells"]
     code = "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")
     imported = set(re.findall(r"^(?:import|from) (\w+)", code, re.M)) - {"ricochet"}
     assert imported <= installed | set(packages.needed)
     said = ran("make", "-n", "notebook", cwd=ROOT)
-    assert ".ci/set-up demo notebook" in said.stdout and "docs/tour.ipynb" in said.stdout
+    assert ".ci/set-up demo notebook" in said.stdout and "docs/tutorials/tour.ipynb" in said.stdout
     assert "make notebook" in cells[0]["source"][-2] + cells[0]["source"][-1]
 
 
 def test_the_page_says_all_that_a_run_can_do():
-    page = (ROOT / "docs" / "output.md").read_text().partition("What a `Run` can do")[2]
+    page = path_of("output").read_text().partition("What a `Run` can do")[2]
     names = {name for name in (*Run.__dataclass_fields__, *members_of(Run)) if name[0] != "_"}
     assert [name for name in sorted(names) if not re.search(rf"`{name}\b", page)] == []
 
@@ -532,10 +539,10 @@ def test_each_cell_shows_what_it_promises(program, monkeypatch):
     nbclient = pytest.importorskip("nbclient")
     import nbformat
 
-    notebook = nbformat.read(ROOT / "docs" / "tour.ipynb", as_version=4)
+    notebook = nbformat.read(TOUR, as_version=4)
     monkeypatch.setenv("RICOCHET", str(program))
     kernel = {"kernel_name": "python3", "timeout": 300}
-    folder = {"metadata": {"path": str(ROOT / "docs")}}
+    folder = {"metadata": {"path": str(TOUR.parent)}}
     nbclient.NotebookClient(notebook, resources=folder, **kernel).execute()
     cells = [(one.source, shown(one)) for one in notebook.cells if one.cell_type == "code"]
     drawn = [output for source, output in cells if "plt.subplots" in source]

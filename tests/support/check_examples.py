@@ -4,7 +4,7 @@
 
 The script writes one file for each section of README.md, and of the pages in docs/, that contains
 an example.  A section without imports is added to the file of the previous section.  The code cells
-of the notebook docs/tour.ipynb form another file.
+of the notebook docs/tutorials/tour.ipynb form another file.
 """
 
 import ast
@@ -15,8 +15,8 @@ import textwrap
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-TOUR = ROOT / "docs" / "tour.ipynb"
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+TOUR = ROOT / "docs" / "tutorials" / "tour.ipynb"
 
 
 def blocks_of(section: str) -> list[str]:

@@ -310,7 +310,7 @@ def language_problems(root: Path) -> Iterator[Problem]:
                 yield Problem(path.relative_to(root), line, what)
             if "tests" not in path.relative_to(root).parts:
                 yield from denied_words(path.relative_to(root), line, words)
-    for path in sorted((root / "docs").glob("*.md")):
+    for path in sorted((root / "docs").rglob("*.md")):
         for number, words in enumerate(path.read_text().splitlines(), start=1):
             yield from denied_words(path.relative_to(root), number, words)
 

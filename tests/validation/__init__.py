@@ -2,7 +2,7 @@
 
 A case consists of the inputs of its runs, a pure function that measures a value from the runs, the
 reference value, the tolerance, and the source of the reference.  `python tests/validate.py` runs
-all cases and writes the report docs/validation.md.
+all cases and writes the report docs/explanation/validation.md.
 """
 
 from importlib import import_module

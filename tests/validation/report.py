@@ -10,8 +10,9 @@ from .case import Verdict
 
 HEAD = """# Physics validation
 
-Written by `python tests/validate.py --report docs/validation`. Each case runs the program on its
-own input and compares the result with an exact value, a derivation, or published numbers.
+Written by `python tests/validate.py --report docs/explanation/validation`. Each case runs the
+program on its own input and compares the result with an exact value, a derivation, or published
+numbers.
 
 Cases of one number share a row, which shows the value that comes nearest to its tolerance. The
 *verdict* is its deviation divided by the allowed one: up to 1 it passes, beyond it fails. What must

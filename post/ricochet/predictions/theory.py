@@ -261,11 +261,11 @@ def pushed_width(
     """Return mean and variance of the width of a box with a piston under a constant force.
 
     If the piston exerts the force F, the probability density of the width w is proportional to Q(w)
-    (H - F w)^(f/2 - 1), as derived in docs/theory.md.  Q is the configuration integral of the
-    disks, H the enthalpy, and f the number of degrees of freedom including that of the piston.  The
-    density is evaluated at equally spaced `widths` (W,), for which `places` contains ln Q and
-    `energy` contains H - F w.  Where Q is unknown, `places` contains NaN and the density is set to
-    0.  The argument `squares` is the number f of degrees of freedom.
+    (H - F w)^(f/2 - 1), as derived in docs/explanation/theory.md.  Q is the configuration integral
+    of the disks, H the enthalpy, and f the number of degrees of freedom including that of the
+    piston.  The density is evaluated at equally spaced `widths` (W,), for which `places` contains
+    ln Q and `energy` contains H - F w.  Where Q is unknown, `places` contains NaN and the density
+    is set to 0.  The argument `squares` is the number f of degrees of freedom.
     """
     log = np.where(np.isnan(places), -np.inf, places) + (squares / 2 - 1) * np.log(energy)
     density = np.exp(log - log.max())

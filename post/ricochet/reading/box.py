@@ -131,7 +131,8 @@ def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
     """Return the inward displacement of a moving side at the given times.
 
     The displacement is measured from the mean position of an oscillating side, or from the initial
-    position of a side that moves at constant velocity.  The formulae are in docs/theory.md.
+    position of a side that moves at constant velocity.  The formulae are in
+    docs/explanation/theory.md.
     """
     if side.get("motion") == "constant_velocity":
         start, end = side["start_time"], side["end_time"]
