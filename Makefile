@@ -314,10 +314,14 @@ coverage:
 	@RICOCHET="$$(realpath '$(BUILD)')/coverage/ricochet" $(venv) -m pytest -q tests
 	@$(venv) -m gcovr --root . --filter src/ --fail-under-line 95 $(BUILD)/coverage
 
-docs:  ## pages of the source, with FORD: build/docs/index.html
-	@.ci/set-up docs
-	@$(venv) -m ford --quiet --no-search --src_dir "$$PWD/src" --output_dir "$$(realpath $(BUILD))/docs" --config \
+docs:  ## builds the documentation site: build/docs/index.html
+	@.ci/set-up demo docs
+	@$(MAKE) $(jobs) all
+	@$(MAKE) library
+	@$(venv) -m ford --quiet --no-search --src_dir "$$PWD/src" --output_dir "$$(realpath $(BUILD))/docs/fortran" --config \
 	  'project = "Ricochet"; preprocess = false; display = ["public", "private"]; print_creation_date = false' src/README.md
+	@$(venv) docs/build_site.py $(BUILD)
+	@echo 'The site: $(BUILD)/docs/index.html'
 
 install: $(if $(wildcard $(BUILD)/ricochet),,all library)  ## for all users (PREFIX=, DESTDIR=); uninstall; dist: tarball
 install uninstall dist: export BUILD := $(BUILD)

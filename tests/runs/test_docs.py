@@ -82,11 +82,6 @@ def test_what_a_page_leads_to_and_names_is_there(page):
     assert [name for name in missing if name not in mine and name == name.lower()] == []
 
 
-def test_the_readme_leads_to_every_page():
-    readme = (ROOT / "README.md").read_text()
-    assert [p for p in ROOT.glob("docs/*/*.md") if f"({p.relative_to(ROOT)})" not in readme] == []
-
-
 @pytest.mark.parametrize(
     ("page", "heading"), [("limits", "## Promises"), ("inside", "## Invariants")]
 )

@@ -185,8 +185,8 @@ def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estim
     Returns
     -------
     Estimate
-        the mean is the number that `of` returns for the curve; the error is |a - b| / 2, where a
-        and b are the numbers for the curve plus its error and for the curve minus its error; mean
+        the mean is the number that `of` returns for the curve; the error is ``|a - b| / 2``, where
+        a and b are the numbers for the curve plus its error and for the curve minus its error; mean
         and error are NaN if a or b is NaN, or if the curve has no error
 
     Examples

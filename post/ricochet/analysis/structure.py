@@ -107,7 +107,7 @@ def masks(run: Run, pair: tuple[str, str] | None) -> list[np.ndarray]:
 def structure_factor(
     run: Run, frames: Index, edges: np.ndarray, pair: tuple[str, str] | None = None
 ) -> np.ndarray:
-    """Return the structure factor S(k) = <|sum of exp(i k x)|^2> / N averaged over frames.
+    """Return the structure factor ``S(k) = <|sum of exp(i k x)|^2> / N`` averaged over frames.
 
     Only one of the wave vectors k and -k is used, because S(k) = S(-k).  If there are many disks,
     only a part of the wave vectors is used.

@@ -1,0 +1,275 @@
+"""Build the documentation site: pages of docs/, READMEs, Python reference, and pages of the source.
+
+    python docs/build_site.py build
+
+The command `make docs` runs this script.  The folder build/docs-sources receives a copy of all
+pages, in which links between pages of different folders are changed to links within the site; the
+site build/docs is made from this copy by Sphinx.  Each README.md of docs/ is the index page of its
+folder, and the pages to which it links, in this order, are the pages of the folder.  A warning of
+Sphinx ends the script with exit code 1, as does a link within the site that leads nowhere.
+"""
+
+import json
+import os
+import posixpath
+import re
+import shutil
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+#: Folder of the site with the pages of the Fortran source, which FORD writes.
+FORTRAN = "fortran"
+#: Pages outside of docs/, with their names in the folder `project` of the site.
+OUTSIDE = {
+    "README.md": "readme",
+    "CHANGELOG.md": "changelog",
+    "CONTRIBUTING.md": "contributing",
+    "input/README.md": "input",
+    "runs/README.md": "runs",
+    "src/README.md": "src",
+    "post/ricochet/README.md": "python",
+    "LICENSE": "licence",
+}
+LINK = re.compile(r"(?<=\]\()[^)\s]+|(?<=\bsrc=\")[^\"]+")
+TO_FOLDER = re.compile(r"\[([^\[\]]*)\]\(([\w/.-]+)\)")
+ELSEWHERE = ("http:", "https:", "mailto:", "#", "data:")
+API_HEAD = """\
+# {short}
+
+```{{eval-rst}}
+.. automodule:: {name}
+   :no-members:
+
+.. currentmodule:: {name}
+
+.. autosummary::
+   :nosignatures:
+
+{names}
+
+{entries}
+```
+"""
+
+
+def sources() -> dict[str, str]:
+    """Return the path in the site of each page, without ending, by its path in the project."""
+    pages = {}
+    for path in sorted([*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")]):
+        name = path.relative_to(DOCS).with_suffix("").as_posix()
+        pages[f"docs/{path.relative_to(DOCS)}"] = re.sub(r"(^|/)README$", r"\1index", name)
+    pages |= {name: f"project/{new}" for name, new in OUTSIDE.items()}
+    for path in sorted((ROOT / "src").glob("*/README.md")):
+        pages[path.relative_to(ROOT).as_posix()] = f"project/src-{path.parent.name}"
+    return pages
+
+
+class Stage:
+    """The folder with the sources of the site."""
+
+    def __init__(self, folder: Path) -> None:
+        """Use a folder, whose earlier content is kept until `tidy` is called."""
+        self.folder = folder
+        self.pages = sources()
+        self.written: set[Path] = set()
+
+    def write(self, name: str, content: str | bytes) -> None:
+        """Write a file, unless the same content is already there: then Sphinx keeps its page."""
+        path = self.folder / name
+        data = content.encode() if isinstance(content, str) else content
+        if not path.exists() or path.read_bytes() != data:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        self.written.add(path)
+
+    def tidy(self) -> None:
+        """Remove files of earlier calls."""
+        for path in self.folder.rglob("*"):
+            if path.is_file() and path not in self.written:
+                path.unlink()
+
+    def target(self, page: str, link: str) -> str:
+        """Return a link of a page as it is in the site; other files are copied into the site."""
+        name, mark, section = link.partition("#")
+        if not name or link.startswith(ELSEWHERE):
+            return link
+        path = posixpath.normpath(posixpath.join(posixpath.dirname(page), unquote(name)))
+        if (ROOT / path).is_dir():
+            path = posixpath.join(path, "README.md")
+        if path in self.pages:
+            ending = ".ipynb" if path.endswith(".ipynb") else ".md"
+            new = self.pages[path] + ending
+        elif (ROOT / path).is_file():
+            new = path.removeprefix("docs/") if path.startswith("docs/") else f"files/{path}"
+            self.write(new, (ROOT / path).read_bytes())
+        else:
+            raise SystemExit(f"{page}: the link {link} leads nowhere")
+        return posixpath.relpath(new, posixpath.dirname(self.pages[page])) + mark + section
+
+    def relinked(self, page: str, text: str) -> str:
+        """Return the text of a page with the links of the site.
+
+        A link to a folder without a page is replaced by its text.
+        """
+        here = (ROOT / page).parent
+
+        def unlinked(found: re.Match) -> str:
+            folder = here / found[2]
+            without_page = folder.is_dir() and not (folder / "README.md").exists()
+            return found[1] if without_page else found[0]
+
+        text = TO_FOLDER.sub(unlinked, text)
+        return LINK.sub(lambda found: self.target(page, found[0]), text)
+
+    def contents(self, page: str, text: str) -> str:
+        """Return a hidden table of contents: the links of an index page to pages of its folder."""
+        here = posixpath.dirname(page)
+        names = []
+        for found in re.finditer(r"\]\(([^)\s#]+)\)", text):
+            path = posixpath.normpath(posixpath.join(here, found[1]))
+            path = f"{path}/README.md" if (ROOT / path).is_dir() else path
+            inner = path in self.pages and path.startswith(f"{here}/") and path != page
+            if inner and self.pages[path] not in names:
+                names.append(self.pages[path])
+        more = ["project/index"] if page == "docs/README.md" else []
+        more += ["reference/python/index"] if page == "docs/reference/README.md" else []
+        lines = [f"/{name}" for name in [*names, *more]]
+        return "\n```{toctree}\n:hidden:\n\n" + "\n".join(lines) + "\n```\n"
+
+    def copy_pages(self) -> None:
+        """Copy all pages."""
+        for page, name in self.pages.items():
+            text = (ROOT / page).read_text(encoding="utf-8")
+            if page.endswith(".ipynb"):
+                book = json.loads(text)
+                for cell in book["cells"]:
+                    if cell["cell_type"] == "markdown":
+                        whole = self.relinked(page, "".join(cell["source"]))
+                        cell["source"] = whole.splitlines(keepends=True)
+                self.write(f"{name}.ipynb", json.dumps(book, indent=1, ensure_ascii=False))
+                continue
+            if page == "LICENSE":
+                text = f"# Licence\n\n{text}"
+            # Diagrams in the language Mermaid need a script from another machine: they stay text.
+            text = self.relinked(page, text).replace("```mermaid", "```text")
+            if page.startswith("docs/") and page.endswith("/README.md"):
+                text += self.contents(page, (ROOT / page).read_text(encoding="utf-8"))
+            self.write(f"{name}.md", text)
+
+    def write_project_index(self) -> None:
+        """Write the index of the pages from outside of docs/."""
+        own = [name for name in self.pages.values() if name.startswith("project/")]
+        lines = "\n".join(f"/{name}" for name in own)
+        self.write(
+            "project/index.md",
+            "# Project\n\nThese pages are the README files of the folders of the source tree, "
+            "written for\nthose who read or change the source code. The pages of the "
+            f'<a href="../{FORTRAN}/index.html">Fortran source</a>\nlist every module, type and '
+            f"procedure.\n\n```{{toctree}}\n:maxdepth: 1\n\n{lines}\n```\n",
+        )
+
+    def write_python_reference(self) -> None:
+        """Write a page for each public module of the package."""
+        sys.path[:0] = [str(ROOT / "post"), str(ROOT / "tests" / "support")]
+        from importlib import import_module
+
+        from check_docstrings import MODULES
+
+        names = ["ricochet", *(import_module(f"ricochet.{name}").__name__ for name in MODULES)]
+        for name in names:
+            module = import_module(name)
+            public = sorted(module.__all__)
+            listed = "\n".join(f"   {one}" for one in public)
+            entries = []
+            for one in public:
+                kind = "class" if isinstance(getattr(module, one), type) else "function"
+                members = "\n   :members:" if kind == "class" else ""
+                entries.append(f".. auto{kind}:: {one}{members}\n")
+            text = API_HEAD.format(
+                short=f"ricochet.{name.rpartition('.')[2]}" if "." in name else name,
+                name=name,
+                names=listed,
+                entries="\n".join(entries),
+            )
+            self.write(f"reference/python/{name}.md", text)
+        lines = "\n".join(names)
+        self.write(
+            "reference/python/index.md",
+            "# Python modules\n\nThis reference lists the public functions and classes of the "
+            "package `ricochet`, for those who\nanalyse runs in Python. A module can be imported "
+            "without the name of its folder, as in\n`from ricochet import structure`.\n\n"
+            f"```{{toctree}}\n:maxdepth: 1\n\n{lines}\n```\n",
+        )
+
+
+class Page(HTMLParser):
+    """The links and the anchors of a page of the site."""
+
+    def __init__(self, path: Path) -> None:
+        """Read a page."""
+        super().__init__()
+        self.links: list[str] = []
+        self.anchors: set[str] = set()
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        self.anchors |= {value for key in ("id", "name") if (value := given.get(key))}
+        self.links += [value for key in ("href", "src") if (value := given.get(key))]
+
+
+def broken(site: Path) -> list[str]:
+    """Return all links of the site, except those of the pages of FORD, that lead nowhere.
+
+    Scripts, styles and pictures from other machines also count as broken, because the site works
+    without a network.
+    """
+    pages = {path: Page(path) for path in site.rglob("*.html") if FORTRAN not in path.parts}
+    found = []
+    for path, page in pages.items():
+        for link in page.links:
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                continue
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            target = target / "index.html" if target.is_dir() else target
+            anchor = unquote(parts.fragment)
+            lost = not target.exists() or (
+                anchor and target in pages and anchor not in pages[target].anchors
+            )
+            if lost:
+                found.append(f"{path.relative_to(site)}: {link}")
+    return sorted(set(found))
+
+
+def main(build: Path) -> int:
+    """Build the site; return 0 if there was no warning and no broken link."""
+    site, stage = build / "docs", Stage(build / "docs-sources")
+    stage.copy_pages()
+    stage.write_project_index()
+    stage.write_python_reference()
+    stage.tidy()
+    own = {"RICOCHET": str(build / "ricochet"), "PYTHONPATH": str(ROOT / "post")}
+    environment = os.environ | own | {"RICOCHET_SITE_CACHE": str(build / "docs-cache")}
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-j", "auto"]
+    command += ["-c", str(DOCS), "-d", str(build / "docs-doctrees"), str(stage.folder), str(site)]
+    status = subprocess.run(command, env=environment, check=False).returncode
+    if status == 0 and not (site / FORTRAN / "index.html").exists():
+        print(f"{site}/{FORTRAN}: the pages of the Fortran source are missing", file=sys.stderr)
+        status = 1
+    if status == 0 and (lost := broken(site)):
+        print(*(f"broken link: {link}" for link in lost), sep="\n", file=sys.stderr)
+        status = 1
+    shutil.rmtree(site / ".doctrees", ignore_errors=True)
+    return status
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        raise SystemExit(__doc__)
+    sys.exit(main(Path(sys.argv[1]).resolve()))

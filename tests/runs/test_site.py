@@ -1,0 +1,82 @@
+"""Tests of docs/build_site.py, which collects the pages of the documentation site for Sphinx."""
+
+import importlib.util
+import re
+
+import pytest
+
+from synthetic_run import ROOT
+
+KINDS = ("tutorials", "guides", "reference", "explanation")
+
+
+@pytest.fixture(scope="module")
+def site():
+    """Return the script docs/build_site.py as a module."""
+    source = importlib.util.spec_from_file_location("build_site", ROOT / "docs" / "build_site.py")
+    module = importlib.util.module_from_spec(source)
+    source.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def stage(site, tmp_path_factory):
+    """Return the folder with the sources of the site."""
+    made = site.Stage(tmp_path_factory.mktemp("site"))
+    made.copy_pages()
+    made.write_project_index()
+    made.write_python_reference()
+    return made
+
+
+def test_each_page_stands_in_one_table_of_contents(stage):
+    listed = []
+    for page in stage.folder.rglob("*.md"):
+        for block in re.findall(r"^```{toctree}\n(.*?)^```", page.read_text(), re.M | re.S):
+            for name in re.findall(r"^[/\w].*$", block, re.M):
+                folder = stage.folder if name[0] == "/" else page.parent
+                listed.append((folder / name.lstrip("/")).relative_to(stage.folder).as_posix())
+    pages = [*stage.folder.rglob("*.md"), *stage.folder.rglob("*.ipynb")]
+    names = {page.relative_to(stage.folder).with_suffix("").as_posix() for page in pages}
+    assert sorted(listed) == sorted(names - {"index"})
+
+
+def test_links_lead_to_pages_and_files_of_the_site(stage):
+    for page in stage.folder.rglob("*.md"):
+        links = re.findall(r"\]\(([^)\s#]+)", page.read_text())
+        local = [link for link in links if not re.match(r"\w+:", link)]
+        assert [link for link in local if not (page.parent / link).is_file()] == [], page
+    page = "docs/explanation/inside.md"
+    assert stage.target(page, "../reference/input.md#contact") == "../reference/input.md#contact"
+    assert stage.target(page, "../../CHANGELOG.md") == "../project/changelog.md"
+    assert stage.target(page, "../../input/gas.nml") == "../files/input/gas.nml"
+    assert (stage.folder / "files/input/gas.nml").read_bytes() == (
+        ROOT / "input/gas.nml"
+    ).read_bytes()
+    with pytest.raises(SystemExit, match="leads nowhere"):
+        stage.target(page, "theorie.md")
+
+
+def test_the_readme_leads_to_each_kind_of_page():
+    readme = (ROOT / "README.md").read_text()
+    assert [kind for kind in KINDS if f"(docs/{kind}/README.md)" not in readme] == []
+
+
+def test_links_that_lead_nowhere_are_found(site, tmp_path):
+    (tmp_path / "a.html").write_text(
+        """<h1 id="top">A</h1> <a href="b.html#part">b</a> <a href="#top">top</a>
+        <a href="https://example.org">elsewhere</a> <img src="lost.png">
+        <a href="b.html#gone">b</a>"""
+    )
+    (tmp_path / "b.html").write_text('<p id="part">B</p><a href="sub/">folder</a>')
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "index.html").write_text("<p>")
+    assert site.broken(tmp_path) == ["a.html: b.html#gone", "a.html: lost.png"]
+
+
+def test_every_module_of_the_python_reference_lists_its_names(stage):
+    import ricochet
+
+    page = (stage.folder / "reference/python/ricochet.md").read_text()
+    assert [name for name in ricochet.__all__ if f"   {name}\n" not in page] == []
+    assert ".. autofunction:: run\n" in page and ".. autoclass:: Run\n" in page
