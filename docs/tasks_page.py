@@ -1,10 +1,10 @@
-"""Write the results of the textbook exercises into the page docs/tutorials/getting-started.md.
+"""Write the results of the textbook exercises into the pages of docs/tutorials.
 
     make figures                     or runs/mixture.sh, cooling.sh, crater.sh, gravity.sh alone
-    python docs/tasks_page.py        reads runs/figures into docs/tasks.json, and writes the page
+    python docs/tasks_page.py        reads runs/figures into docs/tasks.json, and writes the pages
 
-The file docs/tasks.json contains each number of the page together with its error.  In the page,
-HTML comments enclose each text that this script replaces, and contain the name of the text.
+The file docs/tasks.json contains each number of the pages together with its error.  In a page, HTML
+comments enclose each text that this script replaces, and contain the name of the text.
 """
 
 import csv
@@ -20,37 +20,44 @@ TABLES = DOCS.parent / "runs" / "figures"
 BLANK = re.compile(r"{(\S+?)}")  # placeholder of a number in a text
 Numbers = dict[str, tuple[float, float | None]]  # value and error (None without an error)
 
+PAGES = ("exam", "gravity")
 TEXTS = {
-    "exam": """\
-- Light and heavy disks start with ⟨K⟩ = 0.5 and 2, and end with {K_light} and {K_heavy} (theory
-  1.25); ⟨v⟩ = {v_light} and {v_heavy} (theory {v_light_theory} and {v_heavy_theory}). Eight
-  seeds.
-- After 20 collisions per disk the ratio of the temperatures, heavy over light, is {ratio_1} for ξ
-  = 1, {ratio_0.9} for 0.9 and {ratio_0.8} for 0.8 (eight seeds): no equipartition.
-- Of the 2000 disks of a bed {hit} are hit and {displaced} move by more than their radius, from a
-  region {width} wide and {depth} deep (eight beds). The number hit grows with the mass of the
-  projectile to the power {hit_mass}, and with its speed to the power {hit_speed}, that is not at
-  all (`contact_time` is changed with 1/speed). In a bed that is large enough the crater decreases
-  slowly with the projectile's radius. In a smaller bed it grows with the radius instead: a small
-  projectile reaches the floor and leaves its energy there (1000 disks: 537, 610 and 663 hit for
-  2, 5 and 10 r; 5000 disks: 1043, 951 and 905). A bed is large enough with some
-  7.5 M (1/f - 1)/(1 - ξ²) disks, M the ratio of the masses and f the energy left at the end: 2250
-  here. As ξ goes to 1 the crater grows to the whole bed. Open points are not fitted: there walls
-  take part, or a time limit ends the run; the script says what to change where too few points are
-  left.
+    "mixture": """\
+Over eight seeds, light and heavy disks end with ⟨K⟩ = {K_light} and {K_heavy} (theory 1.25), and
+with ⟨v⟩ = {v_light} and {v_heavy} (theory {v_light_theory} and {v_heavy_theory}).
 """,
-    "gravity": """\
-- All methods conserve the total energy to {energy_change}. Large steps cost collisions instead:
-  disks pass through each other unnoticed. {missed_0.001} % are missed at dt = 0.001,
-  {missed_0.002} % at 0.002 and {missed_0.004} % at 0.004 (expected {expected_0.001},
-  {expected_0.002} and {expected_0.004} %; 32 pairs of runs of 520 time units).
-- ⟨K⟩ of both species agrees within 10 % from t = {T_first} to {T_last} on, for every v₀: the
-  fall from a mean height of 4 gives far more energy than v₀. Means of 100 seeds;
-  single runs fluctuate too much.
-- The slopes of the logarithm of both histograms agree with kT = ⟨K⟩. Relative to the exponential
-  laws, seed 1 (500 time units) gives {speed_A} and {speed_B} for v² of the light and the heavy
-  disks, and {height_A} and {height_B} for heights. The law for 60 disks of finite size, dashed in
-  the figure, has {speed_law} for v², and {height_law_A} and {height_law_B} for heights.
+    "cooling": """\
+After 20 collisions per disk the ratio of the temperatures, heavy over light, is {ratio_1} for ξ =
+1, {ratio_0.9} for ξ = 0.9 and {ratio_0.8} for ξ = 0.8 (eight seeds): there is no equipartition.
+""",
+    "crater": """\
+- In a bed of 2000 grains {hit} are hit, and {displaced} move by more than their radius. They come
+  from a region that is {width} wide and {depth} deep (eight beds).
+- *Mass.* The number of hit grains grows with the mass of the projectile to the power {hit_mass}.
+- *Speed.* The exponent is {hit_speed}: the crater does not depend on the speed.
+- *Radius.* In a bed that is large enough the crater decreases slowly with the radius of the
+  projectile. In a smaller bed it grows with the radius instead, because a small projectile
+  reaches the floor and leaves its energy there: with 1000 grains 537, 610 and 663 are hit for the
+  radii 2, 5 and 10; with 5000 grains 1043, 951 and 905.
+- *How large is large enough?* About 7.5 M (1/f - 1)/(1 - ξ²) grains, where M is the ratio of the
+  masses and f the fraction of the energy that is left at the end. Here these are 2250.
+- *Restitution.* As ξ approaches 1 the crater grows to the whole bed.
+""",
+    "energy": """\
+The total energy of all methods is constant to {energy_change}. The time steps miss {missed_0.001}
+% of the collisions for dt = 0.001, {missed_0.002} % for 0.002 and {missed_0.004} % for 0.004; the
+formula gives {expected_0.001}, {expected_0.002} and {expected_0.004} % (32 pairs of runs of 520
+time units).
+""",
+    "equipartition": """\
+The mean energies of both species agree within 10 % from the time {T_first} (earliest of the four
+v₀) to {T_last} (latest) on. The time hardly depends on v₀.
+""",
+    "laws": """\
+Relative to the exponential laws, the measured slopes of seed 1 are {speed_A} and {speed_B} for v²
+of the species A and B, and {height_A} and {height_B} for their heights. The dashed lines are the
+laws for 60 disks of finite size with a fixed energy. Their slopes are {speed_law} for v², and
+{height_law_A} and {height_law_B} for the heights.
 """,
 }
 
@@ -126,10 +133,15 @@ def words(number: tuple[float, float | None]) -> str:
 def filled(page: str, numbers: Numbers) -> str:
     """Return the page after replacing all texts that contain results."""
     for name, template in TEXTS.items():
+        start, end = f"<!-- {name} -->\n", "<!-- end -->"
+        if start not in page:
+            continue
         text = BLANK.sub(lambda blank: words(numbers[blank[1]]), template)
         items = [" ".join(item.split()) for item in re.split(r"\n(?=- )", text)]
-        wrapped = [textwrap.fill(item, 112, subsequent_indent="  ") + "\n" for item in items]
-        start, end = f"<!-- {name} -->\n", "<!-- end -->"
+        wrapped = [
+            textwrap.fill(item, 112, subsequent_indent=2 * " " * (item[0] == "-")) + "\n"
+            for item in items
+        ]
         before, _, rest = page.partition(start)
         page = before + start + "".join(wrapped) + end + rest.partition(end)[2]
     return page
@@ -139,8 +151,9 @@ def main() -> None:
     found = mixture() | cooling() | crater() | gravity()
     numbers = {name: found[name] for name in BLANK.findall("".join(TEXTS.values()))}
     (DOCS / "tasks.json").write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
-    page = DOCS / "tutorials" / "getting-started.md"
-    page.write_text(filled(page.read_text(encoding="utf-8"), numbers), encoding="utf-8")
+    for name in PAGES:
+        page = DOCS / "tutorials" / f"{name}.md"
+        page.write_text(filled(page.read_text(encoding="utf-8"), numbers), encoding="utf-8")
 
 
 if __name__ == "__main__":

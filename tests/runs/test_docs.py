@@ -196,11 +196,13 @@ def test_options_that_are_named_exist(program):
 
 def test_the_numbers_of_the_tasks_are_those_of_their_tables():
     pages = script_in_docs("tasks_page")
-    page = path_of("getting-started").read_text()
     numbers = json.loads((ROOT / "docs" / "tasks.json").read_text())
-    assert pages.filled(page, numbers) == page, "make it anew: python docs/tasks_page.py"
     other = {name: (mean + 1, error) for name, (mean, error) in numbers.items()}
-    assert pages.filled(page, other) != page
+    texts = [path_of(name).read_text() for name in pages.PAGES]
+    for text in texts:
+        assert pages.filled(text, numbers) == text, "make it anew: python docs/tasks_page.py"
+        assert pages.filled(text, other) != text
+    assert [name for name in pages.TEXTS if f"<!-- {name} -->" not in "".join(texts)] == []
 
 
 @pytest.mark.check
@@ -243,7 +245,7 @@ def test_workflows_take_fixed_actions_and_may_only_read():
 
 
 def test_every_script_of_post_is_in_the_list():
-    page = path_of("getting-started").read_text()
+    page = path_of("scripts").read_text()
     scripts = [p.name for p in ROOT.glob("post/*.py") if "def main()" in p.read_text()]
     assert [name for name in scripts if not re.search(rf"^\|.*`{name}`.*\| ", page, re.M)] == []
 

@@ -1,0 +1,58 @@
+"""Copy figures of runs/ into the pages, as small pictures.
+
+    make figures                         or the scripts in runs/ that draw some of the figures
+    python docs/page_figures.py [NAME...]
+
+The script copies the figures with the given names, or all that exist, from runs/figures/ into the
+folders of the pages that show them.  The number of pixels and of colours is reduced.
+"""
+
+import io
+import sys
+from pathlib import Path
+
+from PIL import Image
+
+DOCS = Path(__file__).resolve().parent
+FIGURES = DOCS.parent / "runs" / "figures"
+#: Folder of the page that shows each figure.
+SHOWN = {
+    "first": "tutorials",
+    "scattering": "tutorials",
+    "gas": "tutorials",
+    "mixture": "tutorials",
+    "cooling_velocity": "tutorials",
+    "crater_scan": "tutorials",
+    "lab_frames": "tutorials",
+    "lab_speeds": "tutorials",
+    "cost": "tutorials",
+    "gravity_energy": "tutorials",
+    "gravity_equipartition": "tutorials",
+    "gravity_laws": "tutorials",
+    "gravity_missed": "tutorials",
+}
+WIDTH, COLOURS = 1100, 64
+
+
+def reduced(path: Path) -> bytes:
+    """Return a figure as a PNG file with at most `WIDTH` pixels per row and `COLOURS` colours."""
+    picture = Image.open(path).convert("RGB")
+    if picture.width > WIDTH:
+        height = round(picture.height * WIDTH / picture.width)
+        picture = picture.resize((WIDTH, height), Image.Resampling.LANCZOS)
+    file = io.BytesIO()
+    picture.quantize(COLOURS, dither=Image.Dither.NONE).save(file, format="png", optimize=True)
+    return file.getvalue()
+
+
+def main() -> None:
+    for name in sys.argv[1:] or SHOWN:
+        source = FIGURES / f"{name}.png"
+        if sys.argv[1:] or source.exists():
+            target = DOCS / SHOWN[name] / f"{name}.png"
+            target.write_bytes(reduced(source))
+            print(f"{target.relative_to(DOCS.parent)}: {target.stat().st_size} bytes")
+
+
+if __name__ == "__main__":
+    main()
