@@ -29,6 +29,7 @@ OUTSIDE = {
     "README.md": "readme",
     "CHANGELOG.md": "changelog",
     "CONTRIBUTING.md": "contributing",
+    "CODE_OF_CONDUCT.md": "conduct",
     "input/README.md": "input",
     "runs/README.md": "runs",
     "src/README.md": "src",

@@ -26,7 +26,8 @@ ELSEWHERE = ("http://", "https://", "mailto:", "#")
 
 def path_of(page):
     """Return the path of a page in the root of the project, or anywhere in docs/."""
-    (path,) = [*ROOT.glob(f"{page}.md"), *ROOT.glob(f"docs/**/{page}.md")]
+    root = ROOT / f"{page}.md"
+    (path,) = [root] if root.exists() else ROOT.glob(f"docs/**/{page}.md")
     return path
 
 
