@@ -5,8 +5,9 @@
 The command `make docs` runs this script.  The folder build/docs-sources receives a copy of all
 pages, in which links between pages of different folders are changed to links within the site; the
 site build/docs is made from this copy by Sphinx.  Each README.md of docs/ is the index page of its
-folder, and the pages to which it links, in this order, are the pages of the folder.  A warning of
-Sphinx ends the script with exit code 1, as does a link within the site that leads nowhere.
+folder, and the pages to which it links, in this order, are the pages of the folder.  The same holds
+for a page with a folder of the same name.  A warning of Sphinx ends the script with exit code 1, as
+does a link within the site that leads nowhere.
 """
 
 import json
@@ -128,13 +129,17 @@ class Stage:
         return LINK.sub(lambda found: self.target(page, found[0]), text)
 
     def contents(self, page: str, text: str) -> str:
-        """Return a hidden table of contents: the links of an index page to pages of its folder."""
+        """Return a hidden table of contents: the links of an index page to pages of its folder.
+
+        The folder of a page that is no README has the name of the page.
+        """
         here = posixpath.dirname(page)
+        folder = here if page.endswith("README.md") else page.removesuffix(".md")
         names = []
         for found in re.finditer(r"\]\(([^)\s#]+)\)", text):
             path = posixpath.normpath(posixpath.join(here, found[1]))
             path = f"{path}/README.md" if (ROOT / path).is_dir() else path
-            inner = path in self.pages and path.startswith(f"{here}/") and path != page
+            inner = path in self.pages and path.startswith(f"{folder}/") and path != page
             if inner and self.pages[path] not in names:
                 names.append(self.pages[path])
         more = ["project/index"] if page == "docs/README.md" else []
@@ -158,7 +163,8 @@ class Stage:
                 text = f"# Licence\n\n{text}"
             # Diagrams in the language Mermaid need a script from another machine: they stay text.
             text = self.relinked(page, text).replace("```mermaid", "```text")
-            if page.startswith("docs/") and page.endswith("/README.md"):
+            own = page.startswith("docs/") and page.endswith("/README.md")
+            if own or (ROOT / page).with_suffix("").is_dir():
                 text += self.contents(page, (ROOT / page).read_text(encoding="utf-8"))
             self.write(f"{name}.md", text)
 

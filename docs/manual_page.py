@@ -22,7 +22,7 @@ SECTIONS = {
     "exit": "EXIT STATUS",
     "examples": "EXAMPLES",
 }
-LINK = r"\[\w+\]\(([\w./]+)[^)]*\)"  # a link from docs/reference/input.md to another page
+LINK = r"\[\w+\]\(([\w./]+)[^)]*\)"  # a link from docs/reference/input/ to another page
 FILES = """\
 .SH FILES
 .ad l
@@ -68,7 +68,7 @@ def section(paragraph: str) -> list[str]:
 
 def installed(link: re.Match) -> str:
     """Return the path of the installed page to which a link leads."""
-    return f"PREFIX/share/doc/ricochet/{posixpath.normpath(f'docs/reference/{link[1]}')}"
+    return f"PREFIX/share/doc/ricochet/{posixpath.normpath(f'docs/reference/input/{link[1]}')}"
 
 
 def inputs(program: Path) -> list[str]:
