@@ -10,6 +10,9 @@ for a page with a folder of the same name.  A warning of Sphinx ends the script 
 does a link within the site that leads nowhere.
 """
 
+import argparse
+import contextlib
+import importlib.util
 import json
 import os
 import posixpath
@@ -17,8 +20,11 @@ import re
 import shutil
 import subprocess
 import sys
+import textwrap
+from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
+from unittest import mock
 from urllib.parse import unquote, urlsplit
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -143,7 +149,8 @@ class Stage:
             if inner and self.pages[path] not in names:
                 names.append(self.pages[path])
         more = ["project/index"] if page == "docs/README.md" else []
-        more += ["reference/python/index"] if page == "docs/reference/README.md" else []
+        if page == "docs/reference/README.md":
+            more += ["reference/scripts/index", "reference/python/index"]
         lines = [f"/{name}" for name in [*names, *more]]
         return "\n```{toctree}\n:hidden:\n\n" + "\n".join(lines) + "\n```\n"
 
@@ -213,6 +220,100 @@ class Stage:
             f"```{{toctree}}\n:maxdepth: 1\n\n{lines}\n```\n",
         )
 
+    def write_script_pages(self) -> None:
+        """Write a page for each script in post/ from its parser."""
+        drawn = self.figures_of_scripts()
+        names = []
+        for path in sorted((ROOT / "post").glob("*.py")):
+            parser = parser_of(path)
+            if parser is None:
+                continue
+            names.append(path.stem)
+            text = f"# {path.name}\n\n{prose(parser.description or '')}\n\n## Options\n\n"
+            text += "| option | meaning |\n|---|---|\n" + "".join(options_of(parser))
+            for figure in drawn.get(path.stem, []):
+                text += f"\n![{figure}]({posixpath.relpath(figure, 'docs/reference/scripts')})\n"
+            self.pages[f"docs/reference/scripts/{path.stem}.md"] = f"reference/scripts/{path.stem}"
+            page = self.relinked(f"docs/reference/scripts/{path.stem}.md", text)
+            self.write(f"reference/scripts/{path.stem}.md", page)
+        lines = "\n".join(names)
+        self.write(
+            "reference/scripts/index.md",
+            "# Options of each script\n\nThese pages are generated from the parsers of the scripts "
+            "in `post/`; `--help` prints the same\ntext.\n\n"
+            f"```{{toctree}}\n:maxdepth: 1\n\n{lines}\n```\n",
+        )
+
+    def figures_of_scripts(self) -> dict[str, list[str]]:
+        """Return the figures on the pages that the scripts in runs/ draw with each script."""
+        shown = {path.name: path.relative_to(ROOT).as_posix() for path in DOCS.rglob("*.png")}
+        found: dict[str, list[str]] = {}
+        for path in sorted((ROOT / "runs").glob("*.sh")):
+            text = path.read_text(encoding="utf-8").replace("\\\n", " ")
+            for line in text.splitlines():
+                script = re.search(r"post/(\w+)\.py", line)
+                name = re.search(r"\$figures/([\w-]+\.png)", line)
+                if script and name and name[1] in shown:
+                    found.setdefault(script[1], []).append(shown[name[1]])
+        return found
+
+
+class ParserFoundError(Exception):
+    """Raised when a script parses its command line."""
+
+
+def parser_of(path: Path) -> argparse.ArgumentParser | None:
+    """Return the parser of a script, or None; the script is not executed beyond its parsing."""
+    source = importlib.util.spec_from_file_location(f"script_{path.stem}", path)
+    module = importlib.util.module_from_spec(source)
+    source.loader.exec_module(module)
+    if not hasattr(module, "main"):
+        return None
+    found: list[argparse.ArgumentParser] = []
+
+    def parse(self: argparse.ArgumentParser, *_: object) -> None:
+        found.append(self)
+        raise ParserFoundError
+
+    with (
+        mock.patch.object(argparse.ArgumentParser, "parse_known_args", parse),
+        mock.patch.object(sys, "argv", [path.name]),
+        contextlib.suppress(ParserFoundError),
+    ):
+        module.main()
+    return found[0] if found else None
+
+
+def escaped(text: str) -> str:
+    """Return a text without characters that have a meaning in Markdown, except in code."""
+    parts = re.split(r"(`[^`]*`)", text)
+    return "".join(
+        part if part.startswith("`") else re.sub(r"([*_<>|$\\\[\]])", r"\\\1", part)
+        for part in parts
+    )
+
+
+def prose(description: str) -> str:
+    """Return the description of a script as Markdown; indented lines are code."""
+    paragraphs = re.split(r"\n\s*\n", description.strip())
+    code = [paragraph.startswith("    ") for paragraph in paragraphs]
+    return "\n\n".join(
+        f"```text\n{textwrap.dedent(one)}\n```" if is_code else escaped(one)
+        for one, is_code in zip(paragraphs, code, strict=True)
+    )
+
+
+def options_of(parser: argparse.ArgumentParser) -> Iterator[str]:
+    """Return a row of a table for each option of a parser."""
+    for action in parser._actions:
+        if action.dest == "help" or action.help == argparse.SUPPRESS:
+            continue
+        value = action.metavar or ("" if action.nargs == 0 else action.dest.upper())
+        value = " ".join(value) if isinstance(value, tuple) else value
+        names = ", ".join(f"`{name}`" for name in action.option_strings)
+        title = f"{names} {escaped(value)}" if names else f"`{value}`"
+        yield f"| {title.strip()} | {escaped(' '.join((action.help or '').split()))} |\n"
+
 
 class Page(HTMLParser):
     """The links and the anchors of a page of the site."""
@@ -260,6 +361,7 @@ def main(build: Path) -> int:
     stage.copy_pages()
     stage.write_project_index()
     stage.write_python_reference()
+    stage.write_script_pages()
     stage.tidy()
     own = {"RICOCHET": str(build / "ricochet"), "PYTHONPATH": str(ROOT / "post")}
     environment = os.environ | own | {"RICOCHET_SITE_CACHE": str(build / "docs-cache")}

@@ -55,6 +55,12 @@ def test_the_input_pages_are_current(program):
     } <= {*pages}
 
 
+def test_the_other_reference_pages_are_current(program):
+    pages = script_in_docs("reference_pages").pages(program)
+    old = [path for path, text in pages.items() if (ROOT / path).read_text() != text]
+    assert old == [], "make them anew: python docs/reference_pages.py build/ricochet"
+
+
 def test_the_queues_on_the_page_are_those_of_the_engine(program):
     engine = program.parent / "tests" / "four_disks"
     if not engine.exists():

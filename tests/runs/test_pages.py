@@ -22,7 +22,7 @@ from whole_runs import environment, ran
 BLOCK = re.compile(
     r"^(?:<!-- test: (?P<note>.*?) -->\n+)?```(?P<language>\w*)\n(?P<code>.*?)^```$", re.M | re.S
 )
-LANGUAGES = {"bash", "python", "fortran", "text", "diff", "mermaid"}
+LANGUAGES = {"bash", "python", "fortran", "text", "diff", "mermaid", "c"}
 PAGES = [path for path in sorted(ROOT.glob("docs/*/*.md")) if "```" in path.read_text()]
 RUN = [path for path in PAGES if path.parent.name in ("tutorials", "guides")]
 

@@ -26,6 +26,7 @@ def stage(site, tmp_path_factory):
     made.copy_pages()
     made.write_project_index()
     made.write_python_reference()
+    made.write_script_pages()
     return made
 
 
@@ -81,3 +82,11 @@ def test_every_module_of_the_python_reference_lists_its_names(stage):
     page = (stage.folder / "reference/python/ricochet.md").read_text()
     assert [name for name in ricochet.__all__ if f"   {name}\n" not in page] == []
     assert ".. autofunction:: run\n" in page and ".. autoclass:: Run\n" in page
+
+
+def test_each_script_has_a_page_with_its_options(stage):
+    page = (stage.folder / "reference/scripts/speeds.md").read_text()
+    assert "| `--frames` " in page and "2 \\<v^2\\>^2" not in page.split("```")[1]
+    scripts = [p.stem for p in (ROOT / "post").glob("*.py") if "def main()" in p.read_text()]
+    pages = {path.stem for path in stage.folder.glob("reference/scripts/*.md")}
+    assert pages == {*scripts, "index"}

@@ -1,0 +1,141 @@
+"""Write the reference pages that are not about input variables.
+
+python docs/reference_pages.py build/ricochet
+
+The script writes docs/reference/c.md from the header src/ricochet.h, docs/reference/inputs.md from
+the input files and input/chooser.json, and the help text in docs/reference/command-line.md.
+"""
+
+import json
+import re
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+C_HEAD = """\
+# C interface
+
+This page is the reference for programs in C, or in any language that can call C, which contain the
+engine as a library. `make library` builds `build/libricochet.so` and `build/libricochet_files.so`;
+`docs/reference_pages.py` generates this page from the header `ricochet.h`.
+
+## Example
+
+"""
+INPUTS_HEAD = """\
+# Inputs
+
+This page is a gallery of the files in `input/`, for everybody who looks for an experiment to start
+from. Each file is ready to run, and its comments explain the settings. A picture shows the
+simulation at one time; `make lab` shows it moving. `docs/reference_pages.py` generates this page.
+
+"""
+
+
+def c_page() -> str:
+    """Return the text of the page on the C interface."""
+    header = (ROOT / "src" / "ricochet.h").read_text(encoding="utf-8")
+    intro, _, rest = header.partition("*/\n")
+    first, _, more = intro.partition("\n\n       ")
+    example, _, notes = more.partition("\n\n   A handle")
+    example, notes = f"       {example}", f"   A handle{notes}"
+    about = first.rpartition("\n\n")[2].strip()
+    lines = [C_HEAD + about, "", "```c", textwrap.dedent(example).rstrip(), "```", ""]
+    lines += ["## Rules", "", textwrap.dedent(notes).strip(), "", "## Functions", ""]
+    for comment, code in re.findall(r"/\* (.*?) \*/\n((?:(?!/\*)[^\n]+\n)*)", rest, re.DOTALL):
+        if comment.startswith("---"):
+            lines += [f"## {comment.strip('- ')}", ""]
+            continue
+        name = re.search(r"(\w+)\(", code)
+        if not name:
+            continue
+        words, values, returns = parts_of(comment)
+        lines += [
+            f"### `{name[1]}`",
+            "",
+            "```c",
+            code.replace("#endif", "").strip(),
+            "```",
+            "",
+            words,
+            "",
+        ]
+        lines += [f"- `{argument}`: {meaning}" for argument, meaning in values]
+        lines += [""] * bool(values) + [returns, ""] * bool(returns)
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def parts_of(comment: str) -> tuple[str, list[tuple[str, str]], str]:
+    """Return the description, the arguments and the end of a comment of the header."""
+    words: list[str] = []
+    values: list[tuple[str, str]] = []
+    returns: list[str] = []
+    for line in comment.splitlines():
+        text = line.strip()
+        argument = re.match(r"   (\w+): {2,}(.*)", line)
+        if argument:
+            values.append((argument[1], argument[2]))
+        elif values and not returns and line.startswith("     "):
+            name, meaning = values[-1]
+            values[-1] = name, f"{meaning} {text}"
+        elif values or returns:
+            returns.append(text)
+        else:
+            words.append(text)
+    return " ".join(words), values, " ".join(returns)
+
+
+def summary(path: Path) -> str:
+    """Return the first line of an input file, which describes the system."""
+    return path.read_text(encoding="utf-8").splitlines()[0].lstrip("! ").rstrip(".")
+
+
+def inputs_page() -> str:
+    """Return the text of the gallery of input files."""
+    chooser = json.loads((ROOT / "input" / "chooser.json").read_text(encoding="utf-8"))
+    subjects: dict[str, list[str]] = {}
+    for name, entry in chooser.items():
+        subjects.setdefault(entry["subject"], []).append(name)
+    names = {path.stem for path in (ROOT / "input").glob("*.nml")}
+    subjects["Others"] = sorted(names - chooser.keys())
+    lines = [INPUTS_HEAD]
+    for subject, members in subjects.items():
+        lines += [f"## {subject}", "", "| | input | system |", "|---|---|---|"]
+        for name in members:
+            picture = f"input/pictures/{name}.png"
+            shown = f"![{name}](../../{picture})" if (ROOT / picture).exists() else ""
+            about = summary(ROOT / "input" / f"{name}.nml").replace("|", "\\|")
+            lines.append(f"| {shown} | [{name}.nml](../../input/{name}.nml) | {about}. |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def command_page(program: Path) -> str:
+    """Return the text of the page on the command line with the help text of the program."""
+    page = (ROOT / "docs/reference/command-line.md").read_text(encoding="utf-8")
+    said = subprocess.run([program, "--help"], check=True, capture_output=True, text=True).stdout
+    before, start, rest = page.partition("<!-- help -->\n")
+    end = rest.partition("<!-- end -->")[2]
+    return f"{before}{start}```text\n{said.strip()}\n```\n<!-- end -->{end}"
+
+
+def pages(program: Path) -> dict[str, str]:
+    """Return the text of each page by its path."""
+    return {
+        "docs/reference/c.md": c_page(),
+        "docs/reference/inputs.md": inputs_page(),
+        "docs/reference/command-line.md": command_page(program),
+    }
+
+
+def main() -> None:
+    if len(sys.argv) != 2:
+        raise SystemExit(__doc__)
+    for path, text in pages(Path(sys.argv[1]).resolve()).items():
+        (ROOT / path).write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
