@@ -92,7 +92,7 @@ contains
   pure function around(self, k, now) result(number)
     class(images_t), intent(in) :: self
     integer, intent(in) :: k                    !! number of the image, starting at 1
-    real(real64), intent(in), optional :: now   !! time since the epoch; needed in a sheared box [time]
+    real(real64), intent(in), optional :: now   !! time relative to `box%epoch`; needed in a sheared box [time]
     real(real64) :: number(2)
     integer :: reach(2)
 
@@ -108,7 +108,7 @@ contains
   pure function displacement(self, rows, now)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: rows
-    real(real64), intent(in) :: now             !! time since the epoch [time]
+    real(real64), intent(in) :: now             !! time relative to `box%epoch` [time]
     real(real64) :: displacement                !! [length]
 
     displacement = rows*(self%offset + self%velocity*now)
@@ -134,7 +134,7 @@ contains
   pure function nearest_image(self, dx, now) result(number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: dx(2)           !! [length]
-    real(real64), intent(in), optional :: now   !! time since the epoch; needed in a sheared box [time]
+    real(real64), intent(in), optional :: now   !! time relative to `box%epoch`; needed in a sheared box [time]
     real(real64) :: number(2)
 
     number = 0

@@ -28,7 +28,7 @@ module side_motion
   type :: side_state_t
     real(real64) :: position = 0.0_real64            !! displacement inwards from the mean position, at the time `clock` [length]
     real(real64) :: velocity = 0.0_real64            !! velocity inwards, at the time `clock` [length/time]
-    real(real64) :: clock = 0.0_real64               !! time, since the epoch, to which position and velocity refer [time]
+    real(real64) :: clock = 0.0_real64               !! time of position and velocity, relative to `box%epoch` [time]
   end type side_state_t
 
   type :: side_motion_t
