@@ -145,7 +145,9 @@ class Stage:
         for found in re.finditer(r"\]\(([^)\s#]+)\)", text):
             path = posixpath.normpath(posixpath.join(here, found[1]))
             path = f"{path}/README.md" if (ROOT / path).is_dir() else path
-            inner = path in self.pages and path.startswith(f"{folder}/") and path != page
+            rest = path.removeprefix(f"{folder}/")
+            inner = path in self.pages and path != page and rest != path
+            inner = inner and "/" not in rest.removesuffix("/README.md")
             if inner and self.pages[path] not in names:
                 names.append(self.pages[path])
         more = ["project/index"] if page == "docs/README.md" else []
@@ -170,6 +172,7 @@ class Stage:
                 text = f"# Licence\n\n{text}"
             # Diagrams in the language Mermaid need a script from another machine: they stay text.
             text = self.relinked(page, text).replace("```mermaid", "```text")
+            text = with_cards(text)
             own = page.startswith("docs/") and page.endswith("/README.md")
             if own or (ROOT / page).with_suffix("").is_dir():
                 text += self.contents(page, (ROOT / page).read_text(encoding="utf-8"))
@@ -256,6 +259,21 @@ class Stage:
                 if script and name and name[1] in shown:
                     found.setdefault(script[1], []).append(shown[name[1]])
         return found
+
+
+def with_cards(text: str) -> str:
+    """Return a page whose lists after the comment `<!-- cards -->` are grids of cards."""
+
+    def grid(found: re.Match) -> str:
+        cards = [
+            f":::{{grid-item-card}} {title}\n{words[2:3].upper()}{words[3:]}\n:::\n"
+            for title, words in re.findall(
+                r"^- \*\*(.*?)\*\*(.*(?:\n  .*)*)", found[1], re.MULTILINE
+            )
+        ]
+        return "::::{grid} 1 2 2 3\n:gutter: 2\n\n" + "\n".join(cards) + "::::\n"
+
+    return re.sub(r"^<!-- cards -->\n((?:- .*\n(?:  .*\n)*)+)", grid, text, flags=re.MULTILINE)
 
 
 class ParserFoundError(Exception):

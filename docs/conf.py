@@ -30,6 +30,7 @@ html_copy_source = False
 html_show_sourcelink = False
 pygments_style = "default"
 highlight_language = "none"
+smartquotes = False  # they would turn the two hyphens of an option into a dash
 
 myst_enable_extensions = ["colon_fence", "dollarmath", "attrs_block"]
 myst_heading_anchors = 4
