@@ -13,10 +13,10 @@ parts of stress and heat flux are not included.  Within a cell, u is interpolate
 neighbouring cells.  The averages include the frames after the first X collisions per disk, where X
 is the value of --equilibration; by default they include the second half of each run.  Errors are
 determined from the differences between blocks of time, taken from all runs of one input
-(docs/explanation/theory.md).  If a cell contained disks in fewer than two blocks, only its density
-is calculated.  For kT, stress and heat flux, the table contains only cells in which at least three
-disks remain, whichever block of time is left out.  With --species, the fields of one species
-are calculated, relative to the mean flow of that species.
+(docs/explanation/statistics.md).  If a cell contained disks in fewer than two blocks, only its
+density is calculated.  For kT, stress and heat flux, the table contains only cells in which at
+least three disks remain, whichever block of time is left out.  With --species, the fields of one
+species are calculated, relative to the mean flow of that species.
 
 With --grid, the script also draws the stream function psi of the particle flux j = n u, where j_x =
 d psi / dy and j_y = -d psi / dx.  The contour lines of psi are the streamlines of the mean flow.

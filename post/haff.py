@@ -25,7 +25,7 @@ of the run, the fit includes all data later than tau = 2.  The error of `rate` i
 the scatter of the runs.
 
 If the restitution depends on velocity (contact.restitution_law), K is compared with another law,
-which assumes a Maxwell distribution of velocities (docs/explanation/theory.md).  If the restitution
+which assumes a Maxwell distribution of velocities (docs/explanation/laws.md).  If the restitution
 depends on velocity, the table contains no cooling rate.  Instead of the cooling rate, the table
 contains the `exponent` p of the power law K ~ t^-p in the last decade of time; p approaches 5/3. If
 the gas stays homogeneous but K differs from the law by more than 10 % at the end, a warning states

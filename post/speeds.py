@@ -22,11 +22,11 @@ Before the tests, the speeds in each frame are divided by the thermal speed in t
 kinetic energy is conserved, the expected distribution is that of N disks with a fixed total kinetic
 energy; otherwise the Maxwell distribution is expected.  The p-values are determined from random
 samples; the speeds in each sample are divided by the thermal speed of this sample
-(docs/explanation/theory.md). Frames that are close in time contain correlated speeds; therefore the
-number of `independent` speeds is reduced by the statistical inefficiency.  The statistical tests do
-not apply to disks that conserve their angular momentum in a round container.  The last panel shows
-the second Sonine coefficient a2 = <v^4> / (2 <v^2>^2) - 1 against the number of collisions per
-disk.
+(docs/explanation/statistics.md).  Frames that are close in time contain correlated speeds;
+therefore the number of `independent` speeds is reduced by the statistical inefficiency.  The
+statistical tests do not apply to disks that conserve their angular momentum in a round container.
+The last panel shows the second Sonine coefficient a2 = <v^4> / (2 <v^2>^2) - 1 against the number
+of collisions per disk.
 """
 
 from typing import NamedTuple

@@ -25,7 +25,7 @@ formed from the mean mass, the mean diameter and kT.  The theory assumes that th
 colliding disks are independent.  Unless the gas is dense, the predicted viscosities and
 conductivity are accurate to a few per cent, whereas the predicted D is less accurate.  In two
 dimensions no coefficient converges for long times in large boxes.  A fixed total energy of the N
-disks makes the coefficients smaller (docs/explanation/theory.md).  The relative decrease of the
+disks makes the coefficients smaller (docs/explanation/laws.md).  The relative decrease of the
 conductivity is about 6 / N, that of the bulk viscosity 5 / N, and that of the shear viscosity
 2 / N.
 """

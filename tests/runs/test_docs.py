@@ -261,7 +261,7 @@ def test_every_script_of_post_is_in_the_list():
 
 
 def test_the_script_of_a_recipe_works(tmp_path):
-    page = section("inside", "### An observable")
+    page = section("recipes", "## An observable")
     script = re.search(r'    """The largest speed in time.*?launch\(main\)\n', page, re.DOTALL)[0]
     (tmp_path / "fastest.py").write_text(textwrap.dedent(script))
     still = np.zeros((2, 3, 2))
@@ -457,7 +457,7 @@ def test_the_recipes_work(tmp_path):
     for name in ("src", "post", "Makefile", "tests"):
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, tmp_path / name)
-    assert carry_out_recipes(path_of("inside").read_text(), tmp_path) > 30
+    assert carry_out_recipes(path_of("recipes").read_text(), tmp_path) > 30
     ran("git", "init", "-q", cwd=tmp_path, check=True)
     said = ran(sys.executable, "tests/support/check_style.py", cwd=tmp_path)
     assert (said.returncode, said.stdout) == (0, "")

@@ -317,7 +317,7 @@ def drift(run: Run) -> np.ndarray:
 def kt_of(run: Run, energy: np.ndarray) -> np.ndarray:
     """Return kT for total kinetic energies `energy`, an array of any shape.
 
-    The page docs/explanation/theory.md explains when to divide the energy by N and when by N - 1.
+    The page docs/explanation/laws.md explains when to divide the energy by N and when by N - 1.
     """
     return (energy - 0.5 * run.mass.sum() * np.sum(drift(run) ** 2)) / free_disks(run)
 

@@ -389,7 +389,7 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     weights = parts[:, np.where(BY_FRAMES, 0, 1)]
     values, share = jackknife(lambda total: of_sums(total, run, cells), parts, weights)
     # If the total momentum is conserved, the total thermal energy of N disks is smaller than N kT
-    # (docs/explanation/theory.md). Therefore the measured temperature is multiplied by the ratio of
+    # (docs/explanation/laws.md). Therefore the measured temperature is multiplied by the ratio of
     # N to the effective number of disks.
     values[:, NAMES.index("temperature")] *= run.n_disks / free_disks(run)
     for axis, name in enumerate(("kT_x", "kT_y")):
