@@ -31,6 +31,8 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 #: Folder of the site with the pages of the Fortran source, which FORD writes.
 FORTRAN = "fortran"
+#: Pages that Sphinx makes without a source.
+OWN = ("genindex.html", "search.html", "py-modindex.html")
 #: Pages outside of docs/, with their names in the folder `project` of the site.
 OUTSIDE = {
     "README.md": "readme",
@@ -386,6 +388,12 @@ def main(build: Path) -> int:
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-j", "auto"]
     command += ["-c", str(DOCS), "-d", str(build / "docs-doctrees"), str(stage.folder), str(site)]
     status = subprocess.run(command, env=environment, check=False).returncode
+    names = {path.relative_to(stage.folder).with_suffix(".html") for path in stage.written}
+    for path in site.rglob("*.html"):
+        name = path.relative_to(site)
+        made_by_sphinx = name.parts[0] in ("_static", "_downloads", FORTRAN) or name.name in OWN
+        if not made_by_sphinx and name not in names:  # of an earlier call
+            path.unlink()
     if status == 0 and not (site / FORTRAN / "index.html").exists():
         print(f"{site}/{FORTRAN}: the pages of the Fortran source are missing", file=sys.stderr)
         status = 1
