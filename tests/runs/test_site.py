@@ -59,6 +59,14 @@ def test_links_lead_to_pages_and_files_of_the_site(stage):
         stage.target(page, "theorie.md")
 
 
+def test_no_page_is_long():
+    """Pages have at most 400 lines, except those that scripts generate."""
+    generated = [*ROOT.glob("docs/reference/input/*.md"), ROOT / "docs/explanation/validation.md"]
+    pages = [ROOT / "README.md", *(p for p in ROOT.glob("docs/**/*.md") if p not in generated)]
+    assert {p.name: n for p in pages if (n := p.read_text().count("\n")) > 400} == {}
+    assert (ROOT / "README.md").read_text().count("\n") <= 150
+
+
 def test_the_readme_leads_to_each_kind_of_page():
     readme = (ROOT / "README.md").read_text()
     assert [kind for kind in KINDS if f"(docs/{kind}/README.md)" not in readme] == []

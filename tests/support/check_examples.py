@@ -20,9 +20,11 @@ TOUR = ROOT / "docs" / "tutorials" / "tour.ipynb"
 
 
 def blocks_of(section: str) -> list[str]:
-    """Return the Python code in a section: indented blocks with imports or calls."""
-    blocks = re.findall(r"(?:^    .*\n(?:\n(?=    ))?)+", section, re.MULTILINE)
-    return [block for block in map(textwrap.dedent, blocks) if is_python(block)]
+    """Return the Python code in a section: indented blocks with imports or calls, and fences."""
+    fences = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+    marked = [code for language, code in fences.findall(section) if language == "python"]
+    blocks = re.findall(r"(?:^    .*\n(?:\n(?=    ))?)+", fences.sub("", section), re.MULTILINE)
+    return marked + [block for block in map(textwrap.dedent, blocks) if is_python(block)]
 
 
 def is_python(block: str) -> bool:
