@@ -94,7 +94,7 @@ def test_what_a_page_leads_to_and_names_is_there(page):
 
 
 @pytest.mark.parametrize(
-    ("page", "heading"), [("limits", "## Promises"), ("inside", "## Invariants")]
+    ("page", "heading"), [("promises", "## Promises"), ("inside", "## Invariants")]
 )
 def test_promises_are_held_by_tests_and_modules_that_exist(page, heading):
     """The second column of each table names tests, and the third column modules or scripts."""
