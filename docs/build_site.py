@@ -139,12 +139,14 @@ class Stage:
     def contents(self, page: str, text: str) -> str:
         """Return a hidden table of contents: the links of an index page to pages of its folder.
 
-        The folder of a page that is no README has the name of the page.
+        The folder of a page that is no README has the name of the page.  If a page has a section
+        "All pages", only the links of this section count.
         """
         here = posixpath.dirname(page)
         folder = here if page.endswith("README.md") else page.removesuffix(".md")
         names = []
-        for found in re.finditer(r"\]\(([^)\s#]+)\)", text):
+        listed = text.rpartition("## All pages")[2]
+        for found in re.finditer(r"\]\(([^)\s#]+)\)", listed):
             path = posixpath.normpath(posixpath.join(here, found[1]))
             path = f"{path}/README.md" if (ROOT / path).is_dir() else path
             rest = path.removeprefix(f"{folder}/")
@@ -385,7 +387,7 @@ def main(build: Path) -> int:
     stage.tidy()
     own = {"RICOCHET": str(build / "ricochet"), "PYTHONPATH": str(ROOT / "post")}
     environment = os.environ | own | {"RICOCHET_SITE_CACHE": str(build / "docs-cache")}
-    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-j", "auto"]
+    command = [sys.executable, "-m", "sphinx", "-a", "-W", "--keep-going", "-q", "-j", "auto"]
     command += ["-c", str(DOCS), "-d", str(build / "docs-doctrees"), str(stage.folder), str(site)]
     status = subprocess.run(command, env=environment, check=False).returncode
     names = {path.relative_to(stage.folder).with_suffix(".html") for path in stage.written}
