@@ -191,7 +191,8 @@ class Stage:
             "# Project\n\nThese pages are the README files of the folders of the source tree, "
             "written for\nthose who read or change the source code. The pages of the "
             f'<a href="../{FORTRAN}/index.html">Fortran source</a>\nlist every module, type and '
-            f"procedure.\n\n```{{toctree}}\n:maxdepth: 1\n\n{lines}\n```\n",
+            "procedure; they load their style from the network.\n\n"
+            f"```{{toctree}}\n:maxdepth: 1\n\n{lines}\n```\n",
         )
 
     def write_python_reference(self) -> None:
@@ -344,6 +345,7 @@ class Page(HTMLParser):
         """Read a page."""
         super().__init__()
         self.links: list[str] = []
+        self.loaded: list[str] = []
         self.anchors: set[str] = set()
         self.feed(path.read_text(encoding="utf-8"))
 
@@ -351,6 +353,8 @@ class Page(HTMLParser):
         given = dict(attrs)
         self.anchors |= {value for key in ("id", "name") if (value := given.get(key))}
         self.links += [value for key in ("href", "src") if (value := given.get(key))]
+        loaded = given.get("href") if given.get("rel") == "stylesheet" else given.get("src")
+        self.loaded += [loaded] if loaded else []
 
 
 def broken(site: Path) -> list[str]:
@@ -362,6 +366,9 @@ def broken(site: Path) -> list[str]:
     pages = {path: Page(path) for path in site.rglob("*.html") if FORTRAN not in path.parts}
     found = []
     for path, page in pages.items():
+        found += [
+            f"{path.relative_to(site)}: {link}" for link in page.loaded if urlsplit(link).netloc
+        ]
         for link in page.links:
             parts = urlsplit(link)
             if parts.scheme or parts.netloc:

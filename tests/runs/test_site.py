@@ -76,12 +76,13 @@ def test_links_that_lead_nowhere_are_found(site, tmp_path):
     (tmp_path / "a.html").write_text(
         """<h1 id="top">A</h1> <a href="b.html#part">b</a> <a href="#top">top</a>
         <a href="https://example.org">elsewhere</a> <img src="lost.png">
-        <a href="b.html#gone">b</a>"""
+        <a href="b.html#gone">b</a> <script src="https://example.org/a.js"></script>"""
     )
     (tmp_path / "b.html").write_text('<p id="part">B</p><a href="sub/">folder</a>')
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "index.html").write_text("<p>")
-    assert site.broken(tmp_path) == ["a.html: b.html#gone", "a.html: lost.png"]
+    lost = ["b.html#gone", "https://example.org/a.js", "lost.png"]
+    assert site.broken(tmp_path) == [f"a.html: {link}" for link in lost]
 
 
 def test_every_module_of_the_python_reference_lists_its_names(stage):
