@@ -324,6 +324,13 @@ THEORIES = {  # systems in equilibrium, and the number of their theoretical valu
         "&side name = 'left' temperature = 2 /\n&species count = 200 radius = 0.01 speed = 1 /",
         4,
     ),
+    "a flow that thermal walls stop": (
+        "&box boundary = 'periodic', 'wall' /\n&side name = 'top' temperature = 1 /\n"
+        "&side name = 'bottom' temperature = 1 /\n"
+        "&species name = 'a' count = 150 radius = 0.01 velocity = 3, 1 /\n"
+        "&species name = 'b' count = 50 radius = 0.01 velocity = 1, -1 /",
+        5,
+    ),
     "perfectly rough disks": (
         "&contact tangential_restitution = 1 /\n&species count = 200 radius = 0.01 speed = 1 /",
         4,

@@ -46,7 +46,7 @@ from ..reading.reader import Run
 from ..running.simulation import Simulation
 from .estimates import Curve, Estimate, estimate
 from .statistics import FEWEST, correlated_mean
-from .equilibrium import ALONG_WALLS, later, refuse_others, unforced
+from .equilibrium import conserved_momentum, later, refuse_others
 
 __all__ = [
     "Correlator",
@@ -170,8 +170,7 @@ class Correlator:
         self.lags = lags_of(self.times) if lags is None else np.asarray(lags, dtype=float)
         self.reach = REACH * 2 * float(source.radius.mean()) if reach is None else float(reach)
         self.kicked = bool(source.nature & KICKED)
-        walls = "walls" in source.nature and source.nature & ALONG_WALLS
-        self.kept = unforced(source) & (not walls)
+        self.kept = conserved_momentum(source)
         names = source.names if isinstance(source, Run) else source.parameters["species"]
         self.mass, self.names = source.mass, ("all", *names)
         species = np.arange(len(self.names))

@@ -254,6 +254,16 @@ def unforced(source: Run | Simulation) -> np.ndarray:
     return axes & ("sheared" not in nature or "random_walk" in nature)
 
 
+def conserved_momentum(source: Run | Simulation) -> np.ndarray:
+    """Return a mask (2,) of the axes along which no force except noise changes the momentum.
+
+    Unlike the function `unforced`, this function includes the tangential forces that walls with a
+    property in `ALONG_WALLS` exert.
+    """
+    walls = "walls" in source.nature and source.nature & ALONG_WALLS
+    return unforced(source) & (not walls)
+
+
 def comoving(run: Run) -> np.ndarray:
     """Return a mask (2,) of the axes along which motion is relative to the centre of mass.
 

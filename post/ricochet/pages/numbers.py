@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import scipy
 
+from ..analysis.equilibrium import conserved_momentum
 from ..analysis.statistics import SeriesMean, correlated_mean, equilibration
 from ..predictions.walls import virial_pressure
 from ..reading.nature import Nature, bath_temperatures
@@ -185,7 +186,7 @@ def equilibrium_temperature(run: Run, energy: float) -> float | None:
 
 def conserved_drift(run: Run) -> tuple[float, int]:
     """Return the centre-of-mass energy along axes of conserved momentum, and their number."""
-    free = run.periodic & (not run.nature & {"obstacles", "thermostatted"})
+    free = conserved_momentum(run)
     momentum = np.sum(run.mass[:, None] * run.velocity[0], axis=0)
     return float(np.sum(momentum[free] ** 2) / 2 / np.sum(run.mass)), int(np.sum(free))
 
