@@ -1,7 +1,9 @@
-"""Convert a run to a text file that other programs can read.
+"""Convert a run to a file that other programs can read.
 
     python post/export.py runs/gas.h5 -o gas.xyz     extended XYZ, opens in OVITO as a 2D system
     python post/export.py runs/gas.h5 -o gas.csv     one line per disk and frame, for other programs
+    python post/export.py runs/gas.h5 -o gas.gsd     GSD, for HOOMD-blue, freud and OVITO
+    python post/export.py runs/gas.h5 -o gas.lammpstrj     a dump file of LAMMPS
 
 The extended XYZ file contains two position coordinates of each disk; therefore OVITO treats the
 system as two-dimensional. The file also contains the velocity, radius, mass and any further
@@ -12,6 +14,7 @@ full precision.
 from pathlib import Path
 
 from ricochet import Run, RunError
+from ricochet.reading.bridges import write_gsd, write_lammps
 from ricochet.reading.files import destination
 from ricochet.script import chosen_frames, command_line, launch, report
 
@@ -60,20 +63,33 @@ def csv_frame(run: Run, frame: int) -> str:
     )
 
 
+TEXTS = {".xyz": xyz_frame, ".csv": csv_frame}
+
+
+def write_text(run: Run, path: Path, frames: list[int]) -> None:
+    """Write frames to a text file in the format that the end of its name states."""
+    with destination(path).open("w") as file:
+        if path.suffix == ".csv":
+            file.write(",".join([HEAD, *run.disk_data]) + "\n")
+        for frame in tqdm(frames, unit="frame", desc="export", disable=None):
+            file.write(TEXTS[path.suffix](run, frame))
+
+
 def main() -> None:
     parser = command_line(__doc__, "RUN.xyz", one=True, csv=False, frames=None, count=None)
     args = parser.parse_args()
     (run,) = args.runs
     path = args.output or Path(run.path.name).with_suffix(".xyz")
-    if path.suffix not in (".xyz", ".csv"):
-        raise RunError(f"{path}: the name of an export must end in .xyz or .csv")
+    if path.suffix not in (*TEXTS, ".gsd", ".lammpstrj"):
+        raise RunError(f"{path}: an export must end in {', '.join(TEXTS)}, .gsd or .lammpstrj")
     frames = chosen_frames(run, args.frames, args.count)
-    one = csv_frame if path.suffix == ".csv" else xyz_frame
-    with destination(path).open("w") as file:
-        if path.suffix == ".csv":
-            file.write(",".join([HEAD, *run.disk_data]) + "\n")
-        for frame in tqdm(frames, unit="frame", desc="export", disable=None):
-            file.write(one(run, frame))
+    try:
+        if path.suffix in TEXTS:
+            write_text(run, path, frames)
+        else:
+            (write_gsd if path.suffix == ".gsd" else write_lammps)(run, path, frames)
+    except ImportError as problem:
+        raise RunError(f"{path}: {problem}") from None
     report(args, None, [{"export": path, "frames": len(frames), "of": run.n_frames}])
 
 

@@ -1,4 +1,4 @@
-"""Exported runs are opened with OVITO, MDAnalysis and readers of CSV."""
+"""Runs are exchanged with OVITO, MDAnalysis, GSD, LAMMPS, freud, pandas, xarray and CSV."""
 
 import sys
 from pathlib import Path
@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ricochet import Run, mdanalysis_universe
+import ricochet
+from check_examples import examples_of
+from ricochet import Run, RunError, bridges, mdanalysis_universe, structure
 from synthetic_run import ROOT, run_script
 
 
@@ -117,3 +119,244 @@ def test_what_else_disks_have_is_exported_too(simulated):
         assert f":{name}:R:1:" in head
         column = [float(line.split()[7 + k]) for line in lines]
         np.testing.assert_array_equal(column, run.per_disk(name)[-1])
+
+
+WRITERS = {"gsd": bridges.write_gsd, "lammpstrj": bridges.write_lammps}
+READERS = {"gsd": bridges.read_gsd, "lammpstrj": bridges.read_lammps}
+
+
+@pytest.fixture(params=WRITERS)
+def kind(request) -> str:
+    """Return the format of a file; the test is skipped if its package is missing."""
+    if request.param == "gsd":
+        reader("gsd.hoomd")
+    return request.param
+
+
+@pytest.fixture
+def rough(simulated) -> Run:
+    """Return a run of rough disks of two species in a box whose right side moves inwards."""
+    return simulated(
+        "&box lower = -1, 2 upper = 1, 5 boundary = 'wall', 'periodic' / "
+        "&side name = 'right' motion = 'constant_velocity' velocity = 0.5 end_time = 0.5 / "
+        "&species name = 'light' count = 30 radius = 0.05 speed = 1 / "
+        "&species name = 'heavy' count = 9 radius = 0.1 mass = 4 speed = 1 / "
+        "&contact tangential_restitution = 0.5 / &stop time = 0.3 / "
+        "&output frames_every_time = 0.1 /",
+        name="rough",
+    )
+
+
+def test_frames_return_from_files_with_every_bit(run, rough, kind):
+    for one in (run, rough):
+        path = exported(one, f"{one.path.stem}.{kind}")
+        for k in (0, 1, -1):
+            found, frame = READERS[kind](path, k), one[k]
+            assert found.time == frame.time
+            np.testing.assert_array_equal(found.lower, one.lower)
+            np.testing.assert_allclose(found.upper, one.corners_at(frame.time)[1], rtol=1e-15)
+            np.testing.assert_array_equal(found.periodic, one.periodic)
+            exact = {"radius": one.radius, "mass": one.mass, "velocity": frame.velocity}
+            exact |= {"species": [one.names[s - 1] for s in one.species]}
+            exact |= {name: frame.per_disk(name) for name in one.disk_data}
+            for name, values in exact.items():
+                np.testing.assert_array_equal(found.disks[name], values)
+            # A GSD file contains positions relative to the centre of the box.
+            apart = found.disks["position"] - frame.position
+            assert np.abs(apart).max() <= (1e-15 if kind == "gsd" else 0)
+
+
+def test_ovito_opens_gsd_and_lammps_files(run, rough, kind):
+    """OVITO is an independent reader of both formats."""
+    opened = reader("ovito.io").import_file
+    for one in (run, rough):
+        pipeline = opened(str(exported(one, f"{one.path.stem}.{kind}")))
+        assert pipeline.source.num_frames == one.n_frames
+        data = pipeline.compute(one.n_frames - 1)
+        disks, frame = data.particles, one[-1]
+        edges = one.corners_at(frame.time)[1] - one.lower
+        centre = one.lower + edges / 2 if kind == "gsd" else 0
+        close = {"rtol": 1e-14, "atol": 1e-14}
+        np.testing.assert_allclose(disks.positions[...][:, :2] + centre, frame.position, **close)
+        np.testing.assert_allclose(disks["Velocity"][...][:, :2], frame.velocity, **close)
+        np.testing.assert_allclose(disks["Radius"][...], one.radius, rtol=1e-7)
+        np.testing.assert_allclose(disks["Mass"][...], one.mass, rtol=1e-15)
+        np.testing.assert_allclose(np.diag(data.cell[:2, :2]), edges, rtol=1e-7)
+        names = {each.id: each.name for each in disks.particle_types.types}
+        species = [one.names[s - 1] for s in one.species]
+        assert [names[t] for t in disks.particle_types[...]] == species
+        if kind == "gsd":
+            assert data.cell.is2D and data.attributes["ricochet/time"] == frame.time
+        else:
+            assert tuple(data.cell.pbc[:2]) == tuple(one.periodic)
+            assert data.attributes["Time"] == pytest.approx(frame.time, rel=1e-15)
+            if one.disk_data:
+                spin = disks["Angular Velocity"][...][:, 2]
+                np.testing.assert_allclose(spin, frame.per_disk("angular_velocity"), rtol=1e-14)
+
+
+def test_the_package_gsd_reads_what_is_written(run, tmp_path):
+    hoomd = reader("gsd.hoomd")
+    for precision in ("single", "double"):
+        path = bridges.write_gsd(run, tmp_path / "run.gsd", [-1], precision)
+        with hoomd.open(str(path)) as file:
+            (frame,) = file
+        frame.validate()
+        box = frame.configuration
+        assert box.dimensions == 2 and box.step == run.n_frames - 1
+        half = np.array([*run.edges, 0]) / 2
+        assert np.all(np.abs(frame.particles.position) <= half * (1 + 1e-7))
+        place = frame.particles.position[:, :2] + run.lower + run.edges / 2
+        error = 1e-7 if precision == "single" else 1e-15
+        assert np.abs(place - run.position[-1]).max() < error
+        np.testing.assert_array_equal(frame.particles.image[:, :2], run.image[-1])
+    with pytest.raises(ValueError, match="precision: 'half' is neither"):
+        bridges.write_gsd(run, tmp_path / "run.gsd", precision="half")
+
+
+def test_a_simulation_starts_from_an_imported_frame(run, kind, tmp_path):
+    """A simulation that continues from a file has the same collisions as the original run."""
+    direct = {"box": {"lower": run.lower, "upper": run.upper, "boundary": ["periodic", "wall"]}}
+    direct["species"] = [
+        {"name": one.name, "position": run.position[-1][one.disks],
+         "velocity": run.velocity[-1][one.disks], "radius": one.radius, "mass": one.mass}
+        for one in run.by_species
+    ]  # fmt: skip
+    frame = READERS[kind](exported(run, f"run.{kind}"))
+    starts = ricochet.write_start(tmp_path / "start.txt", **frame.disks)
+    named = direct | {
+        "species": [
+            {"name": name, "file": str(starts), "velocities": "file", "placement": "file"}
+            for name in run.names
+        ]
+    }
+    logs = []
+    for start in (direct, frame.input(), named):
+        with ricochet.Simulation(start | {"stop": {"collisions": 30}}) as box:
+            pairs: list = []
+            box.advance(on_event=lambda event, pairs=pairs: pairs.append((event.i, event.j)))
+            logs.append(pairs)
+    assert logs[0] == logs[1] == logs[2] and len(logs[0]) >= 30
+
+
+def test_dump_files_of_lammps_itself_are_read(tmp_path):
+    """The fields are in any order, scaled or unwrapped; ids are not in order; there is no time."""
+    head = "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n3\nITEM: BOX BOUNDS {} {} pp\n"
+    head += "-1.0e+00 1.0e+00\n0 4\n-0.5 0.5\nITEM: ATOMS "
+    rows = "id type xs ys zs vx vy diameter\n3 2 0.5 0.25 0.5 1 2 0.2\n1 1 0 1 0.5 3 4 0.1\n"
+    rows += "2 1 0.25 0.5 0.5 5 6 0.3\n"
+    own = "type yu xu id\n1 4.5 3.5 1\n2 1 0 2\n1 -0.5 -1.5 3\n"
+    path = tmp_path / "own.dump"
+    path.write_text(head.format(100, "pp", "ff") + rows + head.format(200, "pp", "pp") + own)
+    first, last = bridges.read_lammps(path, 0), bridges.read_lammps(path)
+    assert (first.time, last.time) == (100, 200)
+    assert first.periodic.tolist() == [True, False] and last.periodic.tolist() == [True, True]
+    assert first.disks["position"].tolist() == [[-1, 4], [-0.5, 2], [0, 1]]
+    assert first.disks["velocity"].tolist() == [[3, 4], [5, 6], [1, 2]]
+    assert first.disks["radius"].tolist() == [0.05, 0.15, 0.1]
+    assert first.disks["species"].tolist() == ["1", "1", "2"]
+    assert [group["name"] for group in first.input()["species"]] == ["type1", "type2"]
+    assert last.disks["position"].tolist() == [[-0.5, 0.5], [0, 1], [0.5, 3.5]]
+    assert "velocity" not in last.disks and "radius" not in last.disks
+
+
+def test_gsd_files_of_hoomd_itself_are_read(tmp_path):
+    hoomd = reader("gsd.hoomd")
+    frame = hoomd.Frame()
+    frame.configuration.step, frame.configuration.dimensions = 7, 2
+    frame.configuration.box = [4, 2, 0, 0, 0, 0]
+    frame.particles.N, frame.particles.types = 2, ["A", "B"]
+    frame.particles.typeid, frame.particles.position = [1, 0], [[1, -0.5, 0], [-1, 0.5, 0]]
+    frame.particles.type_shapes = [{"type": "Sphere", "diameter": d} for d in (0.5, 0.25)]
+    with hoomd.open(str(tmp_path / "own.gsd"), "w") as file:
+        file.append(frame)
+        frame.configuration.box = [4, 2, 0, 0.5, 0, 0]
+        file.append(frame)
+        frame.configuration.box, frame.configuration.dimensions = [4, 2, 2, 0, 0, 0], 3
+        frame.particles.position = [[1, -0.5, 0], [-1, 0.5, 0.5]]
+        file.append(frame)
+    found = bridges.read_gsd(tmp_path / "own.gsd", 0)
+    assert (
+        found.time == 7 and found.periodic.all() and found.disks["species"].tolist() == ["B", "A"]
+    )
+    assert found.lower.tolist() == [-2, -1] and found.disks["radius"].tolist() == [0.125, 0.25]
+    for k, reason in ((1, "its box is tilted"), (2, "is three-dimensional"), (9, "has no frame 9")):
+        with pytest.raises(RunError, match=reason):
+            bridges.read_gsd(tmp_path / "own.gsd", k)
+
+
+TORN = "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n1\nITEM: BOX BOUNDS pp pp pp\n0 1\n0 1\n0 1\n"
+WRONG = {
+    "": "has no frame -1; it is no dump file of LAMMPS",
+    TORN: "has no ITEM: ATOMS",
+    TORN + "ITEM: ATOMS id x y\n": "is cut short: a frame does not consist of 1 lines of 3 columns",
+    TORN + "ITEM: ATOMS id x y\n1 2\n": "is cut short",
+    TORN + "ITEM: ATOMS id q\n1 2\n": r"has no columns x and y \(or xu and yu, or xs and ys\)",
+    TORN + "ITEM: ATOMS x y\n1 a\n": r"frame -1 is damaged \(could not convert",
+    TORN.replace("BOUNDS", "BOUNDS xy xz yz") + "ITEM: ATOMS x y\n1 1\n": "its box is tilted",
+    TORN.replace("ATOMS\n1", "ATOMS\n2") + "ITEM: ATOMS x y z\n0 0 1\n1 1 0\n": "three-dimensional",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_a_wrong_dump_file_is_answered_in_one_line(text, tmp_path):
+    (tmp_path / "a.dump").write_text(text)
+    with pytest.raises(RunError, match=WRONG[text]) as problem:
+        bridges.read_lammps(tmp_path / "a.dump")
+    assert str(problem.value).startswith(str(tmp_path)) and "\n" not in str(problem.value)
+    with pytest.raises(RunError, match="no such file"):
+        bridges.read_lammps(tmp_path / "b.dump")
+
+
+def test_what_cannot_be_exchanged_is_answered_in_one_line(simulated, tmp_path, monkeypatch, capsys):
+    words = ("box.shear_rate=1", "box.boundary=periodic,periodic", "stop.collisions_per_disk=1")
+    sheared = simulated(ROOT / "input/lab.nml", "stop.events=", *words)
+    assert run_script("export", sheared.path, "-o", tmp_path / "a.lammpstrj") == 1
+    assert "LAMMPS dump files are written of rectangular boxes only" in capsys.readouterr().err
+    assert run_script("export", sheared.path, "-o", tmp_path / "a.pdb") == 2
+    assert "must end in .xyz, .csv, .gsd or .lammpstrj" in capsys.readouterr().err
+    monkeypatch.setitem(sys.modules, "gsd", None)  # as if it were not installed
+    assert run_script("export", sheared.path, "-o", tmp_path / "a.gsd") == 2
+    assert "a.gsd: write_gsd needs a package: pip install gsd\n" in capsys.readouterr().err
+    with pytest.raises(ImportError, match="read_gsd needs a package: pip install gsd"):
+        bridges.read_gsd(tmp_path / "a.gsd")
+
+
+def examples(heading: str) -> list[str]:
+    """Return the Python examples below a heading of the page on output."""
+    page = (ROOT / "docs" / "output.md").read_text()
+    return examples_of(page.partition(f"\n### {heading}\n")[2].partition("\n#")[0])
+
+
+@pytest.fixture
+def at_root(program, tmp_path, monkeypatch):
+    """Change to a folder in which the examples of the pages find the inputs."""
+    monkeypatch.setenv("RICOCHET", str(program))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "input").symlink_to(ROOT / "input")
+    (tmp_path / "runs").mkdir()
+
+
+@pytest.mark.usefixtures("at_root")
+def test_the_example_of_an_imported_frame_works():
+    (code,) = examples("Disks of other programs")
+    found: dict = {}
+    exec(code, found)
+    assert len(Path("runs/first.txt").read_text().splitlines()) == found["first"].n_disks + 1
+    assert found["frame"].time == found["first"].time[-1]
+
+
+@pytest.mark.usefixtures("at_root")
+def test_freud_finds_the_order_that_this_package_finds():
+    """The package freud calculates in single precision."""
+    reader("freud")
+    (code,) = examples("freud")
+    found: dict = {}
+    exec(code, found)
+    run, g = found["fluid"], found["g"]
+    close = {"atol": 2e-4}
+    np.testing.assert_allclose(found["psi6"], structure.bond_order(run, -1), **close)
+    edges = g.bin_edges / (2 * run.radius[0])
+    own = structure.pair_correlation(run, -1, edges.astype(float))
+    assert len(own) == 50 and np.nanmax(own) > 1.4
+    np.testing.assert_allclose(g.rdf[1:], own[1:], atol=0.03)

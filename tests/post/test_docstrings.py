@@ -64,6 +64,7 @@ def names(request, tmp_path_factory):
         "rough_runs": [made(f"rough_{k}", GAS, **{"run.seed": k}, **ROUGH) for k in (1, 2)],
         "small": {"species": {"count": 20, "radius": 0.01, "speed": 1}, "stop": {"collisions": 20}},
         "has_xarray": bool(find_spec("xarray")),
+        "has_gsd": bool(find_spec("gsd")),
         "has_mdanalysis": bool(find_spec("MDAnalysis")),
         "walled_run": made("walls", GAS, **{"box.boundary": ("wall", "wall")}),
         **{name: import_module(f"ricochet.{name}") for name in MODULES},

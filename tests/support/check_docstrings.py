@@ -12,6 +12,7 @@ from importlib import import_module
 from types import FunctionType
 
 MODULES = (
+    "bridges",
     "estimates",
     "statistics",
     "structure",

@@ -1,16 +1,42 @@
-"""Conversion of runs to data types of other packages.
+"""Exchange of disks with other programs: MDAnalysis, GSD files, dump files of LAMMPS.
 
 Conversion for pandas and xarray is implemented by `Run.to_dataframe` and `Run.to_xarray`.
 """
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import numpy as np
 
+from .arrays import Index, chosen
+from .files import RunError, destination
+from .nature import Refused
 from .reader import Run
 
 if TYPE_CHECKING:
     import MDAnalysis
+
+__all__ = [
+    "ImportedFrame",
+    "mdanalysis_universe",
+    "read_gsd",
+    "read_lammps",
+    "write_gsd",
+    "write_lammps",
+]
+
+TOLERANCE = 1e-6  # largest |z| of a system in two dimensions, relative to the largest edge
+CLOSED = "ff"  # word of a LAMMPS dump for an axis with walls
+#: Columns of a LAMMPS dump that have other names in Ricochet.
+NAMES = {"angular_velocity": "omegaz"}
+#: Items of a LAMMPS dump whose names are followed by further words.
+ITEMS = ("ATOMS", "BOX BOUNDS")
+#: Columns of a LAMMPS dump that contain numbers and are read.
+NUMBERS = {f"{axis}{end}" for axis in "xyz" for end in ("", "u", "s", "su")}
+NUMBERS |= {"vx", "vy", "radius", "diameter", "mass", "omegaz", "orientation"}
+#: For each item of a frame: the further words in its first line, and the words of its other lines.
+Items = dict[str, tuple[list[str], list[list[str]]]]
 
 
 def mdanalysis_universe(run: Run) -> "MDAnalysis.Universe":
@@ -47,3 +73,422 @@ def mdanalysis_universe(run: Run) -> "MDAnalysis.Universe":
     universe.add_TopologyAttr("radii", run.radius)
     universe.add_TopologyAttr("types", [run.names[s - 1] for s in run.species])
     return universe
+
+
+class ImportedFrame(NamedTuple):
+    """Disks that another program has written, at one time.
+
+    The arrays in `disks` have the names of the parameters of `ricochet.write_start`: "position",
+    "velocity" (N, 2), "radius", "mass", "angular_velocity", "orientation" (N,) as far as the file
+    contains them, and "species" (N,), the names of the species.
+    """
+
+    time: float
+    lower: np.ndarray  # (2,) corner of the box
+    upper: np.ndarray  # (2,)
+    periodic: np.ndarray  # (2,) bool
+    disks: dict[str, np.ndarray]
+
+    def input(self) -> dict[str, Any]:
+        """Return the box and the species as groups of an input, which may be completed and run.
+
+        Returns
+        -------
+        dict
+            the groups "box" and "species", for `ricochet.run` and `ricochet.Simulation`
+
+        Examples
+        --------
+        >>> path = ricochet.bridges.write_lammps(run, folder / "gas.lammpstrj")
+        >>> gas = ricochet.bridges.read_lammps(path).input()
+        >>> with ricochet.Simulation(gas) as box:
+        ...     box.n_disks == run.n_disks, box.advance(events=10).events
+        (True, 10)
+        """
+        boundary = ["periodic" if axis else "wall" for axis in self.periodic]
+        box = {"lower": self.lower.tolist(), "upper": self.upper.tolist(), "boundary": boundary}
+        kinds, groups = self.disks["species"], []
+        for kind in dict.fromkeys(kinds.tolist()):
+            own = {key: values[kinds == kind] for key, values in self.disks.items()}
+            own["name"] = kind if kind[:1].isalpha() else f"type{kind}"
+            groups.append({key: value for key, value in own.items() if key != "species"})
+        return {"box": box, "species": groups}
+
+
+def refuse_sheared(run: Run, kind: str) -> None:
+    """Raise Refused if the box of a run is not a rectangle that is repeated periodically."""
+    if run.shear_rate:
+        why = "the copies of a sheared box are displaced, and"
+        raise Refused(f"{run.path}: {why} {kind} files are written of rectangular boxes only")
+
+
+# --- GSD ---
+
+
+def gsd_package(user: str) -> Any:
+    """Import the module `gsd.hoomd`, or raise an ImportError with the command that installs it."""
+    try:
+        import gsd.hoomd
+    except ImportError:
+        raise ImportError(f"{user} needs a package: pip install gsd") from None
+    return gsd.hoomd
+
+
+def write_gsd(
+    run: Run, path: str | Path, frames: Index | None = None, precision: str = "double"
+) -> Path:
+    """Write frames to a GSD file in the schema of HOOMD-blue; the package gsd must be installed.
+
+    A GSD file has its origin at the centre of the box, stores the edges of the box in single
+    precision, and contains no walls.  Therefore the time, the corners of the box and the periodic
+    axes are also written, as the logged quantities "ricochet/time", "ricochet/lower",
+    "ricochet/upper" and "ricochet/periodic".  The step of a frame is its number in the run.  The
+    programs freud, OVITO and HOOMD-blue read GSD files.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    path : str or Path
+        the file to write
+    frames : int, slice or list of int, optional
+        frames of the run; by default all
+    precision : {"double", "single"}
+        precision of all real numbers; disks that nearly touch may overlap in single precision
+
+    Returns
+    -------
+    Path
+        the path of the file
+
+    Raises
+    ------
+    ImportError
+        if gsd is not installed
+    Refused
+        if the box of the run is sheared
+
+    Examples
+    --------
+    >>> path = ricochet.bridges.write_gsd(run, folder / "gas.gsd") if has_gsd else None
+    >>> path is None or bool(ricochet.bridges.read_gsd(path).time == run.time[-1])
+    True
+    """
+    package, path = gsd_package("write_gsd"), destination(Path(path))
+    refuse_sheared(run, "GSD")
+    if precision not in ("double", "single"):
+        raise ValueError(f"precision: {precision!r} is neither 'double' nor 'single'")
+    with package.open(str(path), "w", precision=precision) as file:
+        for frame in range(run.n_frames) if frames is None else chosen(run.n_frames, frames):
+            file.append(gsd_frame(package, run, frame))
+    return path
+
+
+def gsd_frame(package: Any, run: Run, frame: int) -> Any:
+    """Return a frame of a run as a frame of the package gsd."""
+    lower, upper = run.corners_at(run.time[frame])
+    found, disks = package.Frame(), run[frame]
+    found.configuration.step, found.configuration.dimensions = frame, 2
+    found.configuration.box = [*(upper - lower), 0, 0, 0, 0]
+    particles = found.particles
+    particles.N, particles.types, particles.typeid = run.n_disks, [*run.names], run.species - 1
+    particles.position = in_space(disks.position - (lower + upper) / 2)
+    particles.velocity = in_space(disks.velocity)
+    particles.mass, particles.diameter = run.mass, 2 * run.radius
+    if run.image is not None:
+        particles.image = in_space(run.image[frame]).astype(np.int32)
+    for name in run.disk_data:
+        found.log[f"particles/{name}"] = disks.per_disk(name)
+    found.log["ricochet/time"] = np.array([run.time[frame]])
+    found.log["ricochet/lower"], found.log["ricochet/upper"] = lower, upper
+    found.log["ricochet/periodic"] = run.periodic.astype(np.uint8)
+    return found
+
+
+def in_space(flat: np.ndarray) -> np.ndarray:
+    """Return vectors (N, 3) with z = 0."""
+    return np.pad(flat, ((0, 0), (0, 1)))
+
+
+def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
+    """Read a frame of a GSD file; the package gsd must be installed.
+
+    If the file was not written by `write_gsd`, the axes are periodic, the origin is at the centre
+    of the box, and the time is the step of the frame.  Other programs often write positions in
+    single precision.  Disks that touch may then overlap by rounding errors, and the program refuses
+    a start with overlaps; radii that are multiplied by 1 - 1e-6 do not overlap.
+
+    Parameters
+    ----------
+    path : str or Path
+        a GSD file in the schema of HOOMD-blue, in two dimensions
+    frame : int
+        number of the frame, counted from 0, or from the end if it is negative
+
+    Returns
+    -------
+    ImportedFrame
+        the disks, and the box
+
+    Raises
+    ------
+    ImportError
+        if gsd is not installed
+    RunError
+        if the file is not a GSD file of disks in a rectangle
+
+    Examples
+    --------
+    >>> path = ricochet.bridges.write_gsd(run, folder / "all.gsd", [0]) if has_gsd else None
+    >>> disks = ricochet.bridges.read_gsd(path).disks if has_gsd else {"radius": run.radius}
+    >>> bool(np.all(disks["radius"] == run.radius))
+    True
+    """
+    package, path = gsd_package("read_gsd"), Path(path)
+    try:
+        with package.open(str(path), "r") as file:
+            count = len(file)
+            found = file[frame] if -count <= frame < count else None
+    except FileNotFoundError:
+        raise RunError(f"{path}: no such file") from None
+    except (OSError, RuntimeError) as problem:
+        raise RunError(f"{path}: cannot be read as a GSD file ({problem})") from None
+    if found is None:
+        raise RunError(f"{path}: has no frame {frame}; it has {count} frames")
+    box, particles, log = found.configuration.box, found.particles, found.log
+    width, height, *_, xy, xz, yz = box.tolist()
+    if any((xy, xz, yz)):
+        raise RunError(f"{path}: its box is tilted; only rectangular boxes can be read")
+    edges = np.array([width, height])
+    in_plane(path, particles.position[:, 2], edges)
+    lower = np.asarray(log.get("ricochet/lower", -edges / 2), dtype=float)
+    upper = np.asarray(log.get("ricochet/upper", edges / 2), dtype=float)
+    periodic = np.asarray(log.get("ricochet/periodic", (1, 1))).astype(bool)
+    (time,) = np.ravel(log.get("ricochet/time", float(found.configuration.step))).tolist()
+    types = np.array(particles.types)
+    disks = {"position": particles.position[:, :2] + (lower + upper) / 2}
+    disks |= {"velocity": particles.velocity[:, :2], "mass": particles.mass}
+    disks["radius"] = gsd_diameters(particles) / 2
+    own = ("angular_velocity", "orientation")
+    disks |= {one: log[f"particles/{one}"] for one in own if f"particles/{one}" in log}
+    disks = {name: np.array(values, dtype=float) for name, values in disks.items()}
+    disks["position"] = wrapped(disks["position"], lower, upper - lower, periodic)
+    return ImportedFrame(time, lower, upper, periodic, disks | {"species": types[particles.typeid]})
+
+
+def gsd_diameters(particles: Any) -> np.ndarray:
+    """Return the diameters (N,) of the disks, also where hard-particle runs store them by type."""
+    shapes = [(one or {}).get("diameter") for one in particles.type_shapes or []]
+    if len(shapes) == len(particles.types) and all(shapes):
+        return np.array(shapes, dtype=float)[particles.typeid]
+    return np.asarray(particles.diameter, dtype=float)
+
+
+def in_plane(path: Path, z: np.ndarray, edges: np.ndarray) -> None:
+    """Raise RunError unless all disks have the same z."""
+    if len(z) and np.ptp(z) > TOLERANCE * np.max(edges):
+        raise RunError(f"{path}: is three-dimensional: its particles have different z")
+
+
+def wrapped(
+    position: np.ndarray, lower: np.ndarray, edges: np.ndarray, periodic: np.ndarray
+) -> np.ndarray:
+    """Return positions (N, 2), moved into the box by whole periods along the periodic axes."""
+    outside = (position < lower) | (position >= lower + edges)
+    inside = lower + (position - lower) % edges
+    inside = np.where(inside < lower + edges, inside, lower)  # the rounding of % can return `edges`
+    return np.where(outside & periodic, inside, position)
+
+
+# --- dump files of LAMMPS ---
+
+
+def write_lammps(run: Run, path: str | Path, frames: Index | None = None) -> Path:
+    """Write frames to a text file in the format of the command `dump custom` of LAMMPS.
+
+    The columns are id, type, element (the name of the species), x, y, z, vx, vy, vz, radius, mass,
+    for a periodic box also ix, iy, iz, and for disks that can rotate omegaz and orientation.
+    Numbers are written with full precision.  The time step of a frame is its number in the run, and
+    its time follows after ITEM: TIME.
+
+    Parameters
+    ----------
+    run : Run
+        a run
+    path : str or Path
+        the file to write
+    frames : int, slice or list of int, optional
+        frames of the run; by default all
+
+    Returns
+    -------
+    Path
+        the path of the file
+
+    Raises
+    ------
+    Refused
+        if the box of the run is sheared
+
+    Examples
+    --------
+    >>> path = ricochet.bridges.write_lammps(run, folder / "gas.dump", slice(0, 10))
+    >>> path.read_text().count("ITEM: TIMESTEP")
+    10
+    """
+    refuse_sheared(run, "LAMMPS dump")
+    path = destination(Path(path))
+    with path.open("w") as file:
+        file.write("ITEM: UNITS\nlj\n")
+        for frame in range(run.n_frames) if frames is None else chosen(run.n_frames, frames):
+            file.write(lammps_frame(run, frame))
+    return path
+
+
+def lammps_frame(run: Run, frame: int) -> str:
+    """Return the lines of a frame in a dump file of LAMMPS."""
+    lower, upper = run.corners_at(run.time[frame])
+    sides = np.array([[*lower, -0.5], [*upper, 0.5]]).T.tolist()
+    disks, zero = run[frame], [0] * run.n_disks
+    names = [run.names[s - 1].replace(" ", "_") for s in run.species]
+    columns: dict[str, list[Any]] = {"id": [*range(1, run.n_disks + 1)]}
+    columns |= {"type": run.species.tolist(), "element": names}
+    for head, vectors in (("", disks.position), ("v", disks.velocity)):
+        x, y = vectors.T.tolist()
+        columns |= {f"{head}x": x, f"{head}y": y, f"{head}z": zero}
+    columns |= {"radius": run.radius.tolist(), "mass": run.mass.tolist()}
+    for name in run.disk_data:
+        columns[NAMES.get(name, name)] = disks.per_disk(name).tolist()
+    if run.image is not None:
+        x, y = run.image[frame].T.tolist()
+        columns |= {"ix": x, "iy": y, "iz": zero}
+    lines = ["ITEM: TIMESTEP", str(frame), "ITEM: TIME", str(float(run.time[frame]))]
+    lines += ["ITEM: NUMBER OF ATOMS", str(run.n_disks)]
+    kinds = ["pp" if axis else CLOSED for axis in run.periodic]
+    lines += [" ".join(["ITEM: BOX BOUNDS", *kinds, "pp"]), *(f"{a} {b}" for a, b in sides)]
+    lines.append(" ".join(["ITEM: ATOMS", *columns]))
+    lines += [" ".join(map(str, row)) for row in zip(*columns.values(), strict=True)]
+    return "\n".join([*lines, ""])
+
+
+def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
+    """Read a frame of a text file of the command `dump` of LAMMPS.
+
+    The file must contain the positions as x and y, xu and yu (unwrapped), or xs and ys (scaled).
+    The columns id, element or type, vx, vy, radius or diameter, mass, omegaz and orientation are
+    read if they exist.  The species has the name of the element, or else of the type.  Without
+    ITEM: TIME, the time is the time step.
+
+    Parameters
+    ----------
+    path : str or Path
+        the dump file
+    frame : int
+        number of the frame, counted from 0, or from the end if it is negative
+
+    Returns
+    -------
+    ImportedFrame
+        the disks, and the box
+
+    Raises
+    ------
+    RunError
+        if the file is not such a file, or its particles are not in a rectangle
+
+    Examples
+    --------
+    >>> path = ricochet.bridges.write_lammps(run, folder / "last.dump", [-1])
+    >>> frame = ricochet.bridges.read_lammps(path)
+    >>> bool(np.all(frame.disks["position"] == run.position[-1]))
+    True
+    >>> ricochet.write_start(folder / "bed.txt", **frame.disks).name
+    'bed.txt'
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            starts = [*frame_starts(file)]
+            if not -len(starts) <= frame < len(starts):
+                count = f"it has {len(starts)} frames" if starts else "it is no dump file of LAMMPS"
+                raise RunError(f"{path}: has no frame {frame}; {count}")
+            file.seek(starts[frame])
+            return imported(path, items_of(file))
+    except FileNotFoundError:
+        raise RunError(f"{path}: no such file") from None
+    except OSError as problem:
+        raise RunError(f"{path}: {problem.strerror}") from None
+    except KeyError as problem:
+        raise RunError(f"{path}: frame {frame} has no ITEM: {problem.args[0]}") from None
+    except (IndexError, ValueError) as problem:
+        raise RunError(f"{path}: frame {frame} is damaged ({problem})") from None
+
+
+def frame_starts(file: BinaryIO) -> Iterator[int]:
+    """Return the place in a dump file at which each frame starts.
+
+    A frame starts with its time step, or with the units and the time that precede the time step.
+    """
+    place, before = 0, False
+    while line := file.readline():
+        if line.startswith(b"ITEM:"):
+            first = line.startswith((b"ITEM: UNITS", b"ITEM: TIME"))
+            if first and not before:
+                yield place
+            before = first
+        place = file.tell()
+
+
+def items_of(file: BinaryIO) -> Items:
+    """Return the items of the frame at which a dump file is open."""
+    items: Items = {}
+    for line in map(bytes.decode, file):
+        if not line.startswith("ITEM:"):
+            next(reversed(items.values()))[1].append(line.split())
+        elif "ATOMS" in items:
+            break
+        else:
+            name = next((one for one in ITEMS if line[6:].startswith(one)), line[6:].strip())
+            items[name] = line[6 + len(name) :].split(), []
+    return items
+
+
+def imported(path: Path, items: Items) -> ImportedFrame:
+    """Return the disks of a frame of a dump file."""
+    kinds, bounds = items["BOX BOUNDS"]
+    if len(kinds) != 3:
+        raise RunError(f"{path}: its box is tilted; only rectangular boxes can be read")
+    lower, upper = np.array(bounds[:2], dtype=float).T
+    periodic = np.array([kind == "pp" for kind in kinds[:2]])
+    columns, rows = items["ATOMS"]
+    count = int(items["NUMBER OF ATOMS"][1][0][0])
+    if len(rows) != count or any(len(row) != len(columns) for row in rows):
+        whole = f"{count} lines of {len(columns)} columns"
+        raise RunError(f"{path}: is cut short: a frame does not consist of {whole}")
+    if "id" in columns:
+        rows.sort(key=lambda row: int(row[columns.index("id")]))
+    text = dict(zip(columns, np.array(rows).reshape(-1, len(columns)).T, strict=True))
+    numbers = {name: text[name].astype(float) for name in NUMBERS & text.keys()}
+    in_plane(
+        path,
+        next((numbers[z] for z in ("z", "zu", "zs") if z in numbers), lower[:0]),
+        upper - lower,
+    )
+    vectors = {
+        way: np.column_stack([numbers[way.format(axis)] for axis in "xy"])
+        for way in ("{}", "{}u", "{}s", "{}su", "v{}")
+        if {way.format(axis) for axis in "xy"} <= numbers.keys()
+    }
+    places = [vectors[way] for way in ("{}", "{}u") if way in vectors]
+    places += [lower + vectors[way] * (upper - lower) for way in ("{}s", "{}su") if way in vectors]
+    if not places:
+        raise RunError(f"{path}: has no columns x and y (or xu and yu, or xs and ys)")
+    disks = {"position": wrapped(places[0], lower, upper - lower, periodic)}
+    disks |= {"velocity": vectors["v{}"]} if "v{}" in vectors else {}
+    disks |= {"radius": numbers["diameter"] / 2} if "diameter" in numbers else {}
+    disks |= {name: numbers[name] for name in ("radius", "mass", "orientation") if name in numbers}
+    disks |= {"angular_velocity": numbers["omegaz"]} if "omegaz" in numbers else {}
+    kind = next((text[name] for name in ("element", "type") if name in text), None)
+    disks["species"] = np.full(count, "disks") if kind is None else kind
+    time = items["TIME" if "TIME" in items else "TIMESTEP"][1][0][0]
+    return ImportedFrame(float(time), lower, upper, periodic, disks)
