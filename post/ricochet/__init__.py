@@ -75,6 +75,7 @@ if TYPE_CHECKING:  # imports for type checkers of the modules that `__getattr__`
     from .reading import arrays as arrays
     from .reading import box as box
     from .reading import bridges as bridges
+    from .reading import contacts as contacts
     from .reading import files as files
     from .reading import frames as frames
     from .reading import layout as layout

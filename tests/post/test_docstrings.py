@@ -66,6 +66,7 @@ def names(request, tmp_path_factory):
         "has_xarray": bool(find_spec("xarray")),
         "has_gsd": bool(find_spec("gsd")),
         "has_mdanalysis": bool(find_spec("MDAnalysis")),
+        "has_pandas": bool(find_spec("pandas")),
         "walled_run": made("walls", GAS, **{"box.boundary": ("wall", "wall")}),
         **{name: import_module(f"ricochet.{name}") for name in MODULES},
         "folder": folder,

@@ -13,6 +13,7 @@ from types import FunctionType
 
 MODULES = (
     "bridges",
+    "contacts",
     "estimates",
     "statistics",
     "structure",

@@ -1,0 +1,187 @@
+"""Contact networks and force chains from the event log of a run.
+
+In an event-driven simulation a force is the momentum that collisions transfer per time.  Disks that
+stay close to each other collide many times in a window of time, and the mean force between them is
+the sum of these impulses divided by the length of the window.
+"""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import scipy
+
+from .files import RunError
+from .reader import Run
+
+if TYPE_CHECKING:
+    import pandas
+
+__all__ = ["ContactNetwork", "chains", "network"]
+
+
+class ContactNetwork(NamedTuple):
+    """Contacts in a window of time: pairs of disks, or a disk and a boundary, that collided.
+
+    All arrays have one row for each of the E contacts.  `j` has the same meaning as in `EventLog`:
+    numbers from 1 are disks, and the contact then has i < j; 0, -1, -2, ... are boundaries.
+    """
+
+    i: np.ndarray  # (E,) id of a disk, counted from 1
+    j: np.ndarray  # (E,)
+    contacts: np.ndarray  # (E,) number of collisions
+    impulse: np.ndarray  # (E,) sum of the magnitudes of the changes of momentum
+    momentum: np.ndarray  # (E, 2) sum of the changes of momentum of disk i
+    start: float  # of the window; a collision at this time is not included
+    end: float  # of the window; a collision at this time is included
+
+    @property
+    def force(self) -> np.ndarray:
+        """Mean force (E,) of each contact: its impulse divided by the length of the window."""
+        return self.impulse / (self.end - self.start)
+
+    @property
+    def pairs(self) -> np.ndarray:
+        """Mask (E,) of the contacts of two disks."""
+        return self.j > 0
+
+    def matrix(self, n_disks: int, quantity: str = "impulse") -> "scipy.sparse.csr_array":
+        """Return a quantity of the contacts of two disks as a symmetric sparse matrix.
+
+        Parameters
+        ----------
+        n_disks : int
+            number N of disks of the run
+        quantity : {"impulse", "contacts", "force"}
+            quantity of the contacts
+
+        Returns
+        -------
+        scipy.sparse.csr_array
+            (N, N) matrix, whose row k belongs to the disk with the id k + 1
+
+        Examples
+        --------
+        >>> found = contacts.network(run)
+        >>> matrix = found.matrix(run.n_disks, "contacts")
+        >>> bool(matrix.sum() == 2 * run.observable("collisions").value[-1])
+        True
+        """
+        pairs, values = self.pairs, np.asarray(getattr(self, quantity))
+        ends = (self.i[pairs] - 1, self.j[pairs] - 1)
+        half = scipy.sparse.coo_array((values[pairs], ends), shape=(n_disks, n_disks))
+        return (half + half.T).tocsr()
+
+    def to_dataframe(self) -> "pandas.DataFrame":
+        """Return the contacts as a pandas DataFrame, which has one row for each contact.
+
+        Returns
+        -------
+        pandas.DataFrame
+            (E, 7) columns i, j, contacts, impulse, force, momentum_x, momentum_y
+
+        Raises
+        ------
+        ImportError
+            if pandas is not installed
+
+        Examples
+        --------
+        >>> table = contacts.network(run, 0.0, 0.1).to_dataframe() if has_pandas else None
+        >>> table is None or bool(np.all(table.contacts > 0))
+        True
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("to_dataframe needs a package: pip install pandas") from None
+        columns = {name: getattr(self, name) for name in ("i", "j", "contacts", "impulse", "force")}
+        columns |= {"momentum_x": self.momentum[:, 0], "momentum_y": self.momentum[:, 1]}
+        return pandas.DataFrame(columns)
+
+
+def network(run: Run, start: float | None = None, end: float | None = None) -> ContactNetwork:
+    """Return the contacts in the window of time start < t <= end from the event log.
+
+    Parameters
+    ----------
+    run : ricochet.Run
+        a run with `output.event_log = .true.`
+    start, end : float, optional
+        the window of time [the whole run]
+
+    Returns
+    -------
+    ContactNetwork
+        one row for each pair of disks, or disk and boundary, that collided in the window
+
+    Raises
+    ------
+    RunError
+        if the run has no event log, or if the window does not lie in the run
+
+    Examples
+    --------
+    >>> found = contacts.network(run, 0.0, 0.1)
+    >>> log = run.event_log()
+    >>> bool(found.contacts.sum() == np.sum((log.time > 0) & (log.time <= 0.1)))
+    True
+    """
+    log, last = run.event_log(), float(max(run.time[-1], run.observable("momentum").time[-1]))
+    start, end = 0.0 if start is None else float(start), last if end is None else float(end)
+    if not 0 <= start < end <= last * (1 + 1e-12):
+        raise RunError(f"{run.path}: has no window from {start:g} to {end:g}; it ends at {last:g}")
+    if log.momentum_change is None:
+        raise RunError(f"{run.path}: its event log has no momentum_change; repeat the run")
+    seen = slice(*np.searchsorted(log.time, (start, end), side="right"))
+    ends = np.column_stack([log.i[seen], log.j[seen]]).astype(np.int64)
+    rows, which, counts = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    which, size = which.ravel(), len(rows)
+    impulse = np.bincount(which, log.impulse[seen], size)
+    parts = [np.bincount(which, part, size) for part in np.transpose(log.momentum_change[seen])]
+    return ContactNetwork(
+        rows[:, 0], rows[:, 1], counts, impulse, np.column_stack(parts), start, end
+    )
+
+
+def chains(found: ContactNetwork, above: float = 1.0, at_least: int = 3) -> list[np.ndarray]:
+    """Return the force chains: groups of disks that are connected by strong contacts.
+
+    A contact of two disks is strong if its impulse exceeds `above` times the mean impulse of all
+    contacts of two disks.  The strong contacts carry the deviatoric load of a granular medium
+    (Radjai and others, Physical Review Letters 80, 61, 1998).
+
+    Parameters
+    ----------
+    found : ContactNetwork
+        the contacts
+    above : float
+        smallest impulse of a strong contact, divided by the mean impulse
+    at_least : int
+        smallest number of disks of a chain
+
+    Returns
+    -------
+    list of numpy.ndarray
+        ids of the disks of each chain, in increasing order; the largest chain comes first
+
+    Examples
+    --------
+    >>> found = contacts.network(run, 0.0, 0.1)
+    >>> sizes = [len(chain) for chain in contacts.chains(found)]
+    >>> sizes == sorted(sizes, reverse=True) and min(sizes) >= 3
+    True
+    """
+    strong = strong_contacts(found, above)
+    ids, ends = np.unique(np.array([found.i[strong], found.j[strong]]), return_inverse=True)
+    edges = (np.ones(strong.sum()), tuple(ends.reshape(2, -1)))
+    graph = scipy.sparse.coo_array(edges, shape=(len(ids), len(ids)))
+    count, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    groups = [ids[part == k] for k in range(count)]
+    return sorted((own for own in groups if len(own) >= at_least), key=len, reverse=True)
+
+
+def strong_contacts(found: ContactNetwork, above: float = 1.0) -> np.ndarray:
+    """Return a mask (E,) of the contacts of two disks that are strong, as in `chains`."""
+    pairs = found.pairs
+    mean = found.impulse[pairs].mean() if pairs.any() else 0.0
+    return pairs & (found.impulse > above * mean)
