@@ -13,8 +13,9 @@ All frames have the same colour scale, which begins at 0, unless --per-frame is 
 the colour scale is logarithmic.  If colours show a quantity other than the species, all disks
 except those of the first species have an outline.  A disk that overlaps a periodic side is drawn on
 both sides of the box.  If disks can rotate, a line from the centre of each disk shows its
-orientation.  Disks that would be too small to be visible are drawn enlarged, and the title states
-the factor.
+orientation.  If the run keeps a frame every so many events or collisions, the title of a panel
+contains their number.  Disks that would be too small to be visible are drawn enlarged, and the
+title states the factor.
 """
 
 import argparse
@@ -40,6 +41,26 @@ def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
         return Normalize(0, 1)
     low, top = np.quantile(moved, (0.005, 0.995))
     return LogNorm(min(low, top / 1.01), top) if log else Normalize(0, top)
+
+
+def count_at(run: Run, frame: int) -> dict[str, int]:
+    """Return the number of events or collisions before a frame, if frames are counted by them."""
+    schedule = run.parameters.get("output", {})
+    if {"frames_at", "frames_per_decade"} & schedule.keys():
+        return {}
+    counted = {"collisions": ("collisions",)}
+    counted["events"] = ("collisions", "side_collisions", "obstacle_collisions")
+    for name, parts in counted.items():
+        if every := schedule.get(f"frames_every_{name}"):
+            total = sum(int(np.sum(run.observable(part).value[-1])) for part in parts)
+            return {name: min(frame * int(every), total)}  # the last frame may follow earlier
+    return {}
+
+
+def moment(run: Run, frame: int) -> str:
+    """Return the time of a frame, after the number of events or collisions if it is known."""
+    counts = [f"{name[:-1]} {number},  " for name, number in count_at(run, frame).items()]
+    return "".join(counts) + f"t = {run.time[frame]:.4g}"
 
 
 def draw_key(axes: plt.Axes, run: Run, arrows: Quiver, longest: float) -> None:
@@ -92,7 +113,7 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
             drawn = axes.quiver(*run.position[frames[k]].T, *run.velocity[frames[k]].T, **arrows)
             if k == 0:
                 draw_key(axes, run, drawn, longest)
-        axes.set_title(f"t = {run.time[frames[k]]:.4g}")
+        axes.set_title(moment(run, frames[k]))
     if colour == "species":
         drawing.species_legend(figure, run)
     else:
@@ -119,7 +140,7 @@ def main() -> None:
     figure = draw(run, frames, drawing.chosen_colour(run, args.colour), args)
     rows = []
     for frame in frames:
-        row = {"frame": frame, "time": float(run.time[frame])}
+        row = {"frame": frame, **count_at(run, frame), "time": float(run.time[frame])}
         row |= {"mean_speed": float(run.speed(frame).mean())}
         rows.append(row | {"kinetic_energy": float(run.kinetic_energy(frame).mean())})
     report(args, figure, rows)

@@ -256,6 +256,25 @@ def test_arrows_have_a_scale_and_a_second_species_an_outline(tmp_path, rng, figu
     assert np.all(np.array(widths) == np.array([0, 0, 0, 1, 1, 1]) * widths[-1]) and widths[-1] > 0
 
 
+def test_panels_contain_the_number_of_events_before_the_frame(tmp_path, figures, simulated):
+    """The numbers agree with the event log, also for the last frame, which follows earlier."""
+    gas = "&species count = 20 radius = 0.02 speed = 1 / &stop events = 57 / "
+    gas += "&output event_log = .true. frames_every_{} = {} /"
+    for name, every in (("events", 20), ("collisions", 10)):
+        run = simulated(gas.format(name, every), name=name)
+        words = ("--frames", "0,1,-1", "-o", tmp_path / "a.png")
+        assert run_script("snapshot", run.path, *words) == 0
+        log, titles = run.event_log(), [axes.get_title("left") for axes in figures[-1].axes[:3]]
+        counted = log.time if name == "events" else log.time[log.j > 0]
+        before = [int(np.sum(counted <= run.time[k])) for k in (0, 1, -1)]
+        assert before[1] == every and before[2] == len(counted)
+        starts = [f"{name[:-1]} {number},  t = " for number in before]
+        assert all(map(str.startswith, titles, starts)), titles
+    timed = simulated(gas.format("time", 0.1), name="time")
+    assert run_script("snapshot", timed.path, "-o", tmp_path / "a.png") == 0
+    assert figures[-1].axes[0].get_title("left").startswith("t = ")
+
+
 def test_spins_have_a_colour(tmp_path, rng, figures, capsys, simulated):
     """The scale has 0 in its middle; disks that cannot rotate have no spin to draw."""
     rough = "&contact tangential_restitution = 0 /"
