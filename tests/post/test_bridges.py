@@ -195,6 +195,19 @@ def test_ovito_opens_gsd_and_lammps_files(run, rough, kind):
                 np.testing.assert_allclose(spin, frame.per_disk("angular_velocity"), rtol=1e-14)
 
 
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_mdanalysis_reads_lammps_files_without_times(run, tmp_path):
+    opened = reader("MDAnalysis").Universe
+    path = bridges.write_lammps(run, tmp_path / "run.lammpstrj", slice(0, None, 4), time=False)
+    kind = {"format": "LAMMPSDUMP", "topology_format": "LAMMPSDUMP"}
+    universe = opened(str(path), **kind, lammps_coordinate_convention="unscaled")
+    assert len(universe.trajectory) == len(range(0, run.n_frames, 4))
+    place = run.position[0] - [*run.lower]  # MDAnalysis moves the origin to the corner of the box
+    np.testing.assert_allclose(universe.atoms.positions[:, :2], place, atol=1e-6)
+    found = bridges.read_lammps(path, 1)
+    assert found.time == 4 and np.all(found.disks["position"] == run.position[4])
+
+
 def test_the_package_gsd_reads_what_is_written(run, tmp_path):
     hoomd = reader("gsd.hoomd")
     for precision in ("single", "double"):

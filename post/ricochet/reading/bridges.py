@@ -303,13 +303,14 @@ def wrapped(
 # --- dump files of LAMMPS ---
 
 
-def write_lammps(run: Run, path: str | Path, frames: Index | None = None) -> Path:
+def write_lammps(
+    run: Run, path: str | Path, frames: Index | None = None, time: bool = True
+) -> Path:
     """Write frames to a text file in the format of the command `dump custom` of LAMMPS.
 
     The columns are id, type, element (the name of the species), x, y, z, vx, vy, vz, radius, mass,
     for a periodic box also ix, iy, iz, and for disks that can rotate omegaz and orientation.
-    Numbers are written with full precision.  The time step of a frame is its number in the run, and
-    its time follows after ITEM: TIME.
+    Numbers are written with full precision.  The time step of a frame is its number in the run.
 
     Parameters
     ----------
@@ -319,6 +320,9 @@ def write_lammps(run: Run, path: str | Path, frames: Index | None = None) -> Pat
         the file to write
     frames : int, slice or list of int, optional
         frames of the run; by default all
+    time : bool
+        whether the time of each frame is written after ITEM: TIME, as LAMMPS does with
+        `dump_modify time yes`; MDAnalysis cannot read files with times
 
     Returns
     -------
@@ -339,13 +343,12 @@ def write_lammps(run: Run, path: str | Path, frames: Index | None = None) -> Pat
     refuse_sheared(run, "LAMMPS dump")
     path = destination(Path(path))
     with path.open("w") as file:
-        file.write("ITEM: UNITS\nlj\n")
         for frame in range(run.n_frames) if frames is None else chosen(run.n_frames, frames):
-            file.write(lammps_frame(run, frame))
+            file.write(lammps_frame(run, frame, time))
     return path
 
 
-def lammps_frame(run: Run, frame: int) -> str:
+def lammps_frame(run: Run, frame: int, time: bool) -> str:
     """Return the lines of a frame in a dump file of LAMMPS."""
     lower, upper = run.corners_at(run.time[frame])
     sides = np.array([[*lower, -0.5], [*upper, 0.5]]).T.tolist()
@@ -362,8 +365,8 @@ def lammps_frame(run: Run, frame: int) -> str:
     if run.image is not None:
         x, y = run.image[frame].T.tolist()
         columns |= {"ix": x, "iy": y, "iz": zero}
-    lines = ["ITEM: TIMESTEP", str(frame), "ITEM: TIME", str(float(run.time[frame]))]
-    lines += ["ITEM: NUMBER OF ATOMS", str(run.n_disks)]
+    lines = ["ITEM: TIME", str(float(run.time[frame]))] if time else []
+    lines += ["ITEM: TIMESTEP", str(frame), "ITEM: NUMBER OF ATOMS", str(run.n_disks)]
     kinds = ["pp" if axis else CLOSED for axis in run.periodic]
     lines += [" ".join(["ITEM: BOX BOUNDS", *kinds, "pp"]), *(f"{a} {b}" for a, b in sides)]
     lines.append(" ".join(["ITEM: ATOMS", *columns]))
