@@ -11,6 +11,7 @@ trajectories if there is no gravity and the run has a frame at every event
 from ricochet import Run
 from ricochet.figures.drawing import (
     COLOURS,
+    aspect_of,
     caption,
     disk_collection,
     draw_box,
@@ -76,7 +77,9 @@ def main() -> None:
     parser = command_line(__doc__, "trajectory.png", frames=None, count=None, disks=None)
     args = parser.parse_args()
     size, rows = len(args.runs), []
-    figure, panels = plt.subplots(1, size, squeeze=False, figsize=(5.2 * size, 5.7))
+    tallest = min(max(map(aspect_of, args.runs)), 2.0)
+    height = 5.0 * tallest + 1.4  # the title has three lines
+    figure, panels = plt.subplots(1, size, squeeze=False, figsize=(5.2 * size, height))
     for axes, run in zip(panels.flat, args.runs, strict=True):
         frames = chosen_frames(run, args.frames, args.count)
         disks = chosen_disks(run, args.disks or list(range(1, 1 + min(12, run.n_disks))))

@@ -256,6 +256,19 @@ def test_arrows_have_a_scale_and_a_second_species_an_outline(tmp_path, rng, figu
     assert np.all(np.array(widths) == np.array([0, 0, 0, 1, 1, 1]) * widths[-1]) and widths[-1] > 0
 
 
+@pytest.mark.parametrize(("count", "edges"), [(1, (1, 1)), (2, (1, 1)), (2, (1, 2)), (3, (2, 1))])
+def test_titles_and_labels_of_paths_are_inside_the_figure(tmp_path, rng, figures, count, edges):
+    paths = []
+    for k in range(count):
+        x = rng.uniform(0.2, 0.8, (2, 3, 2)) * edges
+        paths.append(write_run(tmp_path / f"{k}.h5", x, x, edges=edges, radius=0.01))
+    assert run_script("trajectory", *paths, "-o", tmp_path / "a.png") == 0
+    (figure,) = figures
+    (x0, y0), (x1, y1) = figure.get_tightbbox().get_points()
+    width, height = figure.get_size_inches()
+    assert min(x0, y0) >= 0 and x1 <= width and y1 <= height
+
+
 def test_panels_contain_the_number_of_events_before_the_frame(tmp_path, figures, simulated):
     """The numbers agree with the event log, also for the last frame, which follows earlier."""
     gas = "&species count = 20 radius = 0.02 speed = 1 / &stop events = 57 / "
