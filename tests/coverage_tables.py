@@ -20,7 +20,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -163,20 +163,31 @@ def of_transport(run: Run) -> Found:
 # --- error bars of several runs ---
 
 
+def at(x: np.ndarray, curve: statistics.Estimate, place: float) -> tuple[float, float]:
+    """Return a point of a curve and its error at a place that is the same for all groups."""
+    mean, error = (float(np.interp(place, x, part)) for part in curve)
+    return mean, error
+
+
 def of_cooling(*runs: Run) -> Found:
-    """cooling.py, at three quarters of the curves."""
-    found = cooling.energies(list(runs), points=41).items()
-    return {name: (v.mean[30], v.error[30]) for name, v in found if isinstance(v, tuple)}
+    """cooling.py, at three quarters of the collisions, and at t = 0.45."""
+    found = cooling.energies(list(runs), points=41)
+    axes = {"energy": ("time", 0.45), "K": ("collisions_per_disk", 6.0)}
+    axes["ratio"] = axes["K"]
+    points = {}
+    for name, curve in found.items():
+        if isinstance(curve, statistics.Estimate):
+            axis, place = axes[name.partition("_")[0]]
+            points[name] = at(found[axis], curve, place)
+    return points
 
 
 def of_haff(*runs: Run) -> Found:
-    """haff.py, after 10 collisions per disk, and half way on the axis of the times."""
+    """haff.py, after 10 collisions per disk, and at the time 8 / w0."""
     tracks = [cooling.energy_left(run) for run in runs]
     curves, rate, _, _ = cooling.haff(tracks, runs[0].restitution)
-    at = int(np.searchsorted(curves["collisions_per_disk"], 10))
-    found = {"K by collisions": curves["K"], "K by time": curves["K_by_time"]}
-    points = {name: (one.mean[at], one.error[at]) for name, one in found.items()}
-    return points | {"rate": rate}
+    points = {"K by collisions": at(curves["collisions_per_disk"], curves["K"], 10)}
+    return points | {"K by time": at(curves["w0_t"], curves["K_by_time"], 8), "rate": rate[:2]}
 
 
 def of_equipartition(*runs: Run) -> Found:
@@ -308,6 +319,22 @@ BARS: dict[str, tuple[str, Callable[[Run], Found]]] = {
         text(PERIODIC, gas(36, 0.2), 20, 0.01, more="helfand = .true."), of_transport
     ),
 }  # fmt: skip
+
+
+class Pool(NamedTuple):
+    """Runs of one input, from which groups are drawn with replacement.
+
+    The runs of a group are independent runs of the pool, and the true value is that of all runs.
+    """
+
+    input: str
+    runs: int
+    size: int  # of a group
+
+
+FALL = (ROOT / "input" / "gravity.nml").read_text().replace("time = 100", "time = 12")
+FALL = FALL.replace("frames_every_time = 0.04", "frames_every_time = 12")
+POOLS = {f"{size} runs of 60 disks that fall": Pool(FALL, 3000, size) for size in (25, 100)}
 EXACT = {("40 disks between thermal sides", "kT"): 1.0, ("fields of the same", "temperature"): 1.0}
 
 # --- p-values ---
@@ -342,6 +369,47 @@ def p_values(apart: float, run: Run) -> Found:
     return {name: (test.ks_p, test.chi2_p) for name, test in tests.items()}
 
 
+# --- groups of a pool of runs ---
+
+
+def energies(program: str, folder: str, given: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the energies (2, W) of the two species of a run in windows of time, and the times."""
+    stem = Path(folder) / f"pool_{seed}"
+    try:
+        run = performed(program, stem, given, seed)
+        light, heavy = td.lightest_and_heaviest(run)
+        names = (f"{run.names[kind]}/kinetic_energy" for kind in (light, heavy))
+        both = [statistics.windows(*run.observable(name), 0.5) for name in names]
+        return np.array([values for _, values in both]), both[0][0]
+    finally:
+        for path in Path(folder).glob(f"{stem.name}.*"):
+            path.unlink()
+
+
+def drawn(found: np.ndarray, time: np.ndarray, size: int, groups: int) -> tuple[list[Found], float]:
+    """Return T_therm of groups of the runs, as equipartition.py determines it, and of all runs."""
+
+    def time_of(both: np.ndarray) -> float:
+        return equipartition.entry(time, np.abs(both[1] / both[0] - 1))
+
+    rng = np.random.default_rng(FIRST_SEED)
+    own = [found[rng.integers(0, len(found), size)] for _ in range(groups)]
+    times = [equipartition.over_runs(time_of, [*np.moveaxis(one, 1, 0)]) for one in own]
+    results = [{"T_therm": (float(one.mean), float(one.error))} for one in times]
+    return results, time_of(found.mean(axis=0))
+
+
+@cache
+def pool_of(
+    program: str, folder: str, workers: ProcessPoolExecutor, given: str, runs: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the energies (R, 2, W) of the runs of a pool, and the times of the windows (W,)."""
+    seeds = range(FIRST_SEED, FIRST_SEED + runs)
+    each = partial(energies, program, folder, given)
+    found, times = zip(*workers.map(each, seeds, chunksize=16), strict=True)
+    return np.array(found), times[0]
+
+
 # --- the tables ---
 
 
@@ -374,8 +442,8 @@ def measured(program: str, folder: str, job: tuple) -> Found:
             path.unlink()
 
 
-def coverage(name: str, results: list[Found]) -> list[dict]:
-    """Return a row for each quantity of a system."""
+def coverage(name: str, results: list[Found], exact: float | None = None) -> list[dict]:
+    """Return a row for each quantity of a system; `exact` is the true value if it is known."""
     rows = []
     for quantity in results[0]:
         mean, error = np.array([one.get(quantity, (np.nan, np.nan)) for one in results]).T
@@ -383,7 +451,7 @@ def coverage(name: str, results: list[Found]) -> list[dict]:
         mean, error = mean[some], error[some]
         if len(mean) < 10 or not error.any():  # exact values, such as kT of a fixed energy
             continue
-        truth = EXACT.get((name, quantity), float(mean.mean()))
+        truth = EXACT.get((name, quantity), float(mean.mean()) if exact is None else exact)
         three = mean[: len(mean) // 3 * 3].reshape(-1, 3)
         few = statistics.estimate(three, axis=1)
         row = {"system": name, "quantity": quantity.strip(), "runs": len(mean)}
@@ -414,7 +482,7 @@ def merged(tables: dict[str, list[dict]], path: Path) -> dict[str, list[dict]]:
     Published rows of systems that are no longer in the lists are left out.
     """
     known = json.loads(path.read_text()) if path.exists() else {}
-    for kind, systems in (("bars", BARS | GROUPS), ("p_values", P_VALUES)):
+    for kind, systems in (("bars", BARS | GROUPS | POOLS), ("p_values", P_VALUES)):
         repeated = {row["system"] for row in tables[kind]}
         rows = tables[kind] + [r for r in known.get(kind, []) if r["system"] not in repeated]
         order = {name: k for k, name in enumerate(systems)}
@@ -429,7 +497,7 @@ def unmeasured(tables: dict[str, list[dict]]) -> list[str]:
     return [
         f"{name}{end}"
         for kind, systems, end in (
-            ("bars", BARS | GROUPS, ""),
+            ("bars", BARS | GROUPS | POOLS, ""),
             ("p_values", P_VALUES, ", p-values"),
         )
         for name in systems
@@ -464,13 +532,19 @@ def main() -> int:
     ):
         for kind, systems, seeds in (
             ("p_values", P_VALUES, P_SEEDS),
-            ("bars", BARS | GROUPS, SEEDS),
+            ("bars", BARS | GROUPS | POOLS, SEEDS),
         ):
             for name in (one for one in systems if args.only in one):
-                seed = range(args.first_seed, args.first_seed + (args.seeds or seeds))
-                jobs = [(kind, name, k) for k in seed]
-                results = list(pool.map(partial(measured, program, folder), jobs, chunksize=4))
-                rows = (coverage if kind == "bars" else uniformity)(name, results)
+                if name in POOLS:
+                    given, runs, size = POOLS[name]
+                    runs_of_pool = pool_of(program, folder, pool, given, runs)
+                    results, truth = drawn(*runs_of_pool, size, args.seeds or SEEDS)
+                    rows = coverage(name, results, truth)
+                else:
+                    seed = range(args.first_seed, args.first_seed + (args.seeds or seeds))
+                    jobs = [(kind, name, k) for k in seed]
+                    results = list(pool.map(partial(measured, program, folder), jobs, chunksize=4))
+                    rows = (coverage if kind == "bars" else uniformity)(name, results)
                 tables[kind] += rows
                 for row in rows:
                     print(

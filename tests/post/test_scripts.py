@@ -574,6 +574,25 @@ def test_one_run_of_many_disks_has_a_thermalisation_time_with_an_error(rng):
     assert np.abs(np.median(mean) - truth) < 0.3 * truth and np.isfinite(mean).mean() > 0.9
 
 
+def test_the_jackknife_error_of_the_thermalisation_time_is_the_scatter_of_groups(rng):
+    """The energy difference falls below 10 % at a known time; the noise is that of 20 runs."""
+    time = np.arange(0.25, 12, 0.5)
+    difference, truth = np.exp(-time / 3), 3 * np.log(10)
+
+    def crossing(both):
+        return equipartition.entry(time, np.abs(both[1] / both[0] - 1))
+
+    found = []
+    for _ in range(300):
+        light = 1 + 0.01 * rng.normal(size=(20, len(time)))
+        heavy = 1 + difference + 0.01 * rng.normal(size=light.shape)
+        found.append(equipartition.over_runs(crossing, [light, heavy]))
+    mean, error = np.transpose(found)
+    assert 0.56 < np.mean(np.abs(mean - truth) < error) < 0.78  # four standard deviations
+    assert np.mean(error) == pytest.approx(np.std(mean), rel=0.25)
+    assert abs(mean.mean() - truth) < 0.3 * np.std(mean)
+
+
 def test_one_run_does_not_say_that_energies_agree(tmp_path, rng, capsys):
     """In equilibrium the energies of 30 disks pass through agreement again and again."""
     path = falling(tmp_path / "run.h5", rng)
