@@ -21,6 +21,7 @@ from ricochet.figures.drawing import (
     draw_box,
     label_of,
     limits_of,
+    moment,
     note_on_size,
     plt,
     radius_marks,
@@ -67,7 +68,7 @@ def animate(
     aspect = aspect_of(run)
     height = min(6.4, 6.4 * aspect)
     width = height / aspect + (1.2 if colour != "species" else 0.2)
-    figure, axes = plt.subplots(figsize=(max(width, 3.6), height + 0.6), dpi=100)
+    figure, axes = plt.subplots(figsize=(max(width, 3.6), height + 0.75), dpi=100)
     style = {}
     if colour != "species":
         limits = limits_of(colour, scale_top(run, frames, colour))
@@ -81,7 +82,7 @@ def animate(
         else:
             style["array"] = values_of(run, frame, colour)
         radius_marks(axes, run, frame)
-        axes.set_title(f"{caption([run])},  t = {run.time[frame]:.4g}{note_on_size(axes, run)}")
+        axes.set_title(f"{caption([run])},  {moment(run, frame)}{note_on_size(axes, run)}")
         return disk_collection(axes, run, run.position[frame], **style)
 
     disks = show(frames[0])

@@ -43,26 +43,6 @@ def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
     return LogNorm(min(low, top / 1.01), top) if log else Normalize(0, top)
 
 
-def count_at(run: Run, frame: int) -> dict[str, int]:
-    """Return the number of events or collisions before a frame, if frames are counted by them."""
-    schedule = run.parameters.get("output", {})
-    if {"frames_at", "frames_per_decade"} & schedule.keys():
-        return {}
-    counted = {"collisions": ("collisions",)}
-    counted["events"] = ("collisions", "side_collisions", "obstacle_collisions")
-    for name, parts in counted.items():
-        if every := schedule.get(f"frames_every_{name}"):
-            total = sum(int(np.sum(run.observable(part).value[-1])) for part in parts)
-            return {name: min(frame * int(every), total)}  # the last frame may follow earlier
-    return {}
-
-
-def moment(run: Run, frame: int) -> str:
-    """Return the time of a frame, after the number of events or collisions if it is known."""
-    counts = [f"{name[:-1]} {number},  " for name, number in count_at(run, frame).items()]
-    return "".join(counts) + f"t = {run.time[frame]:.4g}"
-
-
 def draw_key(axes: plt.Axes, run: Run, arrows: Quiver, longest: float) -> None:
     """Draw a reference arrow above a panel, with the speed that corresponds to its length."""
     power = 10.0 ** np.floor(np.log10(longest))
@@ -113,7 +93,7 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
             drawn = axes.quiver(*run.position[frames[k]].T, *run.velocity[frames[k]].T, **arrows)
             if k == 0:
                 draw_key(axes, run, drawn, longest)
-        axes.set_title(moment(run, frames[k]))
+        axes.set_title(drawing.moment(run, frames[k]))
     if colour == "species":
         drawing.species_legend(figure, run)
     else:
@@ -140,7 +120,7 @@ def main() -> None:
     figure = draw(run, frames, drawing.chosen_colour(run, args.colour), args)
     rows = []
     for frame in frames:
-        row = {"frame": frame, **count_at(run, frame), "time": float(run.time[frame])}
+        row = {"frame": frame, **drawing.count_at(run, frame), "time": float(run.time[frame])}
         row |= {"mean_speed": float(run.speed(frame).mean())}
         rows.append(row | {"kinetic_energy": float(run.kinetic_energy(frame).mean())})
     report(args, figure, rows)

@@ -284,8 +284,10 @@ def test_panels_contain_the_number_of_events_before_the_frame(tmp_path, figures,
         starts = [f"{name[:-1]} {number},  t = " for number in before]
         assert all(map(str.startswith, titles, starts)), titles
     timed = simulated(gas.format("time", 0.1), name="time")
-    assert run_script("snapshot", timed.path, "-o", tmp_path / "a.png") == 0
-    assert figures[-1].axes[0].get_title("left").startswith("t = ")
+    more = gas.format("events", 20).replace("_log = .true.", "_log = .true. frames_at = 0.001")
+    for run in (timed, simulated(more, name="more")):
+        assert run_script("snapshot", run.path, "-o", tmp_path / "a.png") == 0
+        assert figures[-1].axes[0].get_title("left").startswith("t = ")
 
 
 def test_spins_have_a_colour(tmp_path, rng, figures, capsys, simulated):

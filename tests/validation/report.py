@@ -158,10 +158,11 @@ were wrong, and their rows were measured again with the corrected estimators. An
 to a single run, or to a group of runs if the name of the system states a number of runs; *bars* is
 the number of runs or groups. *Held* is the percentage of the error bars that contain the true
 value, which is exact, or the mean over all bars, or the value of 3000 runs from which the groups
-are drawn (disks that fall). The expected percentage is 68, and 61 to 75 are allowed; the percentage of n bars has a standard deviation of 47 / √n by chance. *Error / scatter*
-is the mean error divided by the standard deviation of the measured values; Student's t makes this
-ratio larger than 1. *Three* is the percentage for means over three bars, whose errors follow from
-their scatter.
+are drawn (disks that fall). The expected percentage is 68, and 61 to 75 are allowed; the
+percentage of n bars has a standard deviation of 47 / √n by chance. *Error / scatter* is the mean
+error divided by the standard deviation of the measured values; Student's t makes this ratio larger
+than 1. *Three* is the percentage for means over three bars, whose errors follow from their
+scatter.
 
 | system | quantity | bars | held | error / scatter | three |
 |---|---|---|---|---|---|

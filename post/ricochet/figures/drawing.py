@@ -60,6 +60,28 @@ def caption(runs: list[Run]) -> str:
     return "\n".join(wrap(",  ".join(parts), 110))
 
 
+def count_at(run: Run, frame: int) -> dict[str, int]:
+    """Return the number of events or collisions before a frame, if frames are counted by them.
+
+    The result is empty if the number of frames shows that the schedule was changed during the run.
+    """
+    schedule = run.parameters.get("output", {})
+    counted = {"events": ["collisions", "side_collisions", "obstacle_collisions"]}
+    counted["collisions"] = counted["events"][:1]
+    for name, parts in counted.items():
+        if every := schedule.get(f"frames_every_{name}"):
+            total = sum(int(np.sum(run.observable(part).value[-1])) for part in parts)
+            if run.n_frames - 1 == -(-total // every):  # the last frame may follow earlier
+                return {name: min(frame * int(every), total)}
+    return {}
+
+
+def moment(run: Run, frame: int) -> str:
+    """Return the time of a frame, after the number of events or collisions if it is known."""
+    counts = [f"{name[:-1]} {number},  " for name, number in count_at(run, frame).items()]
+    return "".join(counts) + f"t = {run.time[frame]:.4g}"
+
+
 def titled(runs: list[Run]) -> str:
     """Return the title in the input, followed by the caption."""
     title = str(runs[0].parameter("run", "title", ""))
