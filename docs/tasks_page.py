@@ -10,6 +10,7 @@ comments enclose each text that this script replaces, and contain the name of th
 import csv
 import json
 import re
+import sys
 import textwrap
 from pathlib import Path
 
@@ -64,7 +65,10 @@ laws for 60 disks of finite size with a fixed energy. Their slopes are {speed_la
 
 def table(name: str) -> list[dict[str, str]]:
     """Return the rows of a table with measured results."""
-    with (TABLES / f"{name}.csv").open(newline="") as file:
+    path = TABLES / f"{name}.csv"
+    if not path.exists():
+        sys.exit(f"tasks_page.py: there is no {path}; make it with runs/{name.split('_')[0]}.sh")
+    with path.open(newline="") as file:
         return list(csv.DictReader(file))
 
 

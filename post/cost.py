@@ -18,8 +18,8 @@ from ricochet.script import command_line, launch, recorded, report
 import numpy as np
 
 LABELS = {
-    "rescan": "rescan: all pairs at each collision",
-    "pairs": "pairs: all pairs of the disks just involved",
+    "rescan": "all pairs at each collision",
+    "pairs": "all pairs of the disks just involved",
     "cells": "neighbouring cells",
 }
 

@@ -693,6 +693,18 @@ def timed(path, count=3, search="cells", **provenance):
     return write_run(path, x, x, parameters={"run": {"search": search}}, provenance=provenance)
 
 
+def test_the_legend_of_the_cost_names_each_method_once(tmp_path):
+    runs = [
+        read_run(timed(tmp_path / f"{name}.h5", 9, name, collisions_per_second=1e5))
+        for name in cost.LABELS
+    ]
+    figure = cost.draw(runs, cost.costs(runs), {}, 128, 1e4)
+    texts = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert [text.partition(": ")[0] for text in texts] == [*cost.LABELS]
+    assert [name for name, text in cost.LABELS.items() if text.startswith(f"{name}:")] == []
+    plt.close(figure)
+
+
 def test_cost_takes_the_best_of_equal_runs_and_fits_a_power(tmp_path):
     kinds = [("pairs", 20, 1e5), ("pairs", 10, 1e5), ("pairs", 10, 2e5), ("cells", 10, 1e6)]
     runs = [
