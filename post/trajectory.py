@@ -78,7 +78,7 @@ def main() -> None:
     args = parser.parse_args()
     size, rows = len(args.runs), []
     tallest = min(max(map(aspect_of, args.runs)), 2.0)
-    height = 5.0 * tallest + 1.4  # the title has three lines
+    height = 4.85 * tallest + 1.15  # the title has three lines
     figure, panels = plt.subplots(1, size, squeeze=False, figsize=(5.2 * size, height))
     for axes, run in zip(panels.flat, args.runs, strict=True):
         frames = chosen_frames(run, args.frames, args.count)
