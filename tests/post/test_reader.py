@@ -288,6 +288,7 @@ RUNNING = [
     ([CRATER + SHORT], {"crater": (), "crater_scan": ()}),
     ([PAIR.format(0.3) + TARGET + LONGER], {"scattering": ()}),
     ([BULK + OUTPUT.format(LOG)], dict.fromkeys(SETTLED, ())),
+    ([BULK + OUTPUT.format("event_log = .true. ")], {"contacts": ()}),
     ([BULK + ROUGH + SHORT], {"rough": ()}),
     ([BULK + "&contact restitution = 0.9 /\n" + SHORT], {"haff": ()}),
     ([PAIR.format(x) + LONGER for x in (0.3, 0.300001)], {"lyapunov": ("--largest", "0.1")}),
