@@ -337,7 +337,7 @@ def test_what_cannot_be_exchanged_is_answered_in_one_line(simulated, tmp_path, m
 
 def examples(heading: str) -> list[str]:
     """Return the Python examples below a heading of the page on output."""
-    page = (ROOT / "docs" / "output.md").read_text()
+    page = (ROOT / "docs" / "reference" / "output.md").read_text()
     return examples_of(page.partition(f"\n### {heading}\n")[2].partition("\n#")[0])
 
 
