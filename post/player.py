@@ -67,7 +67,7 @@ def frames_that_fit(run: Run, room: float) -> int:
     for its number of collisions, and 32 bits for its angle.  Up to half of the file is reserved for
     the event log.
     """
-    more = (run.event_count is not None) + (run.image is not None)
+    more = sum(one is not None for one in (run.event_count, run.image, run.recycled))
     more += 4 * ("orientation" in run.disk_data)
     one = run.n_disks * (8 + more) * 4 / 3
     fixed = run.n_disks * (2 + 1 + 4 + 8) * 4 / 3  # for species, size, mass and first position
@@ -77,7 +77,8 @@ def frames_that_fit(run: Run, room: float) -> int:
 
 def quantities(run: Run) -> list[str]:
     """Return the quantities, other than the species, that colours of disks can show."""
-    return ["speed", "displacement"] + ["collisions"] * (run.event_count is not None)
+    found = ["speed"] if "recycled" in run.nature else ["speed", "displacement"]
+    return found + ["collisions"] * (run.event_count is not None)
 
 
 def in_room(run: Run, place: np.ndarray) -> np.ndarray:
@@ -119,7 +120,8 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
     as 16-bit integers in units of the largest velocity component in the frame.  If there are few
     disks, positions and velocities are stored with full precision.  Numbers of collisions are
     stored as values from 0 to 255, where 255 corresponds to `top`.  The numbers of periods that a
-    disk has crossed along x and y since the previous frame are stored in four bits each.
+    disk has crossed along x and y since the previous frame are stored in four bits each.  The
+    numbers of times that each disk has been recycled are stored modulo 256.
     """
     found: dict[str, bytearray] = defaultdict(bytearray)
     at_once = max(1, MOST_AT_ONCE // run.n_disks)
@@ -139,6 +141,8 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
         if run.image is not None:
             crossed = np.clip(np.diff(run.image[[before, *some]], axis=0), -7, 7) + 8
             parts["shifts"] = (16 * crossed[..., 0] + crossed[..., 1]).astype("u1")
+        if run.recycled is not None:
+            parts["recycled"] = (run.recycled[some] % 256).astype("u1")
         if "orientation" in run.disk_data:
             parts["angles"] = run.orientation[some].astype("<f4")
         for name, part in parts.items():
@@ -247,6 +251,7 @@ def scene(run: Run) -> tuple[dict, dict]:
     facts = {
         "exact": run.n_disks <= FEW_DISKS,
         "settles": run.nature.in_equilibrium,
+        "recycling": "recycled" in run.nature,
         "gravity": run.gravity.tolist(),
         "lower": run.bounds[0].tolist(),
         "edges": (run.bounds[1] - run.bounds[0]).tolist(),
@@ -284,8 +289,10 @@ def film(
     blocks = {name: block.tobytes() for name, block in blocks.items()}
     blocks |= moving(run, frames, tops.get("collisions", 1))
     # Displacements of disks are measured from the positions `origin`, which are continuous across
-    # periodic sides up to the first frame of the film.
-    origin = run.unwrapped(0) + run.position[frames[0]] - run.unwrapped(frames[0])
+    # periodic sides up to the first frame of the film.  Recycled disks have no displacements.
+    origin = run.position[frames[0]]
+    if "recycled" not in run.nature:
+        origin = run.unwrapped(0) + origin - run.unwrapped(frames[0])
     blocks["origins"] = in_room(run, origin).astype("<f4").tobytes()
     facts, own = scene(run)
     facts |= {

@@ -8,7 +8,7 @@ trajectories if there is no gravity and the run has a frame at every event
 (output.frames_every_events = 1).  Several runs are drawn side by side.
 """
 
-from ricochet import Run
+from ricochet import Run, RunError
 from ricochet.figures.drawing import (
     COLOURS,
     aspect_of,
@@ -29,13 +29,27 @@ def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
     """Return the path (T', 2) of each disk through the given frames.
 
     If a path crosses a periodic side, it is extended beyond this side, and continues from the
-    opposite side of the box.  A row of NaN separates the two pieces of the path.
+    opposite side of the box.  A row of NaN separates the two pieces of the path.  A row of NaN also
+    separates the pieces of a path before and after a disk has been recycled.
     """
-    paths = list(np.moveaxis(run.position[frames][:, disks], 1, 0))
-    if run.image is None:
-        return paths
-    images = np.moveaxis(run.image[frames][:, disks], 1, 0)
-    return [wrapped(*track, run.edges) for track in zip(paths, images, strict=True)]
+    paths = np.moveaxis(run.position[frames][:, disks], 1, 0)
+    counts, images = np.zeros(paths.shape[:2]), np.zeros(paths.shape, dtype=int)
+    if "recycled" in run.nature:
+        if run.recycled is None:
+            raise RunError(f"{run.path}: has no recycled in its frames")
+        counts = np.moveaxis(run.recycled[frames][:, disks], 1, 0)
+    if run.image is not None:
+        images = np.moveaxis(run.image[frames][:, disks], 1, 0)
+    return [drawn(*track, run.edges) for track in zip(paths, images, counts, strict=True)]
+
+
+def drawn(path: np.ndarray, image: np.ndarray, count: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Return a path (T, 2) in pieces between which `count` (T,) changes, separated by NaN."""
+    cuts = np.flatnonzero(np.diff(count)) + 1
+    pieces = []
+    for own, crossed in zip(np.split(path, cuts), np.split(image, cuts), strict=True):
+        pieces += [wrapped(own, crossed, edges), np.full((1, 2), np.nan)]
+    return np.concatenate(pieces[:-1])
 
 
 def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarray:
@@ -84,7 +98,8 @@ def main() -> None:
         frames = chosen_frames(run, args.frames, args.count)
         disks = chosen_disks(run, args.disks or list(range(1, 1 + min(12, run.n_disks))))
         draw_paths(axes, run, disks, frames)
-        ends = np.hstack([run.unwrapped(frames[end])[disks] for end in (0, -1)]).tolist()
+        place_at = run.position.__getitem__ if "recycled" in run.nature else run.unwrapped
+        ends = np.hstack([place_at(frames[end])[disks] for end in (0, -1)]).tolist()
         names = ("x_first", "y_first", "x_last", "y_last")
         for disk, places in zip(disks, ends, strict=True):
             row = {"run": run.path.name, "disk": disk + 1, "frames": len(frames)}

@@ -265,6 +265,7 @@ contains
       if (run%input%settings%run%threads > 1) text = text//eol//"events_on_one_core = "//written(run%serial_events)
       if (sim%drive%is_on()) text = text//eol//"kicks = "//written(sim%kicks)// &
         eol//"drive_energy = "//written(sim%tally%total(drive_energy))
+      if (allocated(sim%recycled)) text = text//eol//"recycled = "//written(sum(sim%recycled))
     end associate
     if (note(run) /= "") text = text//eol//"note = "//note(run)
   end function summary

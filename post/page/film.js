@@ -131,11 +131,12 @@ function displacement(i) {
 
 // Returns the free flights of a disk between two times. Each flight has a start, an end, and the offset of the control point of a
 // parabola, which is (0, 0) for a straight line. Without an event log, the flights are straight lines between the positions in
-// successive frames.
+// successive frames. If a disk has been recycled between two frames, its way between these frames is left out.
 function flights(i, from, to) {
   const result = [], plus = (a, b) => a.map((one, axis) => one + b[axis]);
   for (let k = frameAt(from); k < past.length - 1 && past[k].time < to; k++) {
     const here = past[k], then = past[k + 1], h = then.time - here.time, own = [], { start, disk, turns } = ways ?? {};
+    if (here.recycled && here.recycled[i] !== then.recycled[i]) continue;
     const pair = array => [array[2 * i], array[2 * i + 1]], g = film.known ? film.gravity : [0, 0];
     let place = pair(here.place), velocity = pair(here.velocity), since = 0;
     if (!film.known) velocity = pair(then.place).map((end, axis) => (end - place[axis] + (here.crossed ? film.edges[axis] * (then.crossed[2 * i + axis] - here.crossed[2 * i + axis]) : 0)) / h);
@@ -170,11 +171,11 @@ function loadFilm({ facts, blocks }) {
   const { exact, time, lower, edges } = film, real = exact ? Float64Array : Float32Array;
   const block = (name, kind) => new kind(bytes(blocks[name] ?? '').buffer), part = (array, k, width) => array?.subarray(k * width, (k + 1) * width);
   const positions = block('positions', exact ? Float64Array : Uint16Array), velocities = block('velocities', exact ? Float64Array : Int16Array);
-  const fastest = block('fastest', Float64Array), [shifts, hits] = ['shifts', 'hits'].map(name => blocks[name] && bytes(blocks[name]));
+  const fastest = block('fastest', Float64Array), [shifts, hits, counts] = ['shifts', 'hits', 'recycled'].map(name => blocks[name] && bytes(blocks[name]));
   const turned = blocks.angles && block('angles', Float32Array);
   const signs = (before, k) => (shifts[past.length * disks + (k >> 1)] >> (k % 2 ? 0 : 4) & 15) - 8;
   time.forEach((when, k) => past.push(cross({
-    time: when, collisions: film.collisions[k], hits: part(hits, k, disks), angle: part(turned, k, disks),
+    time: when, collisions: film.collisions[k], hits: part(hits, k, disks), angle: part(turned, k, disks), recycled: part(counts, k, disks),
     place: real.from(part(positions, k, 2 * disks), (one, n) => lower[n % 2] + edges[n % 2] * one / (exact ? 1 : 65535)),
     velocity: real.from(part(velocities, k, 2 * disks), one => exact ? one : one * fastest[k] / 32767),
   }, signs)));

@@ -103,7 +103,7 @@ function fitScales(mean) {
 }
 
 function setTop(top) {
-  film.scales = { speed: ['speed', top], displacement: ['displacement', Math.max(...film.edges) / 4] };
+  film.scales = { speed: ['speed', top], ...!film.recycling && { displacement: ['displacement', Math.max(...film.edges) / 4] } };
   setBins(1.3 * top, film.rest);
 }
 
@@ -112,6 +112,7 @@ function take(buffer) {
   const head = new Float64Array(buffer, 0, HEAD), pairs = from => new Float32Array(buffer, 8 * HEAD + 8 * from * disks, 2 * disks);
   const frame = { time: head[0], collisions: head[1], sides: [...head.slice(2)], place: pairs(0), velocity: pairs(1) };
   if (film.turning) frame.angle = new Float32Array(buffer, 8 * HEAD + 16 * disks, disks);
+  if (film.recycling) frame.recycled = new Float32Array(buffer, 8 * HEAD + (film.turning ? 20 : 16) * disks, disks);
   // The interval between two frames is so short that no disk moves farther than half of the box.
   cross(frame, ({ place }, k) => film.periodic[k % 2] ? Math.round((place[k] - frame.place[k]) / film.edges[k % 2]) : 0);
   const isFirst = !past.length, follows = stream.live && moment.time === past.at(-1)?.time;

@@ -12,7 +12,7 @@ module random_stream
 
   !> Codes of the purposes for which random numbers are drawn during a run. Random numbers for the initial state are drawn from
   !> separate streams.
-  integer, parameter, public :: thermal_walls = 3, kicks = 4, orientations = 5
+  integer, parameter, public :: thermal_walls = 3, kicks = 4, orientations = 5, recycled_disks = 6
 
   real(real64), parameter :: unit_53 = 2.0_real64**(-53)
 

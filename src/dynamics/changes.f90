@@ -45,9 +45,10 @@ contains
     call bounds(other%box, sim%now, there(:, 1), there(:, 2))
     if ((other%features%rotation .neqv. sim%features%rotation) .or. &
       (other%features%orientation .neqv. sim%features%orientation) .or. &
-      (other%law%contact_time > 0 .neqv. sim%law%contact_time > 0)) then
-      problem = "the change needs data that the disks do not have: rotation, orientation and contact_time > 0 must be there " &
-        //"from the start"
+      (other%law%contact_time > 0 .neqv. sim%law%contact_time > 0) .or. &
+      (other%drive%moves_disks() .neqv. sim%drive%moves_disks())) then
+      problem = "the change needs data that the disks do not have: rotation, orientation, contact_time > 0 and " &
+        //"drive.kind = 'recycle' must be there from the start"
     else if (any(abs(there - here) > 1.0e-12_real64*minval(sim%box%edges()))) then
       problem = "a side would jump: at this time the new motion must have the position of the old one"
     end if

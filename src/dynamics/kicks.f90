@@ -11,7 +11,7 @@ module kicks
   use tally, only: drive_energy
   implicit none
   private
-  public :: kick, draw_orientations
+  public :: change_spin, change_velocity, draw_orientations, kick
 
 contains
 

@@ -10,6 +10,7 @@ module timeline
   use kicks, only: kick
   use kinds, only: int32, int64, never, real64
   use partners, only: is_side, obstacle_number
+  use recycling, only: are_waiting, recycle_disks
   use shapes, only: magnitude
   use signals, only: stop_requested
   use simulation_state, only: simulation_t
@@ -77,8 +78,13 @@ contains
       if (epoch_is_over) call end_epoch()
     end if
     do while (arrived .and. sim%time() >= kick_time .and. next_kick(evolution, sim) <= kick_time)
-      call kick(sim, kicked)
-      call evolution%renew(sim, kicked)
+      if (sim%drive%moves_disks()) then
+        call recycle_disks(sim, kicked)
+        if (size(kicked) > 0) call evolution%start(sim)
+      else
+        call kick(sim, kicked)
+        call evolution%renew(sim, kicked)
+      end if
     end do
     sim%events_done = arrived .or. (sim%events_done .and. sim%tally%events == events .and. .not. sim%time() > before)
   contains
@@ -131,6 +137,9 @@ contains
     real(real64) :: t                              !! time since the start of the run; set to `never` if there are no kicks
 
     t = evolution%pause_at(sim%drive%time_of(sim%kicks + 1))
+    if (evolution%idle .and. sim%drive%moves_disks()) then     ! disks at rest that are not recycled now never will be
+      if (.not. are_waiting(sim)) t = never
+    end if
   end function next_kick
 
   !> Text of a message: the reason why events of disk i with its partner no longer advance the time, and a remedy.

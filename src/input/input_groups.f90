@@ -280,7 +280,7 @@ contains
             if (slot%given .and. word /= "" .and. .not. self%faulty(words(1))) call self%complain(trim(slot%name), &
               "has no effect with "//trim(words(1))//" = '"//trim(word)//"'; it applies with "//either(words(2:)), problems)
           else if (row%status == "required" .and. .not. slot%given) then
-            call self%complain(trim(words(1)), "'"//trim(word)//"' needs "//trim(self%name)//"."//slot%name, problems)
+            call demand_one(self, k, trim(words(1)), trim(word), problems)
           end if
         end if
         if (.not. slot%given) cycle
@@ -291,6 +291,28 @@ contains
       end associate
     end do
   end subroutine check_choices
+
+  !> Reports that a choice requires a variable that is not given. If the choice also permits a variable that excludes the first
+  !> variable, one of the two variables is required, and the problem is reported once.
+  pure subroutine demand_one(self, k, choice, word, problems)
+    class(group_t), intent(in) :: self
+    integer, intent(in) :: k                           !! position of the variable in `self%values`
+    character(len=*), intent(in) :: choice, word       !! name and value of the variable that makes the choice
+    type(problem_list_t), intent(inout) :: problems
+    character(len=:), allocatable :: needed
+    integer :: j
+
+    needed = trim(self%name)//"."//trim(self%values(k)%name)
+    do j = 1, size(self%values)
+      associate (other => self%values(j), row => self%values(k)%row)
+        if (.not. (excludes(row, other%row) .or. excludes(other%row, row))) cycle
+        if (.not. any(words_of(table(other%row)%goes_with) == word)) cycle
+        if (other%given .or. j < k) return
+        needed = needed//" or "//trim(self%name)//"."//trim(other%name)
+      end associate
+    end do
+    call self%complain(choice, "'"//word//"' needs "//needed, problems)
+  end subroutine demand_one
 
   !> Indices of the first and the last group with one of the given names. If the input contains no group with one of the given
   !> names, the last index is smaller than the first index.

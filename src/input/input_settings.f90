@@ -139,6 +139,7 @@ contains
         drive%temperature = group%real_of("temperature", 0.0_real64)
         drive%speed = group%real_of("self_propulsion_speed", 0.0_real64)
         drive%rotational_diffusion = group%real_of("rotational_diffusion", 0.0_real64)
+        if (drive%moves_disks()) call take_regions(group)
         wanted = group%text_of("species")
         if (wanted == "") return
         drive%species = place_of(wanted, known)
@@ -146,6 +147,17 @@ contains
           call group%complain("species", "there is no species "//shown(wanted)//"; "//suggestion(wanted, known), problems)
       end associate
     end subroutine take_drive
+
+    !> Sets the regions and the velocity of recycled disks.
+    subroutine take_regions(group)
+      type(group_t), intent(in) :: group
+
+      associate (drive => settings%drive)
+        if (group%given("velocity")) drive%velocity = group%reals_of("velocity")
+        if (group%given("from_region")) drive%from_region = group%reals_of("from_region")
+        if (group%given("to_region")) drive%to_region = group%reals_of("to_region")
+      end associate
+    end subroutine take_regions
 
     !> Sets the stop rules.
     subroutine take_stop(group)
@@ -254,6 +266,9 @@ contains
         "a single disk (species.count), which has no collision partner; give time or events")
       call refuse(settings%drive%keep_momentum .and. settings%n_driven() == 1, "drive.keep_momentum", &
         "a single driven disk, whose velocity would never change; set it to .false.")
+      call refuse(shear .and. settings%drive%moves_disks(), "box.shear_rate", "drive.kind = 'recycle'")
+      call refuse(settings%output%helfand .and. settings%drive%moves_disks(), "output.helfand", &
+        "drive.kind = 'recycle': recycled disks jump")
       call refuse(alone .and. (shear .or. kicks) .and. .not. timed, "stop", &
         "a single disk in a periodic box that is sheared (box.shear_rate) or driven (drive.kind): no event ever occurs; give time")
     end associate

@@ -437,6 +437,7 @@ contains
     call record%exchange(file, sim%reference_energy)
     call record%exchange(file, sim%typical_speed2)
     call record%exchange(file, sim%kicks)
+    if (allocated(sim%recycled)) call record%exchange(file, sim%recycled)
     call record%exchange(file, sim%changes)
     call exchange_tally()
     if (any(sim%box%surface%motion%kind == piston)) then

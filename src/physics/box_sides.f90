@@ -9,7 +9,7 @@ module box_sides
   use side_motion, only: piston, side_motion_t
   implicit none
   private
-  public :: bounds, separate_from_sides, next_side, side_time
+  public :: bounds, centre_range, separate_from_sides, next_side, side_time, spans
 
   !> Rounding error of the gap between a disk and a moving side, relative to the magnitude of the coordinates.
   real(real64), parameter :: rounding = 16*epsilon(1.0_real64)
@@ -31,6 +31,36 @@ contains
     lower = box%lower + inwards([1, 3])
     upper = box%upper - inwards([2, 4])
   end subroutine bounds
+
+  !> Whether the region extends over the whole period of the box, for each axis. Disks may extend beyond the region along an axis
+  !> for which the result is .true.
+  pure function spans(region, box) result(yes)
+    real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
+    type(box_t), intent(in) :: box
+    logical :: yes(2)
+
+    yes = box%periodic .and. region([1, 3]) <= box%lower .and. region([2, 4]) >= box%upper
+  end function spans
+
+  !> Corners of the rectangle that the centre of a disk in a region may occupy at a given time. If the centre of a disk is in the
+  !> rectangle, the disk is completely inside the region and does not overlap a side, even if the position of the side at this time
+  !> differs from its mean position.
+  pure subroutine centre_range(region, box, radius, lower, upper, t)
+    real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: radius              !! [length]
+    real(real64), intent(out) :: lower(2), upper(2)
+    !> Time relative to the time origin `box%epoch`; the default is 0 [time]
+    real(real64), intent(in), optional :: t
+    real(real64) :: inset(2), low(2), high(2), at
+
+    at = 0
+    if (present(t)) at = t
+    call bounds(box, at, low, high)
+    inset = merge(0.0_real64, radius, spans(region, box))
+    lower = max(region([1, 3]), low) + inset
+    upper = max(min(region([2, 4]), high) - inset, lower)    ! rounding errors must not make `upper` smaller than `lower`
+  end subroutine centre_range
 
   !> Time when the boundary of a disk touches a wall, or its centre reaches a periodic side. A gap that is negative because of
   !> rounding is set to zero: a disk at a wall that still moves outwards is then reflected immediately and cannot leave the box. At

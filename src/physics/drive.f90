@@ -1,5 +1,5 @@
-!> Driving of the disks at regular intervals: white noise, Andersen thermostat, Brownian or active motion. The module `kicks`
-!> executes the velocity changes.
+!> Driving of the disks at regular intervals: white noise, Andersen thermostat, Brownian or active motion, recycling. The module
+!> `kicks` executes the velocity changes, and the module `recycling` moves recycled disks.
 module drive
   use kinds, only: int64, never, real64
   implicit none
@@ -8,8 +8,8 @@ module drive
 
   !> Names of the kinds of driving in the input. Elsewhere in the program a kind of driving is represented by its position in the
   !> list `drive_kinds`.
-  character(len=*), parameter :: drive_kinds = "none noise andersen brownian active"
-  integer, parameter, public :: no_kicks = 1, noise = 2, andersen = 3, brownian = 4, active = 5
+  character(len=*), parameter :: drive_kinds = "none noise andersen brownian active recycle"
+  integer, parameter, public :: no_kicks = 1, noise = 2, andersen = 3, brownian = 4, active = 5, recycle = 6
 
   type :: drive_t
     integer :: kind = no_kicks                       !! position in `drive_kinds`
@@ -18,14 +18,18 @@ module drive
     real(real64) :: strength = 0.0_real64
     logical :: keep_momentum = .false.  !! whether white noise conserves the total momentum; .false. for other kinds of driving
     real(real64) :: fraction = 1.0_real64            !! mean fraction of the disks that a kick of 'andersen' affects
-    real(real64) :: temperature = 0.0_real64         !! kT of the velocities drawn by 'andersen', 'brownian' and 'active' [energy]
+    real(real64) :: temperature = 0.0_real64         !! kT of drawn velocities; 0 if velocities are not drawn [energy]
     real(real64) :: speed = 0.0_real64               !! self-propulsion speed of active disks [length/time]
     real(real64) :: rotational_diffusion = 0.0_real64   !! rotational diffusion coefficient of active disks [1/time]
     integer :: species = 0                           !! index of the only driven species; 0: all species are driven
+    real(real64) :: from_region(4) = 0.0_real64      !! region in which disks are recycled: xlo, xhi, ylo, yhi [length]
+    real(real64) :: to_region(4) = 0.0_real64        !! region to which recycled disks move: xlo, xhi, ylo, yhi [length]
+    real(real64) :: velocity(2) = 0.0_real64         !! velocity of recycled disks, if `temperature` is 0 [length/time]
   contains
     procedure :: is_on
     procedure :: acts_on
     procedure :: acts_on_all
+    procedure :: moves_disks
     procedure :: time_of
     procedure :: speed2
   end type drive_t
@@ -49,12 +53,20 @@ contains
     yes = self%is_on() .and. (self%species == 0 .or. self%species == species)
   end function acts_on
 
+  !> Whether the driving moves disks to other positions, and not only changes their velocities.
+  pure function moves_disks(self) result(yes)
+    class(drive_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%kind == recycle
+  end function moves_disks
+
   !> Whether each kick changes the velocities of all disks.
   pure function acts_on_all(self) result(yes)
     class(drive_t), intent(in) :: self
     logical :: yes
 
-    yes = self%is_on() .and. self%species == 0 .and. .not. (self%kind == andersen .and. self%fraction < 1)
+    yes = self%is_on() .and. self%species == 0 .and. .not. (self%moves_disks() .or. (self%kind == andersen .and. self%fraction < 1))
   end function acts_on_all
 
   !> Time of the k-th kick. The time is k times the interval, because a sum of intervals would accumulate rounding errors.
@@ -77,7 +89,7 @@ contains
     speed2 = 0
     if (.not. self%acts_on(species)) return
     if (self%kind == noise) speed2 = 2*self%strength*self%interval
-    if (self%kind >= andersen) speed2 = 2*self%temperature/mass + self%speed**2
+    if (self%kind >= andersen) speed2 = 2*self%temperature/mass + self%speed**2 + sum(self%velocity**2)
   end function speed2
 
 end module drive

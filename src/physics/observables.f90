@@ -3,7 +3,7 @@ module observables
   use kinds, only: int32, real64
   use box_geometry, only: box_t, free_area
   use box_sides, only: bounds
-  use drive, only: noise
+  use drive, only: recycle
   use partners, only: n_sides
   use simulation_state, only: simulation_t
   use tally, only: kinetic_flux, dissipated, drive_energy, flux_changes, gain, heat, heat_virial, impulse, stress, virial, work
@@ -63,6 +63,7 @@ contains
     call list%add("virial", [sim%tally%total(virial)])
     call list%add("dissipated_energy", [sim%tally%total(dissipated)])
     if (sim%drive%is_on() .or. sim%changes > 0) call list%add("drive_energy", [sim%tally%total(drive_energy)])
+    if (allocated(sim%recycled)) call list%add("recycled", real([sum(sim%recycled)], real64), is_count=.true.)
     call list%add("collisions", real([sim%tally%collisions], real64), is_count=.true.)
     associate (hits => sim%tally%surface_collisions, surface_sums => sim%tally%surface_sums)
       call list%add("side_collisions", real(hits(:n_sides), real64), is_count=.true.)
@@ -167,8 +168,8 @@ contains
     integer :: k
 
     allocate (empty%species(0))
+    empty%drive%kind = recycle
     call empty%make_room(0)
-    empty%drive%kind = noise
     call empty%tally%make_room(n_sides)
     empty%box = box_t()
     empty%box%surface%law%temperature = 1         ! all observables of walls exist if walls are thermal and move

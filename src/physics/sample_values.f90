@@ -18,7 +18,7 @@ module sample_values
   !> Columns of a frame: first the columns that exist in all runs, then the columns that exist only in some runs.
   type(frame_column_t), parameter :: columns(*) = [frame_column_t("position", 2), frame_column_t("velocity", 2), &
     frame_column_t("event_count", is_count=.true.), frame_column_t("image", 2, is_count=.true.), &
-    frame_column_t("angular_velocity"), frame_column_t("orientation")]
+    frame_column_t("angular_velocity"), frame_column_t("orientation"), frame_column_t("recycled", is_count=.true.)]
 
 contains
 
@@ -30,7 +30,8 @@ contains
     type(frame_column_t), allocatable :: list(:)
     integer :: k
 
-    list = pack(columns, [.true., .true., .true., any(sim%box%periodic), sim%features%rotation, sim%features%orientation])
+    list = pack(columns, [.true., .true., .true., any(sim%box%periodic), sim%features%rotation, sim%features%orientation, &
+      allocated(sim%recycled)])
     if (present(wanted)) list = pack(list, [.true., (any(wanted == list(k)%name), k=2, size(list))])
   end function frame_columns
 
@@ -72,6 +73,7 @@ contains
       if (at(4) > 0) sample(at(4) + 2*k:at(4) + 2*k + 1, 1) = image
       if (at(5) > 0) sample(at(5) + k, 1) = sim%spin(i)
       if (at(6) > 0) sample(at(6) + k, 1) = sim%extra(i)%angle + sim%spin(i)*(sim%now - sim%disk(i)%clock)
+      if (at(7) > 0) sample(at(7) + k, 1) = sim%recycled(k + 1)
     end do
     !$omp end parallel do
   end function frame_sample

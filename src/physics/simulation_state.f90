@@ -42,6 +42,8 @@ module simulation_state
     type(tag_t), allocatable :: tag(:)            !! (n)
     real(real64), allocatable :: own_mass(:)      !! (n) individual masses, allocated if masses within a species differ [mass]
     type(extra_t), allocatable :: extra(:)        !! (n) optional data, allocated if `has_extra`
+    !> (n) Number of times that each disk has been recycled, in the order of ids; allocated if the driving moves disks.
+    integer(int64), allocatable :: recycled(:)
     real(real64) :: now = 0.0_real64              !! present time, relative to the time origin `box%epoch` [time]
     logical :: events_done = .false.              !! all events up to and including `now` have been executed
     real(real64) :: epoch_begin = 0.0_real64      !! start of the epoch, relative to the time origin `box%epoch` [time]
@@ -151,6 +153,7 @@ contains
     allocate (self%disk(n), self%tag(n))
     if (self%has_extra()) allocate (self%extra(n))
     if (own_masses) allocate (self%own_mass(n), source=0.0_real64)
+    if (self%drive%moves_disks() .and. .not. present(like)) allocate (self%recycled(n), source=0_int64)
   end subroutine make_room
 
   !> All data of disk i.

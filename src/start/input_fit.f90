@@ -3,7 +3,7 @@
 module input_fit
   use kinds, only: int32, int64, pi, real64
   use box_geometry, only: box_t
-  use box_sides, only: bounds
+  use box_sides, only: bounds, spans
   use errors, only: exit_files
   use input_groups, only: group_t, range_of
   use input_problems, only: most_problems, problem_list_t
@@ -13,7 +13,6 @@ module input_fit
   use partners, only: n_sides, side_name
   use position_file, only: angle_row, radius_row, spin_row
   use radii, only: drawn_radii
-  use regular_positions, only: spans
   use settings, only: settings_t, species_settings_t
   use side_motion, only: piston, constant_velocity
   use starting_disks, only: read_disks, resolution
@@ -68,6 +67,7 @@ contains
     call need("angular_velocity", settings%features%rotation, "disks that rotate, for example by contact.tangential_restitution")
     call need("orientation", settings%features%orientation, &
       "disks that rotate, active disks, or a starting file with orientations")
+    call need("recycled", settings%drive%moves_disks(), "drive.kind = 'recycle'")
 
   contains
 
@@ -104,9 +104,80 @@ contains
       do k = 1, size(species)
         call check_species(groups(s(1) + k - 1), species(k), box, settings%n_disks() == 1, problems)
       end do
+      if (settings%drive%moves_disks()) call check_recycling(settings, groups(place_of("drive", groups%name)), problems)
       if (problems%count == 0) call check_strokes(box, pi*sum(species%count*species%radius**2), groups, problems)
     end associate
   end subroutine check_fit
+
+  !> Checks the regions between which disks are recycled: they must be apart and in the box, and the region to which disks move must
+  !> be wide enough for a disk and clear of obstacles.
+  subroutine check_recycling(settings, group, problems)
+    type(settings_t), intent(in) :: settings
+    type(group_t), intent(in) :: group                        !! the group `drive`
+    type(problem_list_t), intent(inout) :: problems
+    real(real64), parameter :: inner = 1 - 1.0e-9_real64      ! a region may touch an obstacle
+    real(real64) :: beyond(2, 2), radius, middle(2), half(2)
+    integer :: before, k
+
+    before = problems%count
+    beyond = settings%box%side_excursion()
+    call check_region("from_region", settings%drive%from_region)
+    call check_region("to_region", settings%drive%to_region)
+    if (problems%count > before) return
+    associate (box => settings%box, from => settings%drive%from_region, to => settings%drive%to_region)
+      if (all(from([1, 3]) < to([2, 4]) .and. to([1, 3]) < from([2, 4]))) then
+        call group%complain("to_region", "it overlaps drive.from_region, so that disks would be recycled again and again", problems)
+        return
+      end if
+      radius = maxval(settings%species%radius, mask=settings%drive%acts_on([(k, k=1, size(settings%species))]))
+      half = 0.5_real64*(to([2, 4]) - to([1, 3]))
+      middle = 0.5_real64*(to([1, 3]) + to([2, 4]))
+      if (any(half <= radius .and. .not. spans(to, box))) call group%complain("to_region", &
+        "a disk of diameter "//written(2*radius)//" needs more room; the region is "//written(2*half(1))//" x " &
+        //written(2*half(2)), problems)
+      do k = 1, box%n_obstacles()
+        if (.not. is_in_the_way(box, k, middle, inner*half)) cycle
+        call group%complain("to_region", 'it overlaps obstacle "'//box%surface(box%obstacle(k)%surface)%name//'"', problems)
+        exit
+      end do
+    end associate
+
+  contains
+
+    !> Reports a region that is empty or extends beyond the box.
+    subroutine check_region(name, region)
+      character(len=*), intent(in) :: name
+      real(real64), intent(in) :: region(4)                   !! xlo, xhi, ylo, yhi [length]
+
+      if (any(region([1, 3]) >= region([2, 4]))) then
+        call group%complain(name, "its lower ends must be below its upper ends; give xlo, xhi, ylo, yhi", problems)
+      else if (any(region([1, 3]) < settings%box%lower - beyond(:, 1) .or. region([2, 4]) > settings%box%upper + beyond(:, 2))) then
+        call group%complain(name, "it extends beyond the box", problems)
+      end if
+    end subroutine check_region
+  end subroutine check_recycling
+
+  !> Whether the outline of an obstacle crosses a rectangle, or the obstacle excludes disks from the whole rectangle.
+  pure function is_in_the_way(box, m, middle, half) result(yes)
+    type(box_t), intent(in) :: box
+    integer, intent(in) :: m                                  !! index of the obstacle
+    real(real64), intent(in) :: middle(2), half(2)            !! centre and half edges of the rectangle [length]
+    logical :: yes
+    real(real64) :: d(2)
+    integer :: last(2), kx, ky
+
+    yes = .false.
+    associate (shape => box%obstacle(m)%shape)
+      last = merge(1, 0, box%periodic .and. .not. shape%encloses)
+      do ky = -last(2), last(2)
+        do kx = -last(1), last(1)
+          d = middle + [kx, ky]*box%edges() - shape%middle
+          yes = shape%reaches(d, half, 0.0_real64) .or. shape%covers(d, half, 0.0_real64)
+          if (yes) return
+        end do
+      end do
+    end associate
+  end function is_in_the_way
 
   !> Reports an invalid position of an obstacle, with the line of the obstacle in its file or the number of the point in its
   !> polyline.

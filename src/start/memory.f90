@@ -23,8 +23,8 @@ module memory
   real(real64), parameter :: extra = 40, own_size = 8
   real(real64), parameter :: sampled = 8.8_real64            !! memory for each value of a disk in a frame
   real(real64), parameter :: listed = 264                    !! neighbour list of a disk
-  !> `kicked`: random numbers of the driving; `stepped`: Verlet lists of time-stepped dynamics.
-  real(real64), parameter :: kicked = 16, stepped = 100
+  !> `kicked`: random numbers of the driving; `placed_anew`: test for free positions of recycled disks; `stepped`: Verlet lists of time-stepped dynamics.
+  real(real64), parameter :: kicked = 16, placed_anew = 70, stepped = 100
   !> Additional memory per disk if the box is divided into domains: the first number applies to a box with walls, the second number
   !> to a periodic box.
   real(real64), parameter :: divided(2) = [152, 212]
@@ -89,7 +89,7 @@ contains
     if (settings%features%own_sizes) more = more + own_size
     running = record + cell*cells(settings) + more + sampled*numbers_in_frame(settings)
     if (lists) running = running + listed
-    if (settings%drive%is_on()) running = running + kicked
+    if (settings%drive%is_on()) running = running + merge(placed_anew, kicked, settings%drive%moves_disks())
     if (settings%run%dynamics == "steps") running = running + stepped
     if (domains) running = running + divided(merge(2, 1, all(settings%box%periodic)))
     if (domains .and. lists) running = running + listed_twice
@@ -124,7 +124,8 @@ contains
     n = 0
     associate (frames => settings%output%sampling(1), features => settings%features)
       if (.not. (any(frames%every < never) .or. allocated(frames%at) .or. frames%per_decade > 0)) return
-      n = 5 + merge(2, 0, any(settings%box%periodic)) + merge(1, 0, features%rotation) + merge(1, 0, features%orientation)
+      n = 5 + merge(2, 0, any(settings%box%periodic)) + merge(1, 0, features%rotation) + merge(1, 0, features%orientation) &
+        + merge(1, 0, settings%drive%moves_disks())
     end associate
     if (.not. allocated(settings%output%frame_columns)) return
     n = 2

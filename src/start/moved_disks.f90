@@ -20,9 +20,8 @@ contains
     type(simulation_t), intent(in) :: sim
     type(error_t), allocatable, intent(out) :: error
     type(packing_t) :: packing
-    real(real64) :: x(2, size(sim%disk)), radius(size(sim%disk)), lower(2), upper(2), low(2), high(2), inset(2), slack
-    integer(int32) :: id(size(sim%disk)), species(size(sim%disk)), i, s, blocker
-    logical, allocatable :: mine(:)
+    real(real64) :: x(2, size(sim%disk)), radius(size(sim%disk)), lower(2), upper(2), inset(2), slack
+    integer(int32) :: id(size(sim%disk)), species(size(sim%disk)), i, blocker
 
     id = sim%tag%id
     species(id) = sim%tag%species
@@ -32,13 +31,7 @@ contains
     end do
     call bounds(sim%box, sim%now, lower, upper)
     packing = packing_t(sim%box, int(sim%n_disks()), size(sim%species))
-    do s = 1, int(size(sim%species), int32)
-      mine = species == s
-      if (.not. any(mine)) cycle
-      low = [minval(x(1, :), mask=mine), minval(x(2, :), mask=mine)]
-      high = [maxval(x(1, :), mask=mine), maxval(x(2, :), mask=mine)]
-      call packing%open_species(s, maxval(radius, mask=mine), count(mine), low, high)
-    end do
+    call packing%open_all_species(int(species), radius, minval(x, dim=2), maxval(x, dim=2))
     do i = 1, sim%n_disks()
       slack = rounding*(radius(i) + maxval(radius))
       inset = merge(0.0_real64, radius(i) - slack, sim%box%periodic)

@@ -8,7 +8,7 @@ module placement
   use images, only: images_t
   use kinds, only: int32, int64, pi, real64
   use box_geometry, only: box_t
-  use box_sides, only: bounds
+  use box_sides, only: bounds, centre_range, spans
   use circles, only: new_circle
   use dense_growth, only: grow_disks, smallest_scale
   use disks, only: disks_before
@@ -22,7 +22,7 @@ module placement
   use radii, only: drawn_radii
   use random_insertion, only: insert_at_random, largest_first
   use random_stream, only: random_stream_t
-  use regular_positions, only: centre_range, grid_positions, lattice_positions, spans
+  use regular_positions, only: grid_positions, lattice_positions
   use settings, only: species_settings_t
   use simulation_state, only: simulation_t
   use starting_disks, only: origin

@@ -2,7 +2,7 @@
 module regular_positions
   use kinds, only: real64
   use box_geometry, only: box_t
-  use box_sides, only: bounds
+  use box_sides, only: centre_range, spans
   use input_groups, only: group_t
   use input_problems, only: problem_list_t
   use settings, only: species_settings_t
@@ -10,35 +10,9 @@ module regular_positions
   use texts, only: written
   implicit none
   private
-  public :: centre_range, grid_positions, lattice_positions, spans
+  public :: grid_positions, lattice_positions
 
 contains
-
-  !> Whether the region extends over the whole period of the box, for each axis. Disks may extend beyond the region along an axis
-  !> for which the result is .true.
-  pure function spans(region, box) result(yes)
-    real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
-    type(box_t), intent(in) :: box
-    logical :: yes(2)
-
-    yes = box%periodic .and. region([1, 3]) <= box%lower .and. region([2, 4]) >= box%upper
-  end function spans
-
-  !> Corners of the rectangle that the centre of a disk may occupy at the start. If the centre of a disk is in the rectangle, the
-  !> disk is completely inside the region and does not overlap a side, even if the initial position of the side differs from its
-  !> mean position.
-  pure subroutine centre_range(region, box, radius, lower, upper)
-    real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
-    type(box_t), intent(in) :: box
-    real(real64), intent(in) :: radius              !! [length]
-    real(real64), intent(out) :: lower(2), upper(2)
-    real(real64) :: inset(2), low(2), high(2)
-
-    call bounds(box, 0.0_real64, low, high)
-    inset = merge(0.0_real64, radius, spans(region, box))
-    lower = max(region([1, 3]), low) + inset
-    upper = max(min(region([2, 4]), high) - inset, lower)    ! rounding errors must not make `upper` smaller than `lower`
-  end subroutine centre_range
 
   !> Positions on a rectangular grid: the centres of nx*ny equal cells of the region, row by row from the bottom.
   subroutine grid_positions(species, group, x, problems)

@@ -93,12 +93,15 @@ module choices
       //"distribution."), &
     choice_t("kind", "active", "Active Brownian disks: as 'brownian', with an additional velocity (self_propulsion_speed) " &
       //"along the orientation of each disk, which diffuses."), &
+    choice_t("kind", "recycle", "Recycling: each disk in from_region moves to a random free position in to_region, with a new " &
+      //"velocity. Displacements of disks are not defined in such a run."), &
     choice_t("frame_columns", "position", "Positions of the disks."), &
     choice_t("frame_columns", "velocity", "Velocities of the disks."), &
     choice_t("frame_columns", "event_count", "Number of events of each disk since the start."), &
     choice_t("frame_columns", "image", "Number of periods by which each disk has moved, if a boundary is periodic."), &
     choice_t("frame_columns", "angular_velocity", "Angular velocities, if disks rotate."), &
     choice_t("frame_columns", "orientation", "Orientations, if disks rotate or are active."), &
+    choice_t("frame_columns", "recycled", "Number of times that each disk has been recycled, if drive.kind is 'recycle'."), &
     choice_t("precision", "double", "64 bits per number."), &
     choice_t("precision", "single", "32 bits per number: half the size of 'double', about seven significant digits.")]
 

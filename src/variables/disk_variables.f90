@@ -155,11 +155,13 @@ module disk_variables
   type(variable_t), parameter :: drive_rows(*) = [ &
     variable_t("drive", "kind", "text", 1, "default", "'none'", &
       "Kind of driving. Driving changes the velocities of the disks at all multiples of the time interval; such a change is " &
-      //"called a kick. Driving cannot be combined with stop.energy_fraction or stop.at_rest.", &
+      //"called a kick. A kick of the kind 'recycle' also moves disks. Driving cannot be combined with stop.energy_fraction or " &
+      //"stop.at_rest.", &
       choices=drive_kinds, may_change=in_motion), &
     variable_t("drive", "interval", "real", 1, "required", "0.01", &
       "Time between two kicks. Choose an interval well below the mean time between collisions, unless the kicks themselves " &
-      //"are studied.", positive, "time", goes_with="kind noise andersen brownian active", may_change=in_motion), &
+      //"are studied. With kind = 'recycle', choose an interval that is shorter than the time in which a disk passes through " &
+      //"from_region.", positive, "time", goes_with="kind noise andersen brownian active recycle", may_change=in_motion), &
     variable_t("drive", "strength", "real", 1, "required", "0.1", &
       "Strength of the noise: rate at which the kicks increase the variance of each velocity component. The rate is equal for " &
       //"disks of all masses.", &
@@ -171,8 +173,24 @@ module disk_variables
       "Probability that a kick changes the velocity of a given disk. The probability divided by interval is the collision " &
       //"frequency of the Andersen thermostat.", part_of_all, goes_with="kind andersen", may_change=in_motion), &
     variable_t("drive", "temperature", "real", 1, "required", "1", &
-      "Temperature kT of the Maxwell distribution from which a kick draws new velocities.", positive, "energy", &
-      goes_with="kind andersen brownian active", may_change=in_motion), &
+      "Temperature kT of the Maxwell distribution from which a kick draws new velocities. With kind = 'recycle', either " &
+      //"temperature or velocity must be given.", positive, "energy", &
+      goes_with="kind andersen brownian active recycle", may_change=in_motion, &
+      otherwise="none; must be given where it applies, or velocity instead if kind is 'recycle'"), &
+    variable_t("drive", "velocity", "real", 2, "required", "0, -1", &
+      "Velocity of recycled disks. With this variable recycled disks do not rotate. Either temperature or velocity must be " &
+      //"given.", &
+      unit="length/time", goes_with="kind recycle", excludes="temperature", may_change=in_motion, &
+      otherwise="none; velocity or temperature must be given where it applies"), &
+    variable_t("drive", "from_region", "real", 4, "required", "0, 1, 0, 0.1", &
+      "Region (xlo, xhi, ylo, yhi) in which disks are recycled: at all multiples of the time interval each disk whose centre is " &
+      //"in this region moves to a random free position in to_region. After 100 random positions that are not free, the disk " &
+      //"stays where it is until the next multiple of the interval. Disks move in the order of their ids.", &
+      unit="length", goes_with="kind recycle", may_change=in_motion), &
+    variable_t("drive", "to_region", "real", 4, "required", "0, 1, 0.9, 1", &
+      "Region (xlo, xhi, ylo, yhi) to which recycled disks move. A recycled disk lies completely inside this region, except " &
+      //"along a periodic axis that the region spans. The region must not overlap from_region, an obstacle or a straight wall.", &
+      unit="length", goes_with="kind recycle", may_change=in_motion), &
     variable_t("drive", "self_propulsion_speed", "real", 1, "required", "1", &
       "Self-propulsion speed of an active disk: each kick adds a velocity of this magnitude along the orientation of the disk.", &
       not_negative, "length/time", &
@@ -182,7 +200,7 @@ module disk_variables
       //"at the rate 2 D_r.", not_negative, "1/time", goes_with="kind active", may_change=in_motion), &
     variable_t("drive", "species", "text", 1, "fallback", "''", &
       "Name of the only species that is driven. If the text is empty, all species are driven.", &
-      goes_with="kind noise andersen brownian active", may_change=in_motion)]
+      goes_with="kind noise andersen brownian active recycle", may_change=in_motion)]
 
   type(variable_t), parameter :: disk_rows(*) = [species_rows, contact_rows, drive_rows]
 

@@ -117,7 +117,7 @@ module run_variables
     variable_t("output", "frame_columns", "text", 0, "optional", "'position', 'velocity'", &
       "Quantities that frames contain. Positions are always written. A quantity that the disks of the run do not have is " &
       //"refused. Scripts that need a quantity that the file does not contain report an error.", &
-      choices="position velocity event_count image angular_velocity orientation", &
+      choices="position velocity event_count image angular_velocity orientation recycled", &
       otherwise="all quantities that the run has"), &
     variable_t("output", "precision", "text", 1, "default", "'double'", &
       "Precision of positions and velocities in frames. Checkpoints are always in double precision.", &

@@ -42,7 +42,7 @@ LATEST = 1e100  # that an input can name
 KILLED = (STOPPED, -signal.SIGTERM, -signal.SIGKILL)
 NOT_THE_END = ("placing disks:", "warning:", "note:", "stopped; the run is finished")
 #: Message for systems whose disks do not fit into the box.
-NO_ROOM = re.compile(r"species\.(radius|placement|file|position): ")
+NO_ROOM = re.compile(r"(species\.(radius|placement|file|position)|drive\.to_region): ")
 #: Data about the execution of a run, which may differ between runs with equal results.
 ASIDE = re.compile(
     r"^/parameters(/run@(search|queue)|/overrides|/output@checkpoint_every|/stop@wall_clock)$"

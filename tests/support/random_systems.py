@@ -73,6 +73,7 @@ class Draw:
         self.least = 0.6 if self.chance(0.2) else 0  # restitution; of the viscoelastic law
         self.turns = self.chance(0.3)
         self.rotates = False
+        self.recycles = False
         self.driven = self.chance(0.3)
         self.falls = self.chance(0.3) and not all(self.periodic)
         self.sheared = all(self.periodic) and not self.steps and self.chance(0.5)
@@ -412,8 +413,24 @@ class Draw:
                 f" self_propulsion_speed = {self.speed!r}{turn}",
             ]
         )
+        if not self.sheared and self.chance(0.3):
+            self.recycles, words = True, self.recycling(energy)
         words += self.maybe(0.3, "species = 's0'")
         return f"&drive interval = {interval!r} {words} /"
+
+    def recycling(self, energy: float) -> str:
+        """Draw the regions between which disks are recycled, and the velocity of recycled disks."""
+        rng = self.rng
+        axis, first, second = rng.choice([0, 1]), rng.uniform(0.05, 0.5), rng.uniform(0.5, 0.9)
+        regions = [[0.0, 1.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0]]
+        regions[0][2 * axis + 1], regions[1][2 * axis] = first, second
+        rng.shuffle(regions)
+        words = "kind = 'recycle'"
+        for name, (x1, x2, y1, y2) in zip(("from", "to"), regions, strict=True):
+            (left, low), (right, high) = self.place(x1, y1), self.place(x2, y2)
+            words += f" {name}_region = {numbers(left, right, low, high)}"
+        velocity = numbers(*(self.speed * rng.uniform(-1, 1) for _ in "xy"))
+        return words + rng.choice([f" temperature = {energy!r}", f" velocity = {velocity}"])
 
     def stop(self) -> str:
         rng = self.rng
@@ -434,7 +451,7 @@ class Draw:
         rng = self.rng
         words = "&output" + self.maybe(0.4, "event_log = .true.")
         words += self.maybe(0.2, "precision = 'single'") + self.maybe(0.3, "virial_tensor = .true.")
-        words += "" if self.falls or self.sheared else self.maybe(0.3, "helfand = .true.")
+        words += "" if self.falls or self.sheared or self.recycles else self.maybe(0.3, "helfand = .true.")
         words += self.maybe(0.1, "checkpoint_every = 1e-3")
         for track in "frames", "observables":
             for kind in rng.sample(CADENCES, rng.choice([0, 1, 1, 1])):
@@ -451,7 +468,8 @@ class Draw:
     def own_columns(self) -> str:
         """Return the columns of frames that exist in some systems only, among them in this one."""
         image = ", 'image'" if any(self.periodic) else ""
-        return image + (", 'orientation'" if self.rotates else "")
+        recycled = ", 'recycled'" if self.recycles else ""
+        return image + (", 'orientation'" if self.rotates else "") + recycled
 
     def cadence(self, kind: str) -> float:
         """Draw the sampling interval of frames or observables."""

@@ -65,7 +65,7 @@ CLOSE = 1e-9  # relative difference of lags that are regarded as equal
 MOST_PAIRS = 2 * 10**6  # largest number of pairs whose lags are compared
 MOST_DISKS = 10**8  # largest number of disks in pairs of samples, if every sample is an origin
 CHUNK = 10**6  # largest number of disks in frames that are read together
-FLOWING = {"sheared", "sliding_surfaces", "changed"}
+FLOWING = {"sheared", "sliding_surfaces", "recycled", "changed"}
 FIXED = ("msd", "fourth", "vacf", "diffusion", "overlap")
 
 

@@ -63,6 +63,7 @@ def snapshot_run(simulation: Simulation) -> SnapshotRun:
         velocity=simulation.velocity[None],
         image=None,
         event_count=None,
+        recycled=None,
         disk_data=elements,
         mass=simulation.mass,
         radius=simulation.radius,

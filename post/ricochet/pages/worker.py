@@ -328,6 +328,8 @@ class Session:
         parts = [simulation.position, simulation.velocity]
         if TURNS in run.disk_data:
             parts.append(simulation.orientation)
+        if "recycled" in run.nature:
+            parts.append(simulation.recycled)
         body = b"".join(np.asarray(part, dtype=np.float32).tobytes() for part in parts)
         send(b"b", struct.pack("6d", *head) + body)
         self.unconfirmed += 1

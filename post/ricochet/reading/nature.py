@@ -26,6 +26,7 @@ TRAITS = {
     "noise_driven": "is heated by noise (&drive)",
     "random_walk": "has a centre of mass that noise moves (drive.keep_momentum)",
     "active": "has active disks (&drive)",
+    "recycled": "recycles disks (drive.kind = 'recycle'), which jump",
     "moving_sides": "has moving sides",
     "piston": "has a piston",
     "sliding_surfaces": "has sliding surfaces",
@@ -50,6 +51,7 @@ SOURCES = {
     "sheared",
     "noise_driven",
     "active",
+    "recycled",
     "moving_sides",
     "piston",
     "sliding_surfaces",
@@ -57,7 +59,7 @@ SOURCES = {
 SOURCES |= {"thermostatted", "thermal_walls"}
 THERMOSTATS = ("andersen", "brownian")  # kinds of driving with a heat bath
 #: Physical properties (traits) of runs whose velocities also change between collisions.
-KICKED = {"noise_driven", "active", "thermostatted"}
+KICKED = {"noise_driven", "active", "recycled", "thermostatted"}
 #: Physical properties (traits) of runs whose velocities do not relax to a Maxwell distribution.
 UNSETTLED = {*SOURCES, "unequal_temperatures", "inelastic", "soft_contacts", "round_container"} - {
     "thermostatted",
@@ -144,6 +146,7 @@ def nature_of(
         and not drive.get("keep_momentum", False)
         and drifts(parameters),
         "active": kind == "active",
+        "recycled": kind == "recycle",
         "moving_sides": bool(motions - {"still", "piston"}),
         "piston": "piston" in motions,
         "sliding_surfaces": any(one.get("surface_velocity", 0.0) != 0 for one in surfaces),
@@ -166,6 +169,7 @@ def nature_of(
         "gravity",
         "noise_driven",
         "active",
+        "recycled",
         "thermostatted",
         "inelastic",
         "rough",

@@ -159,7 +159,7 @@ class Run(BoxResults):
 
         In a sheared box (Lees-Edwards boundary conditions), the periodic image above the box is
         displaced along x by gamma L_y t.  Here gamma is the shear rate and L_y is the height of the
-        box.
+        box.  If disks are recycled, continuous positions do not exist, and an error is raised.
 
         Parameters
         ----------
@@ -177,6 +177,7 @@ class Run(BoxResults):
         >>> bool(np.allclose(apart, np.round(apart), atol=1e-9))
         True
         """
+        allow(self, "displacements are not defined", *TRAITS.keys() - {"recycled"})
         frame = as_index(frame)
         if self.image is None:
             return self.position[frame]
@@ -284,7 +285,7 @@ class Run(BoxResults):
         dimensions = ("time", "disk", "component")
         frames: dict[str, Frames | None]
         frames = {"position": self.position, "velocity": self.velocity, **self.disk_data}
-        frames |= {"image": self.image, "event_count": self.event_count}
+        frames |= {"image": self.image, "event_count": self.event_count, "recycled": self.recycled}
         data: dict[str, tuple[Any, np.ndarray]] = {
             name: (dimensions[: values.ndim], values[:])
             for name, values in frames.items()
@@ -544,6 +545,7 @@ def run_of(path: Path, file: h5py.File, folder: object = None) -> Run:
         velocity=frames.pop("velocity", Frames(path, "velocity", plane, folder)),
         image=frames.pop("image", Frames(path, "image", plane, folder) if any(periodic) else None),
         event_count=frames.pop("event_count", None),
+        recycled=frames.pop("recycled", None),
         disk_data=frames,
         mass=rows(disks["mass"]),
         radius=rows(disks["radius"]),

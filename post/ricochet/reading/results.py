@@ -31,6 +31,7 @@ class Results:
     velocity: Frames  # (T, N, 2); not available if `output.frame_columns` omits it
     image: Frames | None  # (T, N, 2) periods crossed; None without periodic sides
     event_count: Frames | None  # (T, N) numbers per disk; None if not in the frames
+    recycled: Frames | None  # (T, N) how often each disk was recycled; None if no disk can be
     disk_data: dict[str, Frames]  # (T, N) further quantities of the disks, by name
     mass: np.ndarray  # (N,)
     radius: np.ndarray  # (N,)

@@ -23,6 +23,7 @@ COLUMNS = {
     "angular_velocity": float,
     "orientation": float,
     "image": np.int64,
+    "recycled": np.int64,
     "radius": float,
     "mass": float,
     "species": np.int32,
@@ -185,6 +186,14 @@ class State(Session):
         the positions form a continuous path.  If no side is periodic, AttributeError is raised.
         """
         return self._column("image")
+
+    @property
+    def recycled(self) -> np.ndarray:
+        """Number of times that each disk has been recycled, (N,).
+
+        If the driving does not recycle disks, AttributeError is raised.
+        """
+        return self._column("recycled")
 
     @property
     def radius(self) -> np.ndarray:

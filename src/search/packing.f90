@@ -41,6 +41,7 @@ module packing
     !> `open_species`.
     type(obstacle_cells_t) :: near
   contains
+    procedure :: open_all_species
     procedure :: open_species
     procedure :: add
     procedure :: find_blocker
@@ -98,6 +99,21 @@ contains
       allocate (layer%head(n(1), n(2)), source=0_int32)
     end associate
   end subroutine open_species
+
+  !> Sets up the cells of all species for given disks.
+  subroutine open_all_species(self, species, radius, lower, upper)
+    class(packing_t), intent(inout) :: self
+    integer, intent(in) :: species(:)               !! (n) index of the species of each disk
+    real(real64), intent(in) :: radius(:)           !! (n) [length]
+    real(real64), intent(in) :: lower(2), upper(2)  !! corners of a rectangle that contains the centres of all disks [length]
+    integer(int32) :: s
+
+    do s = 1, size(self%layer, kind=int32)
+      associate (mine => species == s)
+        if (any(mine)) call self%open_species(s, maxval(radius, mask=mine), count(mine), lower, upper)
+      end associate
+    end do
+  end subroutine open_all_species
 
   !> Adds disk k of species s at the point p, without a test for overlaps.
   pure subroutine add(self, k, s, p, radius)
