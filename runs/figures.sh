@@ -5,7 +5,7 @@
 #   runs/figures.sh gas crater      some
 #   runs/figures.sh -j 4 gas        options before the names go to ensemble.sh
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
-known=(scattering gas mixture cooling crater lab cost billiards lorentz gravity state stages melting driven)
+known=(scattering gas mixture cooling crater lab cost billiards lorentz gravity state stages melting driven hopper)
 
 options=()
 while [[ ${1:-} == -* ]]; do
@@ -116,6 +116,11 @@ HTML
   section heated 'A granular gas with white-noise driving' driven
   section active 'Active disks form clusters' driven
   section transport 'Bulk: viscosity, conductivity, diffusion' driven
+  section discharge 'A refilled hopper: discharge rate and the law of Beverloo' hopper
+  section hopper 'A hopper that is refilled' hopper
+  section drum 'A rotating drum' hopper
+  section intruder 'A dragged intruder' hopper
+  section stirrer 'A stirrer of constant speed' hopper
   section coverage 'Bulk: coverage of error bars' coverage
   printf '</main>\n</html>\n'
 } | replace "$figures/index.html"

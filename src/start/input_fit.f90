@@ -115,7 +115,7 @@ contains
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: group                        !! the group `drive`
     type(problem_list_t), intent(inout) :: problems
-    real(real64), parameter :: inner = 1 - 1.0e-9_real64      ! a region may touch an obstacle
+    real(real64), parameter :: nearly = 1 - 1.0e-6_real64     ! a region may touch an obstacle
     real(real64) :: beyond(2, 2), radius, middle(2), half(2)
     integer :: before, k
 
@@ -135,8 +135,9 @@ contains
       if (any(half <= radius .and. .not. spans(to, box))) call group%complain("to_region", &
         "a disk of diameter "//written(2*radius)//" needs more room; the region is "//written(2*half(1))//" x " &
         //written(2*half(2)), problems)
+      half = max(half - merge(0.0_real64, radius, spans(to, box)), 0.0_real64)       ! the rectangle of the centres
       do k = 1, box%n_obstacles()
-        if (.not. is_in_the_way(box, k, middle, inner*half)) cycle
+        if (.not. is_in_the_way(box, k, middle, half, nearly*radius)) cycle
         call group%complain("to_region", 'it overlaps obstacle "'//box%surface(box%obstacle(k)%surface)%name//'"', problems)
         exit
       end do
@@ -157,11 +158,12 @@ contains
     end subroutine check_region
   end subroutine check_recycling
 
-  !> Whether the outline of an obstacle crosses a rectangle, or the obstacle excludes disks from the whole rectangle.
-  pure function is_in_the_way(box, m, middle, half) result(yes)
+  !> Whether a disk whose centre is in a rectangle can touch an obstacle, or the obstacle excludes disks from the whole rectangle.
+  pure function is_in_the_way(box, m, middle, half, radius) result(yes)
     type(box_t), intent(in) :: box
     integer, intent(in) :: m                                  !! index of the obstacle
     real(real64), intent(in) :: middle(2), half(2)            !! centre and half edges of the rectangle [length]
+    real(real64), intent(in) :: radius                        !! [length]
     logical :: yes
     real(real64) :: d(2)
     integer :: last(2), kx, ky
@@ -172,7 +174,7 @@ contains
       do ky = -last(2), last(2)
         do kx = -last(1), last(1)
           d = middle + [kx, ky]*box%edges() - shape%middle
-          yes = shape%reaches(d, half, 0.0_real64) .or. shape%covers(d, half, 0.0_real64)
+          yes = shape%reaches(d, half, radius) .or. shape%covers(d, half, radius)
           if (yes) return
         end do
       end do

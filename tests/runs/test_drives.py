@@ -211,6 +211,104 @@ def test_a_driven_gas_does_not_end_for_being_cold(performed):
     assert "note" not in said and "time = 2e16" in said
 
 
+# --- recycling: disks that jump from one region to another ---
+
+FALLING = """&run seed = 4 /
+&box lower = -1, 2 upper = 1, 5 gravity = 0, -1 boundary = '{}', 'wall' /
+&species name = 'a' count = 60 radius = 0.03 mass = 2 region = -1, 1, 3, 5 temperature = 0.1 /
+&species name = 'b' count = 20 radius = 0.06 region = -1, 1, 3, 5 /
+&drive kind = 'recycle' interval = 0.25 from_region = -0.9, 0.9, 2, 2.4 to_region = -1, 1, 4, 5 {} /
+&contact restitution = 0.9 contact_time = 1e-4 tangential_restitution = 0.2 /
+&stop time = 10 / &output frames_every_time = 0.25 observables_every_time = 0.25 /
+"""
+
+
+def recycled_now(found) -> np.ndarray:
+    """Return which disks (T - 1, N) were recycled between a frame and the next frame."""
+    return np.diff(found["/particles/disks/recycled/value"], axis=0) > 0
+
+
+@pytest.mark.parametrize("side", ["wall", "periodic"])
+def test_disks_in_one_region_continue_in_the_other(observed, side):
+    """Frames at the times of recycling show each recycled disk in its new place and no other."""
+    found = observed(FALLING.format(side, "velocity = 0.5, -2 species = 'a'"))
+    x, v, spin = (
+        found[f"/particles/disks/{name}/value"]
+        for name in ("position", "velocity", "angular_velocity")
+    )
+    now = recycled_now(found)
+    inset = np.where(side == "wall", 0.03, 0), 0.03
+    assert now.sum() > 100 and not now[:, 60:].any(), "only species a is recycled"
+    places = x[1:][now]
+    assert np.all(places >= [-1 + inset[0], 4.03]) and np.all(places <= [1 - inset[0], 4.97])
+    assert np.all(v[1:][now] == [0.5, -2]) and np.all(spin[1:][now] == 0)
+    inside = np.all((x[1:, :60] >= [-0.9, 2]) & (x[1:, :60] <= [0.9, 2.4]), axis=-1)
+    assert not inside.any(), "every disk finds a place"
+    total = found["/observables/recycled/value"]
+    assert (total == found["/particles/disks/recycled/value"].sum(axis=1)).all()
+    assert list(laws_broken(found)) == []
+    if side == "periodic":
+        assert not found["/particles/disks/image/value"][1:][now].any()
+
+
+def test_recycled_disks_have_the_temperature_of_the_drive(observed):
+    """Velocities and spins of recycled disks are Gaussian; places are uniform in the region."""
+    text = FALLING.format("wall", "temperature = 3").replace("time = 10", "time = 60")
+    found = observed(text)
+    now = recycled_now(found)
+    mass, radius = (found[f"/particles/disks/{name}"] for name in ("mass", "radius"))
+    rows, disks = np.nonzero(now)
+    v = found["/particles/disks/velocity/value"][1:][now] * np.sqrt(mass[disks] / 3)[:, None]
+    inertia = mass[disks] * radius[disks] ** 2 / 2
+    spin = found["/particles/disks/angular_velocity/value"][1:][now] * np.sqrt(inertia / 3)
+    several = 4 / np.sqrt(len(rows))
+    assert len(rows) > 500
+    assert v.mean(axis=0) == pytest.approx([0, 0], abs=several)
+    assert v.var(axis=0) == pytest.approx([1, 1], abs=1.5 * several)
+    assert spin.var() == pytest.approx(1, abs=1.5 * several)
+    places = found["/particles/disks/position/value"][1:][now][:, 0] / (1 - radius[disks])
+    assert places.mean() == pytest.approx(0, abs=several)
+    assert places.var() == pytest.approx(1 / 3, abs=several)
+
+
+def test_disks_wait_until_there_is_room(observed):
+    """A disk that finds no free place stays; it moves when the disk in its way has gone."""
+    found = observed(
+        """&box upper = 6, 1 /
+        &species name = 'a' radius = 0.4 position = 0.6, 0.5 /
+        &species name = 'b' radius = 0.4 position = 2.6, 0.5 velocity = 0.25, 0 /
+        &drive kind = 'recycle' interval = 1 species = 'a' velocity = 0, 0
+        from_region = 0, 1, 0, 1 to_region = 2.1, 3.1, 0, 1 / &stop time = 4 /
+        &output frames_every_time = 1 observables_every_time = 1 /"""
+    )
+    assert found["/observables/recycled/value"].tolist() == [0, 0, 0, 1, 1]
+    x = found["/particles/disks/position/value"]
+    assert (x[:3, 0] == [0.6, 0.5]).all() and 2.5 <= x[3, 0, 0] <= 2.7
+    assert np.linalg.norm(x[3, 0] - x[3, 1]) >= 0.8
+
+
+def test_a_recycled_disk_has_no_last_contact(observed):
+    """A disk hits the floor immediately after it was recycled, and loses energy there."""
+    found = observed(
+        """&species count = 1 radius = 0.1 position = 0.5, 0.2 velocity = 0, -1 /
+        &contact restitution = 0.5 contact_time = 10 / &output frames_every_events = 1 /
+        &drive kind = 'recycle' interval = 0.2 velocity = 0, -4 from_region = 0, 1, 0, 0.3
+        to_region = 0, 1, 0.5, 0.75 / &stop events = 2 /"""
+    )
+    v = found["/particles/disks/velocity/value"][:, 0, 1]
+    assert v.tolist() == [-1, 0.5, 2]
+
+
+def test_disks_at_rest_outside_the_region_end_the_run(performed):
+    """A run without a time limit ends if no disk moves and no disk can be recycled."""
+    _, said = performed(
+        """&species count = 2 radius = 0.1 position = 0.5, 0.5, 0.5, 0.1 /
+        &drive kind = 'recycle' interval = 0.3 velocity = 0, 0 from_region = 0, 1, 0, 0.2
+        to_region = 0, 1, 0.7, 1 / &stop events = 10 /"""
+    )
+    assert "recycled = 1\n" in said and "kicks = 1\n" in said and "no further events" in said
+
+
 # --- moving sides, and collision rules of walls ---
 
 BOUNCE = """&box gravity = 0, -1 upper = 1, 1000 /

@@ -340,6 +340,7 @@ APART = [
     (r"species\.(file|position)", r"species|contact\.pair|many"),
     (r"species\.(grid|placement = |packing)", r"species\.(grid|placement = |packing)|many"),
     ("output.helfand", r"box\.(gravity|shear)"),
+    (r"output\.helfand|box\.shear", r"drive\.(kind = recycle|from_region|to_region|velocity)"),
     (r"side\.(mass|force|motion = piston)", r"run\.d"),
     ("drive", "drive"),
     (r"obstacle\.(name|side)|wall (x|y)", "periodic"),

@@ -425,6 +425,12 @@ class Draw:
         regions = [[0.0, 1.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0]]
         regions[0][2 * axis + 1], regions[1][2 * axis] = first, second
         rng.shuffle(regions)
+        if self.chance(0.6):  # a small region may be between obstacles
+            for first in (0, 2):
+                low, high = regions[1][first : first + 2]
+                width = rng.uniform(0.1, 0.6) * (high - low)
+                regions[1][first] = low + rng.random() * (high - low - width)
+                regions[1][first + 1] = regions[1][first] + width
         words = "kind = 'recycle'"
         for name, (x1, x2, y1, y2) in zip(("from", "to"), regions, strict=True):
             (left, low), (right, high) = self.place(x1, y1), self.place(x2, y2)
@@ -451,7 +457,11 @@ class Draw:
         rng = self.rng
         words = "&output" + self.maybe(0.4, "event_log = .true.")
         words += self.maybe(0.2, "precision = 'single'") + self.maybe(0.3, "virial_tensor = .true.")
-        words += "" if self.falls or self.sheared or self.recycles else self.maybe(0.3, "helfand = .true.")
+        words += (
+            ""
+            if self.falls or self.sheared or self.recycles
+            else self.maybe(0.3, "helfand = .true.")
+        )
         words += self.maybe(0.1, "checkpoint_every = 1e-3")
         for track in "frames", "observables":
             for kind in rng.sample(CADENCES, rng.choice([0, 1, 1, 1])):

@@ -36,7 +36,7 @@ TOPICS = {
     "P12": "billiards",
     "P13": "symmetries: conservation, reversal, boosts, order of the disks",
     "P14": "velocity correlations and diffusion",
-    "P15": "thermal walls, rough disks, transport, kicks, shear, moving sides",
+    "P15": "thermal walls, rough disks, transport, kicks, recycling, shear, moving sides",
     "W1": "straight walls: a wedge under gravity",
 }
 

@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# Discharge rate of a hopper that is refilled, against the width of its mouth: Beverloo's law in two dimensions. The lower ends of
+# both walls are moved along the walls, which are inclined by 45 degrees. Each width is simulated with two seeds. Films and pictures
+# show the hopper, a rotating drum, a dragged intruder and a stirrer. The script takes about five minutes of processor time.
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
+
+# One member for each width and seed. Disks are recycled 0.05 below the mouth.
+for width in 0.10 0.12 0.16 0.20 0.24 0.28 0.32 0.36; do
+  for seed in 1 2; do
+    awk -v D="$width" -v seed="$seed" 'BEGIN {
+      half = D / 2
+      printf "width_%s_seed_%d\t--set run.seed=%d", D, seed, seed
+      printf " --set wall.left.to=%.17g,%.17g", 0.5 - half, 0.1 + half
+      printf " --set wall.right.to=%.17g,%.17g", 0.5 + half, 0.1 + half
+      printf " --set drive.from_region=0,1,0,%.17g\n", 0.05 + half
+    }'
+  done
+done | replace "$data/discharge.txt"
+runs/ensemble.sh input/hopper.nml -d "$data/discharge" --manifest "$data/discharge.txt" \
+  --set stop.time=24 --set output.frames_every_time=6 "$@"
+"$python" post/discharge.py "$data"/discharge/*.h5 -o "$figures/discharge.png" \
+  --csv "$figures/discharge.csv"
+# A film and a picture of the hopper, of a rotating drum, a dragged intruder and a stirrer.
+for system in hopper drum intruder stirrer; do
+  runs/ensemble.sh "input/$system.nml" -d "$data/$system" --seeds 1 "$@"
+  "$python" post/player.py "$data/$system/seed_1.h5" -o "$figures/$system.html"
+  "$python" post/snapshot.py "$data/$system/seed_1.h5" --count 4 -o "$figures/$system.png"
+done
