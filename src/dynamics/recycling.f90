@@ -87,9 +87,10 @@ contains
   pure function disks_due(sim) result(due)
     type(simulation_t), intent(in) :: sim
     integer(int32), allocatable :: due(:)
-    integer(int32) :: index_of(sim%n_disks()), i, n
+    integer(int32), allocatable :: index_of(:)               ! index of each disk that is due, by id; 0 for all other disks
+    integer(int32) :: i, n
 
-    index_of = 0                                             ! index of each disk that is due, by id; 0 for all other disks
+    allocate (index_of(sim%n_disks()), source=0_int32)
     n = 0
     do i = 1, sim%n_disks()
       if (.not. is_due(sim, i)) cycle

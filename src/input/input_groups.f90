@@ -279,6 +279,7 @@ contains
             call slot%clear()
             if (slot%given .and. word /= "" .and. .not. self%faulty(words(1))) call self%complain(trim(slot%name), &
               "has no effect with "//trim(words(1))//" = '"//trim(word)//"'; it applies with "//either(words(2:)), problems)
+            cycle
           else if (row%status == "required" .and. .not. slot%given) then
             call demand_one(self, k, trim(words(1)), trim(word), problems)
           end if

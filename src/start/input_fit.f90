@@ -115,7 +115,7 @@ contains
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: group                        !! the group `drive`
     type(problem_list_t), intent(inout) :: problems
-    real(real64), parameter :: nearly = 1 - 1.0e-6_real64     ! a region may touch an obstacle
+    real(real64), parameter :: nearly = 1 - 1.0e-4_real64     ! a region may touch an obstacle
     real(real64) :: beyond(2, 2), radius, middle(2), half(2)
     integer :: before, k
 
@@ -123,7 +123,7 @@ contains
     beyond = settings%box%side_excursion()
     call check_region("from_region", settings%drive%from_region)
     call check_region("to_region", settings%drive%to_region)
-    if (problems%count > before) return
+    if (problems%count > before .or. .not. (group%given("from_region") .and. group%given("to_region"))) return
     associate (box => settings%box, from => settings%drive%from_region, to => settings%drive%to_region)
       if (all(from([1, 3]) < to([2, 4]) .and. to([1, 3]) < from([2, 4]))) then
         call group%complain("to_region", "it overlaps drive.from_region, so that disks would be recycled again and again", problems)
@@ -137,7 +137,7 @@ contains
         //written(2*half(2)), problems)
       half = max(half - merge(0.0_real64, radius, spans(to, box)), 0.0_real64)       ! the rectangle of the centres
       do k = 1, box%n_obstacles()
-        if (.not. is_in_the_way(box, k, middle, half, nearly*radius)) cycle
+        if (.not. is_in_the_way(box, k, middle, nearly*half, nearly*radius)) cycle
         call group%complain("to_region", 'it overlaps obstacle "'//box%surface(box%obstacle(k)%surface)%name//'"', problems)
         exit
       end do
@@ -150,6 +150,7 @@ contains
       character(len=*), intent(in) :: name
       real(real64), intent(in) :: region(4)                   !! xlo, xhi, ylo, yhi [length]
 
+      if (.not. group%given(name) .or. group%faulty(name)) return
       if (any(region([1, 3]) >= region([2, 4]))) then
         call group%complain(name, "its lower ends must be below its upper ends; give xlo, xhi, ylo, yhi", problems)
       else if (any(region([1, 3]) < settings%box%lower - beyond(:, 1) .or. region([2, 4]) > settings%box%upper + beyond(:, 2))) then
