@@ -57,10 +57,10 @@ def picture(path: Path, at: float) -> bytes:
                 room[k % 2, k // 2] = run.observable(place)
         axes.add_patch(Rectangle(lower, *(upper - lower), fill=False, color="0.8", lw=0.8))
         axes.add_patch(Rectangle(room[0], *(room[1] - room[0]), fill=False, color="0.3", lw=0.8))
-        for one in obstacles_of({k: np.asarray(v) for k, v in groups.get("obstacle", {}).items()}):
+        for one in obstacles_of(groups):
             colour = "none" if one.inside else "0.8"
             axes.add_patch(Circle(one.centre, one.radius, facecolor=colour, edgecolor="0.3"))
-        walls = walls_of({k: np.asarray(v) for k, v in groups.get("wall", {}).items()})
+        walls = walls_of(groups)
         axes.add_collection(LineCollection(walls, color="0.3", lw=0.8))
         least = min(0.006, 0.2 / np.sqrt(run.n_disks)) * np.max(upper - lower)
         size = 2 * np.maximum(run.radius, least)

@@ -93,10 +93,15 @@ def table(runs: list[Run], after: float) -> tuple[list[dict], list[str]]:
     return rows, notes
 
 
+def columns(rows: list[dict]) -> np.ndarray:
+    """Return D / d, the rates and their errors (3, M); an unknown error is NaN."""
+    return np.array([[row[name] for row in rows] for name in ("D_over_d", "W", "W_error")], float)
+
+
 def draw(rows: list[dict], runs: list[Run], fit: dict) -> plt.Figure:
     """Draw the rates and the fits, and the power 2/3 of the rates, which is linear in D."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8))
-    x, y, error = (np.array([row[name] for row in rows]) for name in ("D_over_d", "W", "W_error"))
+    x, y, error = columns(rows)
     left.errorbar(x, y, error, fmt="o", label="measured")
     slope = 2 / 3 * y ** (-1 / 3)
     right.errorbar(x, y ** (2 / 3), slope * error, fmt="o", label="measured")
@@ -122,7 +127,7 @@ def main() -> None:
     parser.add_argument("--after", type=not_negative, default=4.0, metavar="T", help=words)
     args = parser.parse_args()
     rows, notes = table(args.runs, args.after)
-    x, y, error = (np.array([row[name] for row in rows]) for name in ("D_over_d", "W", "W_error"))
+    x, y, error = columns(rows)
     fit = fitted(x, y, error) if len(rows) > 2 else {}
     for name, (value, uncertainty) in fit.items():
         print(f"{name} = {value:.4f} ± {uncertainty:.4f}")
