@@ -19,9 +19,9 @@ module recycling
 
 contains
 
-  !> Moves the disks that are due at the present time, in the order of their ids, and lists the moved disks. If no trial finds a free
-  !> position for a disk, the disk stays where it is. A position is free if no other disk, obstacle or side is in the way. The old
-  !> positions of disks that move at the same time are not free.
+  !> Moves the disks that are due at the present time, in the order of their ids, and lists the moved disks. If no trial finds a
+  !> free position for a disk, the disk stays where it is. A position is free if no other disk, obstacle or side is in the way. The
+  !> old positions of disks that move at the same time are not free.
   subroutine recycle_disks(sim, moved)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable, intent(out) :: moved(:)     !! indices of the moved disks

@@ -23,7 +23,8 @@ module memory
   real(real64), parameter :: extra = 40, own_size = 8
   real(real64), parameter :: sampled = 8.8_real64            !! memory for each value of a disk in a frame
   real(real64), parameter :: listed = 264                    !! neighbour list of a disk
-  !> `kicked`: random numbers of the driving; `placed_anew`: test for free positions of recycled disks; `stepped`: Verlet lists of time-stepped dynamics.
+  !> `kicked`: random numbers of the driving; `placed_anew`: test for free positions of recycled disks; `stepped`: Verlet lists of
+  !> time-stepped dynamics.
   real(real64), parameter :: kicked = 16, placed_anew = 70, stepped = 100
   !> Additional memory per disk if the box is divided into domains: the first number applies to a box with walls, the second number
   !> to a periodic box.

@@ -91,11 +91,10 @@ def mouths(folder, widths, k, c, count=200):
         rate = c * np.sqrt(4 / 0.02) * (width / 0.02 - k) ** 1.5
         time = np.linspace(0, 20, count)
         parameters = {"drive": {"kind": "recycle"}, "box": {"gravity": [0.0, -4.0]}}
-        parameters["run"] = {"seed": len(paths) + 1}
         walls = [((0, 1), (0.5 - width / 2, 0.5)), ((1, 1), (0.5 + width / 2, 0.5))]
         paths.append(
             write_run(
-                folder / f"{width}.h5", np.zeros((1, 5, 2)), np.zeros((1, 5, 2)), radius=0.01,
+                folder / f"{width}.h5", np.full((1, 5, 2), width), np.zeros((1, 5, 2)), radius=0.01,
                 walls=walls, observables={"recycled": rate * time}, observable_time=time,
                 parameters=parameters,
             )
