@@ -74,6 +74,7 @@ class Draw:
         self.turns = self.chance(0.3)
         self.rotates = False
         self.recycles = False
+        self.bowl = False  # all disks are in a round container
         self.driven = self.chance(0.3)
         self.falls = self.chance(0.3) and not all(self.periodic)
         self.sheared = all(self.periodic) and not self.steps and self.chance(0.5)
@@ -217,6 +218,7 @@ class Draw:
             size = f"centre = {numbers(*self.place(0.5, 0.5))} radius = {0.5 * small!r}"
             groups.append(f"&obstacle name = 'bowl' side = 'inside' {size}{self.law()} /")
             self.packing *= small / max(self.edges)
+            self.bowl = True
         if groups:
             self.packing = min(self.packing, 0.2)
         return groups
@@ -431,6 +433,9 @@ class Draw:
                 width = rng.uniform(0.1, 0.6) * (high - low)
                 regions[1][first] = low + rng.random() * (high - low - width)
                 regions[1][first + 1] = regions[1][first] + width
+        if self.bowl:
+            across, up = (rng.uniform(0.05, 0.2) * min(self.edges) / edge for edge in self.edges)
+            regions = [[0.0, 1.0, 0.0, 0.49 - up], [0.5 - across, 0.5 + across, 0.5 - up, 0.5 + up]]
         words = "kind = 'recycle'"
         for name, (x1, x2, y1, y2) in zip(("from", "to"), regions, strict=True):
             (left, low), (right, high) = self.place(x1, y1), self.place(x2, y2)
