@@ -85,8 +85,10 @@ def fitted(x: np.ndarray, y: np.ndarray, error: np.ndarray) -> dict[str, tuple[f
 def table(runs: list[Run], after: float) -> tuple[list[dict], list[str]]:
     """Return a table row for each width of the mouth, and warnings."""
     rows, notes = [], []
-    for width, same in sorted(grouped(runs, reduced_width), key=lambda pair: pair[0]):
+    mouths = grouped(runs, lambda run: round(mouth(run), 9))
+    for _, same in sorted(mouths, key=lambda pair: pair[0]):
         members = [rate(run, after) for run in same]
+        width = round(float(np.mean([reduced_width(run) for run in same])), 6)
         row = {"D_over_d": width, "runs": len(same)}
         row |= over_runs("W", members, notes, f"D = {width:g} d")
         rows.append(row | {"samples": round(combine_runs(members).samples, 1)})
