@@ -31,10 +31,10 @@ from contextlib import suppress
 from pathlib import Path
 
 from ricochet import Run, RunError
-from ricochet.analysis.paths import seen, turns_between, why_unknown
+from ricochet.analysis.paths import BENT, seen, turns_between, why_unknown
 from ricochet.figures.drawing import COLOURS, caption, chosen_colour, label_of, scale_top
 from ricochet.reading.files import destination
-from ricochet.reading.nature import known, rows_of
+from ricochet.reading.nature import KICKED, known, rows_of
 from ricochet.reading.box import groups_of_rows
 from ricochet.reading.reader import SIDES
 from ricochet.reading.records import span
@@ -163,7 +163,8 @@ def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[st
         log = run.event_log()
     except RunError:  # a film can be made without an event log
         facts["collisions"] = run.collisions_per_disk_at(run.time)[frames].tolist()
-        return facts | {"note": "output.event_log tells the paths between"}, {}
+        kicked = run.nature & KICKED
+        return facts | {"note": BENT if kicked else "output.event_log tells the paths between"}, {}
     ends, pairs = seen(run, log, frames), np.append(0, np.cumsum(log.j > 0))
     facts["collisions"] = (2 / run.n_disks * pairs[ends]).tolist()
     some = slice(ends[0], ends[-1])

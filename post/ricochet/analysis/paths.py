@@ -7,6 +7,8 @@ import numpy as np
 from ..reading.nature import KICKED
 from ..reading.reader import EventLog, Run
 
+BENT = "the driving bends the paths between"  # reason why paths between frames are unknown
+
 
 class Turns(NamedTuple):
     """Velocities after collisions, sorted by frame, then by disk, then by time."""
@@ -22,7 +24,7 @@ def why_unknown(run: Run, log: EventLog) -> str:
     if log.momentum_change is None:
         return "the log has no momentum_change"
     if run.nature & KICKED:
-        return "the driving bends the paths between"
+        return BENT
     return "images slide" if run.shear_rate else ""
 
 
