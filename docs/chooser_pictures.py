@@ -58,6 +58,9 @@ def picture(path: Path, at: float) -> bytes:
         axes.add_patch(Rectangle(lower, *(upper - lower), fill=False, color="0.8", lw=0.8))
         axes.add_patch(Rectangle(room[0], *(room[1] - room[0]), fill=False, color="0.3", lw=0.8))
         for one in obstacles_of(groups):
+            if one.is_arc:
+                axes.plot(*one.points(181).T, color="0.3", lw=0.8)
+                continue
             colour = "none" if one.inside else "0.8"
             axes.add_patch(Circle(one.centre, one.radius, facecolor=colour, edgecolor="0.3"))
         walls = walls_of(groups)

@@ -42,7 +42,7 @@ def density_of(run: Run) -> float:
     """Return the reduced density n R^2 of a run of one disk among equal circular obstacles."""
     allow(run, "the Lorentz gas consists of one disk among fixed circles", "obstacles")
     radii = np.unique([obstacle.radius for obstacle in run.obstacles])
-    inside = any(obstacle.inside for obstacle in run.obstacles)
+    inside = any(obstacle.inside or obstacle.is_arc for obstacle in run.obstacles)
     if run.n_disks != 1 or len(run.walls) or len(radii) != 1 or inside or not all(run.periodic):
         raise RunError(f"{run.path}: needs one disk among equal circles in a periodic box")
     reach = float(run.radius[0] + radii[0])

@@ -258,7 +258,10 @@ def scene(run: Run) -> tuple[dict, dict]:
         "edges": (run.bounds[1] - run.bounds[0]).tolist(),
         "sides": sides(run),
         "periodic": run.periodic.tolist(),
-        "obstacles": [[*map(float, o.centre), o.radius, o.inside] for o in run.obstacles],
+        "obstacles": [
+            [*map(float, o.centre), o.radius, o.inside, *([o.from_angle, o.to_angle] * o.is_arc)]
+            for o in run.obstacles
+        ],
         "walls": run.walls.tolist(),
         "laws": {name: laws_of(run, name) for name in ("obstacle", "wall")},
         "species": species(run),

@@ -154,8 +154,9 @@ function drawGround() {
 
 // Draws an obstacle. If the obstacle is smaller than a pixel, a square of the same area is drawn, because squares are drawn much
 // faster.
-function drawObstacle([x, y, radius, inside], k) {
+function drawObstacle([x, y, radius, inside, from, to], k) {
   const size = radius * view.unit, half = 0.886 * size;
+  if (to !== undefined) { drawArc([x, y, size, from, to], k); return; }
   if (inside) {
     ground.fillStyle = ink.obstacle;
     ground.fillRect(0, 0, page.width, page.height);
@@ -167,6 +168,17 @@ function drawObstacle([x, y, radius, inside], k) {
     ground.beginPath();
     ground.arc(across(x + dx), up(y + dy), size, 0, 2 * Math.PI);
     ground.fill();
+    ground.stroke();
+  });
+}
+
+// Draws an arc between two angles [degrees], like a wall. Angles of the canvas are clockwise, and the line is drawn counter-clockwise.
+function drawArc([x, y, size, from, to], k) {
+  ground.lineWidth = (drawLike(film.laws.obstacle[k]) ? 4.5 : 1.5) * page.dots;
+  const radius = size / view.unit;
+  copies([x - radius, x + radius], [y - radius, y + radius], (dx, dy) => {
+    ground.beginPath();
+    ground.arc(across(x + dx), up(y + dy), size, -from * Math.PI / 180, -to * Math.PI / 180, true);
     ground.stroke();
   });
 }

@@ -194,8 +194,9 @@ contains
     x = sim%position(i)
     v = sim%velocity(i)
     normal = wall_normal(sim%box, code, x, v)
-    yes = abs(dot_product(v, normal)) < grazing*magnitude(v) &
-      .and. dot_product(sim%box%obstacle(obstacle_number(code))%shape%middle - x, normal) > 0
+    associate (shape => sim%box%obstacle(obstacle_number(code))%shape)
+      yes = abs(dot_product(v, normal)) < grazing*magnitude(v) .and. shape%is_concave_at(shape%from_nearest(x, sim%box%images()))
+    end associate
   end function slides
 
   !> Report of the inelastic collapses in a run; empty if no collapse occurred.

@@ -32,6 +32,7 @@ contains
     circle%radius = radius
     circle%encloses = encloses
     circle%is_round = .not. encloses
+    circle%is_convex = .not. encloses
     circle%extent = radius
     circle%circumradius = radius
     circle%area = pi*radius**2
@@ -66,10 +67,12 @@ contains
     if (self%encloses) length = -length
   end function gap
 
-  !> Unit vector from the point of contact on the circle to the centre of a disk that touches the circle.
-  pure function normal(self, d) result(direction)
+  !> Unit vector from the point of contact on the circle to the centre of a disk that touches the circle. A disk touches a circle at
+  !> one point, so that `heading` is not needed.
+  pure function normal(self, d, heading) result(direction)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
+    real(real64), intent(in), optional :: heading(2)
     real(real64) :: direction(2)
 
     direction = merge(-d, d, self%encloses)/magnitude(d)

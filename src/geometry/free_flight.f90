@@ -5,7 +5,7 @@ module free_flight
   use kinds, only: never, real64
   implicit none
   private
-  public :: flight, flight_velocity, time_to_line, time_to_circle, slowest
+  public :: flight, flight_velocity, time_to_line, time_to_circle, later_time_to_circle, slowest
 
   !> Speeds below this value are treated as zero, because contact times would overflow. [length/time]
   real(real64), parameter :: slowest = 1/never
@@ -80,7 +80,7 @@ contains
       if (present(within) .and. .not. inside) then
         if (misses_circle(d, v, g, rho, within)) return
       end if
-      s = time_to_circle_falling(d, v, g, rho, inside)
+      s = time_to_circle_falling(d, v, g, rho, inside, 0)
       return
     end if
     b = d(1)*v(1) + d(2)*v(2)
@@ -145,17 +145,31 @@ contains
     end function is_positive
   end function misses_circle
 
+  !> Like `time_to_circle`, but the given number of earlier contacts is skipped. The point passes through the circle at each skipped
+  !> contact. Without acceleration, the path reaches the circle only once from inside or from outside.
+  pure function later_time_to_circle(d, v, g, rho, inside, skipped) result(s)
+    real(real64), intent(in) :: d(2), v(2), g(2), rho
+    logical, intent(in) :: inside
+    integer, intent(in) :: skipped        !! number of contacts to be skipped, at least 1
+    real(real64) :: s
+
+    s = never
+    if (any(abs(g) > 0)) s = time_to_circle_falling(d, v, g, rho, inside, skipped)
+  end function later_time_to_circle
+
   !> Like `time_to_circle`, but for a disk on a parabolic path. The function F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic
   !> polynomial, which is 0 at a contact. F is monotonic between the roots of its derivative F', and F' is monotonic between the
   !> roots of its derivative F''. Bisection therefore starts with an interval that contains exactly one root, and the first contact
   !> cannot be missed. F is calculated from the position at the time s and not from polynomial coefficients, because rounding errors
   !> of the coefficients could exceed the squared radius of a small circle.
-  pure function time_to_circle_falling(d, v, g, rho, inside) result(s)
+  pure function time_to_circle_falling(d, v, g, rho, inside, skipped) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside
+    integer, intent(in) :: skipped        !! number of earlier contacts to be skipped
     real(real64) :: s, cubic(0:3), from, to, a, b, c, disc, bend(2), bound, ends(5)
-    integer :: k
+    integer :: k, passed
 
+    passed = 0
     cubic = [2*dot_product(d, v), 2*(dot_product(v, v) + dot_product(d, g)), 3*dot_product(v, g), dot_product(g, g)]
     bound = root_bound(cubic, rho/sqrt(cubic(3)))
     a = 3*cubic(3); b = cubic(2); c = cubic(1)         ! F'' = a s**2 + 2 b s + c
@@ -176,8 +190,11 @@ contains
         end do
       end if
       if (.not. (apart(to) > 0 .or. apart(to) >= apart(from))) then
-        s = last_apart(from, to)
-        return
+        if (passed == skipped) then
+          s = last_apart(from, to)
+          return
+        end if
+        passed = passed + 1
       end if
       from = to
     end do

@@ -8,7 +8,7 @@ module segments
   use free_flight, only: flight, time_to_circle, time_to_line
   use images, only: images_t
   use kinds, only: never, real64
-  use shapes, only: magnitude, shape_t, spare
+  use shapes, only: from_nearest_outline, magnitude, shape_t, spare
   implicit none
   private
   public :: segment_t, new_segment
@@ -47,8 +47,9 @@ contains
   !> Tangential velocity of the surface at a point of contact, if the surface moves along the wall with unit speed. The result is
   !> the unit vector along the wall without its component along the normal of the surface. At the rounded ends of the wall the
   !> surface therefore moves more slowly than along the wall.
-  pure function direction(self, normal) result(along)
+  pure function direction(self, d, normal) result(along)
     class(segment_t), intent(in) :: self
+    real(real64), intent(in) :: d(2)
     real(real64), intent(in) :: normal(2)
     real(real64) :: along(2)
 
@@ -62,24 +63,9 @@ contains
     real(real64), intent(in) :: x(2)
     type(images_t), intent(in) :: images
     real(real64), intent(in), optional :: heading(2)
-    real(real64) :: d(2), nearest(2), candidate(2), touching
-    integer :: k
+    real(real64) :: d(2)
 
-    nearest = x - self%middle
-    nearest = nearest + images%shift(images%nearest_image(nearest))
-    d = nearest
-    do k = 1, images%count()
-      candidate = nearest + images%shift(images%around(k))
-      if (self%gap(candidate, 0.0_real64) < self%gap(d, 0.0_real64)) d = candidate
-    end do
-    if (.not. present(heading)) return
-    touching = self%gap(d, 0.0_real64)
-    touching = touching + spare**2*(touching + self%length + maxval(abs(x)))
-    do k = 1, images%count()
-      candidate = nearest + images%shift(images%around(k))
-      if (self%gap(candidate, 0.0_real64) > touching) cycle
-      if (dot_product(heading, self%normal(candidate)) > dot_product(heading, self%normal(d))) d = candidate
-    end do
+    d = from_nearest_outline(self, x, images, heading)
   end function from_nearest
 
   !> Time until a disk touches the wall.
@@ -142,10 +128,12 @@ contains
   end function gap
 
   !> Unit vector from the point of contact on the wall to the centre of a disk that touches the wall. Between the ends of the wall
-  !> the result is exactly the normal of the wall, without rounding errors even for very small disks.
-  pure function normal(self, d) result(direction)
+  !> the result is exactly the normal of the wall, without rounding errors even for very small disks. A disk touches a wall at one
+  !> point, so that `heading` is not needed.
+  pure function normal(self, d, heading) result(direction)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
+    real(real64), intent(in), optional :: heading(2)
     real(real64) :: direction(2)
 
     if (abs(dot_product(d, self%along)) <= self%length) then

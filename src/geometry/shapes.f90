@@ -5,7 +5,7 @@ module shapes
   use kinds, only: never, real64
   implicit none
   private
-  public :: shape_t, magnitude, spare
+  public :: shape_t, from_nearest_outline, magnitude, spare
 
   !> Relative safety margin, larger than all rounding errors. If rounding errors make the result of a test uncertain, a test with
   !> this margin returns the safe result.
@@ -16,12 +16,15 @@ module shapes
     real(real64) :: middle(2) = 0.0_real64      !! [length]
     logical :: encloses = .false.               !! .true. if the disks are inside the obstacle, .false. if they are outside
     logical :: is_round = .false.               !! .true. if the outline is a circle and the disks are outside
+    !> Whether a disk that leaves the outline on a straight path cannot touch the outline again
+    logical :: is_convex = .true.
     real(real64) :: extent(2) = 0.0_real64      !! half width and half height of the bounding rectangle [length]
     real(real64) :: circumradius = 0.0_real64   !! largest distance of a point of the outline from the middle [length]
     real(real64) :: area = 0.0_real64  !! area that the outline encloses [length**2]
   contains
     procedure :: from_nearest
     procedure :: direction
+    procedure :: is_concave_at
     procedure(contact_time), deferred :: contact_time
     procedure(gap), deferred :: gap
     procedure(normal), deferred :: normal
@@ -52,11 +55,14 @@ module shapes
       real(real64) :: length
     end function gap
 
-    !> Unit vector from the point of contact on the outline to the centre of a disk that touches the outline.
-    pure function normal(self, d) result(direction)
+    !> Unit vector from the point of contact on the outline to the centre of a disk that touches the outline. If the disk touches
+    !> the outline at several points, the vector `heading` selects the point: the angle between the result and `heading` is the
+    !> smallest.
+    pure function normal(self, d, heading) result(direction)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
       real(real64), intent(in) :: d(2)
+      real(real64), intent(in), optional :: heading(2)
       real(real64) :: direction(2)
     end function normal
 
@@ -121,15 +127,52 @@ contains
     end do
   end function from_nearest
 
-  !> Unit tangent vector at the point where the outline has the given normal. The tangent vector points counter-clockwise around the
-  !> middle of the obstacle.
-  pure function direction(self, normal) result(along)
+  !> Like `from_nearest`, for an outline whose nearest image is not always the image whose middle is nearest to x. The distances of x
+  !> from the outlines of all images are compared.
+  pure function from_nearest_outline(shape, x, images, heading) result(d)
+    class(shape_t), intent(in) :: shape
+    real(real64), intent(in) :: x(2)            !! [length]
+    type(images_t), intent(in) :: images
+    real(real64), intent(in), optional :: heading(2)
+    real(real64) :: d(2), nearest(2), candidate(2), touching
+    integer :: k
+
+    nearest = x - shape%middle
+    nearest = nearest + images%shift(images%nearest_image(nearest))
+    d = nearest
+    do k = 1, images%count()
+      candidate = nearest + images%shift(images%around(k))
+      if (shape%gap(candidate, 0.0_real64) < shape%gap(d, 0.0_real64)) d = candidate
+    end do
+    if (.not. present(heading)) return
+    touching = shape%gap(d, 0.0_real64)
+    touching = touching + spare**2*(touching + shape%circumradius + maxval(abs(x)))
+    do k = 1, images%count()
+      candidate = nearest + images%shift(images%around(k))
+      if (shape%gap(candidate, 0.0_real64) > touching) cycle
+      if (dot_product(heading, shape%normal(candidate, heading)) > dot_product(heading, shape%normal(d, heading))) d = candidate
+    end do
+  end function from_nearest_outline
+
+  !> Unit tangent vector at the point of contact with a disk. The tangent vector points counter-clockwise around the middle of the
+  !> obstacle.
+  pure function direction(self, d, normal) result(along)
     class(shape_t), intent(in) :: self
-    real(real64), intent(in) :: normal(2)       !! unit vector from the outline to a disk
+    real(real64), intent(in) :: d(2)            !! vector from the middle of the obstacle to the centre of the disk [length]
+    real(real64), intent(in) :: normal(2)       !! unit vector from the outline to the disk
     real(real64) :: along(2)
 
     along = [-normal(2), normal(1)]
     if (self%encloses) along = -along
   end function direction
+
+  !> Whether the outline is concave where a disk touches the outline, so that the disk can slide along the outline.
+  pure function is_concave_at(self, d) result(yes)
+    class(shape_t), intent(in) :: self
+    real(real64), intent(in) :: d(2)            !! vector from the middle of the obstacle to the centre of the disk [length]
+    logical :: yes
+
+    yes = self%encloses
+  end function is_concave_at
 
 end module shapes

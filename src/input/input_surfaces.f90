@@ -1,5 +1,6 @@
 !> Converts the groups of sides and obstacles to shapes, contact laws and motions.
 module input_surfaces
+  use arcs, only: new_arc
   use box_geometry, only: box_t
   use circles, only: new_circle
   use collisions, only: tangential_law_t, normal_rule, speed_law_t, wall_law_t, wall_rules
@@ -33,6 +34,7 @@ contains
       call check_name(groups, k, problems)
       call take_file(groups(k), problems)
       call take_points(groups(k), problems)
+      call check_angles(groups(k), problems, complete)
       do v = 1, size(groups(k)%values)
         associate (value => groups(k)%values(v))
           if (table(value%row)%status /= "example") cycle           ! only variables with the status "example" must be given
@@ -53,7 +55,10 @@ contains
         case ("wall")
           call take_walls(group%reals_of("from"), group%reals_of("to"))
         case default                                      ! "obstacle"
-          call take_circles(group%reals_of("centre"), group%reals_of("radius"), group%text_of("side") == "inside")
+          if (has(group, "from_angle")) call take_arcs(group%reals_of("centre"), group%reals_of("radius"), &
+            group%real_of("from_angle", 0.0_real64), group%real_of("to_angle", 0.0_real64))
+          if (.not. has(group, "from_angle")) call take_circles(group%reals_of("centre"), group%reals_of("radius"), &
+            group%text_of("side") == "inside")
         end select
       end associate
     end do
@@ -69,6 +74,18 @@ contains
         allocate (box%obstacle(m + i)%shape, source=new_segment(from(2*i - 1:2*i), to(2*i - 1:2*i)))
       end do
     end subroutine take_walls
+
+    !> The arcs of a group, which all extend between the same angles.
+    subroutine take_arcs(centre, radius, from_angle, to_angle)
+      real(real64), intent(in) :: centre(:)               !! x and y of the centre of the circle of each arc [length]
+      real(real64), intent(in) :: radius(:)               !! [length]
+      real(real64), intent(in) :: from_angle, to_angle    !! [degrees]
+      integer :: i
+
+      do i = 1, size(radius)
+        allocate (box%obstacle(m + i)%shape, source=new_arc(centre(2*i - 1:2*i), radius(i), from_angle, to_angle))
+      end do
+    end subroutine take_arcs
 
     !> The circles of a group.
     subroutine take_circles(centre, radius, encloses)
@@ -139,6 +156,29 @@ contains
       end if
     end associate
   end subroutine take_points
+
+  !> Reports an arc with only one angle, and an arc that does not extend counter-clockwise by at most one turn.
+  subroutine check_angles(group, problems, complete)
+    type(group_t), intent(in) :: group
+    type(problem_list_t), intent(inout) :: problems
+    logical, intent(inout) :: complete                    !! set to .false. if the angles are invalid
+    real(real64) :: first, last                           ! [degrees]
+
+    if (group%name /= "obstacle") return
+    if (.not. (has(group, "from_angle") .or. has(group, "to_angle"))) return
+    if (.not. has(group, "to_angle")) then
+      call group%complain("from_angle", "is given without to_angle; an arc needs both angles", problems)
+    else if (.not. has(group, "from_angle")) then
+      call group%complain("to_angle", "is given without from_angle; an arc needs both angles", problems)
+    else if (.not. (group%faulty("from_angle") .or. group%faulty("to_angle"))) then
+      first = group%real_of("from_angle", 0.0_real64)
+      last = group%real_of("to_angle", 0.0_real64)
+      if (last > first .and. last <= first + 360) return
+      call group%complain("to_angle", written(last)//" is not an angle after from_angle; allowed: a number > "//written(first) &
+        //" and <= "//written(first + 360), problems)
+    end if
+    complete = .false.
+  end subroutine check_angles
 
   !> Sets the contact laws of all sides and obstacles, and the motions of all sides. Values that a group does not contain are taken
   !> from `&contact`.

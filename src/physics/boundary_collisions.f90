@@ -37,7 +37,7 @@ contains
     law = sim%box%surface(k)%law
     normal = wall_normal(sim%box, code, sim%disk(i)%x, sim%disk(i)%v)
     normal_velocity = normal_surface_velocity(sim%box, code, normal, t)
-    u = tangential_surface_velocity(sim%box, code, normal) + normal_velocity
+    u = tangential_surface_velocity(sim%box, code, sim%disk(i)%x, normal) + normal_velocity
     v = sim%disk(i)%v
     omega = sim%spin(i)
     if (law%temperature > 0) then

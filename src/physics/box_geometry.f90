@@ -320,9 +320,8 @@ contains
   end subroutine next_obstacle
 
   !> Finds the contact of a disk with one image of an obstacle, if this contact is earlier than an event that is already known.
-  !> Obstacles that disks touch from outside are convex. A disk that leaves a convex obstacle on a straight path cannot touch this
-  !> obstacle again. Without gravity, a contact with the obstacle of the last collision could only result from rounding errors and
-  !> is not predicted.
+  !> A disk that leaves a convex obstacle on a straight path cannot touch this obstacle again. Without gravity, a contact with a
+  !> convex obstacle of the last collision could only result from rounding errors and is not predicted.
   pure subroutine find_image_contact(box, disk, last, obstacle, shift, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -337,7 +336,7 @@ contains
 
     associate (shape => box%obstacle(obstacle_number(obstacle))%shape)
       d = disk%x - (shape%middle + shift)
-      if (last == obstacle .and. .not. (shape%encloses .or. box%has_gravity())) then
+      if (last == obstacle .and. shape%is_convex .and. .not. box%has_gravity()) then
         if (all(abs(d - shape%from_nearest(disk%x, box%images(), heading=disk%v)) < 0.5_real64*box%edges())) return
       end if
       t_image = disk%clock + shape%contact_time(d, disk%v, box%gravity, disk%radius, t - disk%clock)
@@ -452,11 +451,12 @@ contains
     end associate
   end function obstacle_gap
 
-  !> Tangential velocity of a surface at the point where the surface has the given normal.
-  pure function tangential_surface_velocity(box, code, normal) result(u)
+  !> Tangential velocity of a surface at the point of contact with a disk.
+  pure function tangential_surface_velocity(box, code, x, normal) result(u)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
-    real(real64), intent(in) :: normal(2)       !! unit vector from the surface to a disk
+    real(real64), intent(in) :: x(2)            !! centre of the disk [length]
+    real(real64), intent(in) :: normal(2)       !! unit vector from the surface to the disk
     real(real64) :: u(2)                        !! [length/time]
 
     u = 0
@@ -464,7 +464,9 @@ contains
       if (is_side(code)) then
         u(3 - axis_of(code)) = law%speed
       else if (abs(law%speed) > 0) then
-        u = law%speed*box%obstacle(obstacle_number(code))%shape%direction(normal)
+        associate (shape => box%obstacle(obstacle_number(code))%shape)
+          u = law%speed*shape%direction(shape%from_nearest(x, box%images(), heading=normal), normal)
+        end associate
       end if
     end associate
   end function tangential_surface_velocity
@@ -496,7 +498,7 @@ contains
     else
       associate (shape => box%obstacle(obstacle_number(code))%shape)
         d = shape%from_nearest(x, box%images(), heading=-v)
-        normal = shape%normal(d)
+        normal = shape%normal(d, heading=-v)
       end associate
     end if
   end function wall_normal

@@ -35,6 +35,8 @@ module variable_rows
   type(range_t), parameter, public :: energy_left = range_t(1.0e-12_real64, fraction%upper, ">= 1e-12 and < 1")
   type(range_t), parameter, public :: spread_of_radii = range_t(0, fraction%upper, ">= 0 and < 1")
   type(range_t), parameter, public :: tangential = range_t(-1, 1, "from -1 to 1")
+  type(range_t), parameter, public :: first_angle = range_t(-360, 360, "from -360 to 360")
+  type(range_t), parameter, public :: last_angle = range_t(-360, 720, "from -360 to 720")
   type(range_t), parameter, public :: moment = range_t(smallest, 1, "> 0 and <= 1")
   type(range_t), parameter, public :: per_decade = range_t(1, 1000, "from 1 to 1000")
   type(range_t), parameter, public :: count_of_disks = range_t(1, most_disks, "from 1 to 100000000")

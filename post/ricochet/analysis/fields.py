@@ -264,7 +264,9 @@ def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
     for shift in periods(run):
         for circle in run.obstacles:
             away = np.linalg.norm(points - circle.centre - shift, axis=-1)
-            if not circle.inside:
+            if circle.is_arc:
+                free &= circle.distance(points - shift) > radius
+            elif not circle.inside:
                 free &= away > circle.radius + radius
             elif not shift.any():
                 free &= away < circle.radius - radius

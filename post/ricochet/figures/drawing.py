@@ -32,6 +32,7 @@ COLOURS = matplotlib.rc_params_from_file(STYLE)["axes.prop_cycle"].by_key()["col
 LEAST_SHARE = 0.12  # smallest drawn diameter divided by the mean distance of disks
 OUTLINE = 0.12  # width of an outline divided by the diameter
 LEAST_POINTS = 4.0  # largest drawn diameter of enlarged disks
+ARC_POINTS = 181  # points of the line that represents an arc
 WALL: dict[str, Any] = {"color": "0.25", "linewidth": 1.2}
 
 #: Quantities that can determine the colours of disks, each with its label and its dimension.
@@ -198,7 +199,7 @@ def lone(x: np.ndarray) -> dict[str, Any]:
 def draw_box(axes: Axes, run: Run, time: float | None = None) -> None:
     """Draw the sides of the box, the walls and the obstacles, with equal scales of both axes.
 
-    Periodic sides are dashed, other sides and walls are solid, and obstacles are grey.  Moving
+    Periodic sides are dashed, other sides, walls and arcs are solid, and circles are grey.  Moving
     sides are drawn at their positions at `time`, by default at their mean positions, and the area
     beyond moving sides is grey.  Thermal and sliding walls are labelled.
     """
@@ -212,7 +213,8 @@ def draw_box(axes: Axes, run: Run, time: float | None = None) -> None:
     axes.add_patch(Rectangle((low[0], low[1]), *(high - low), zorder=-2, **grey))
     axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="white", zorder=-1))
     axes.add_collection(LineCollection(lines, **sides, **WALL))
-    walls = [wall + shift for wall in run.walls for shift in periods(run)]
+    arcs = [obstacle.points(ARC_POINTS) for obstacle in run.obstacles if obstacle.is_arc]
+    walls = [line + shift for line in (*run.walls, *arcs) for shift in periods(run)]
     axes.add_collection(LineCollection(walls, zorder=3, capstyle="projecting", **WALL))
     draw_circles(axes, run, grey)
     axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -228,13 +230,14 @@ def draw_box(axes: Axes, run: Run, time: float | None = None) -> None:
 
 
 def draw_circles(axes: Axes, run: Run, grey: dict[str, Any]) -> None:
-    """Draw circular obstacles, including periodic images that overlap the box."""
-    if any(obstacle.inside for obstacle in run.obstacles):
+    """Draw circles (not arcs), including periodic images that overlap the box."""
+    circles = [obstacle for obstacle in run.obstacles if not obstacle.is_arc]
+    if any(circle.inside for circle in circles):
         axes.add_patch(Rectangle((run.lower[0], run.lower[1]), *run.edges, zorder=0, **grey))
-    width = min(1.0, 20 / np.sqrt(max(len(run.obstacles), 1)))  # thin for many circles
-    centres = np.array([obstacle.centre for obstacle in run.obstacles]).reshape(-1, 2)
-    radii = np.array([obstacle.radius for obstacle in run.obstacles])
-    encloses = np.array([obstacle.inside for obstacle in run.obstacles], dtype=bool)
+    width = min(1.0, 20 / np.sqrt(max(len(circles), 1)))  # thin for many circles
+    centres = np.array([circle.centre for circle in circles]).reshape(-1, 2)
+    radii = np.array([circle.radius for circle in circles])
+    encloses = np.array([circle.inside for circle in circles], dtype=bool)
     for inside, fill, level in ((True, "white", 0.1), (False, "0.75", 0.5)):  # above maps (0.2)
         style: dict[str, Any]
         style = {"facecolors": fill, "edgecolors": "0.25", "linewidths": width, "zorder": level}

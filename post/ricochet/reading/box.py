@@ -85,6 +85,7 @@ class BoxResults(Results):
     def accessible_area(self, time: float | np.ndarray) -> np.ndarray:
         """Return the area of the box minus the area of its obstacles at the given times.
 
+        Walls and arcs have no area, and the area of a region that they enclose is not calculated.
         If the disks are in a round container, the accessible area is the area of the container.
         For pistons and for sides that move at constant velocity, the area depends on their
         positions at the given times.  For oscillating sides, the area is calculated from their mean
@@ -110,7 +111,8 @@ class BoxResults(Results):
         lower = np.where(drifts[::2], lower, self.lower)
         upper = np.where(drifts[1::2], upper, self.upper)
         area = np.prod(upper - lower, axis=-1)
-        for circle in sorted(self.obstacles, key=lambda circle: not circle.inside):
+        circles = [obstacle for obstacle in self.obstacles if not obstacle.is_arc]
+        for circle in sorted(circles, key=lambda circle: not circle.inside):
             own = np.pi * circle.radius**2
             area = np.minimum(area, own) if circle.inside else area - own
         return area
@@ -146,14 +148,18 @@ def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
 
 
 def obstacles_of(parameters: Mapping[str, Any]) -> tuple[Obstacle, ...]:
-    """Return all circular obstacles, in the order of their numbers in the event log."""
+    """Return all circular obstacles and arcs, in the order of their numbers in the event log."""
     groups = parameters.get("obstacle", {})
     if "inside" not in groups:
         return ()
     rows = parameters.get("obstacle_rows", groups)
-    inside = np.asarray(groups["inside"])[groups_of_rows(parameters, "obstacle")]
-    parts = (rows["centre"], rows["radius"], inside)
-    return tuple(Obstacle(c, float(r), bool(i)) for c, r, i in zip(*parts, strict=True))
+    own = groups_of_rows(parameters, "obstacle")
+    inside, none = np.asarray(groups["inside"])[own], np.full(len(groups["inside"]), np.nan)
+    angles = [np.asarray(groups.get(name, none))[own] for name in ("from_angle", "to_angle")]
+    return tuple(
+        Obstacle(c, float(r), bool(i), *(() if np.isnan(a) else (float(a), float(b))))
+        for c, r, i, a, b in zip(rows["centre"], rows["radius"], inside, *angles, strict=True)
+    )
 
 
 def walls_of(parameters: Mapping[str, Any], group: str = "wall") -> np.ndarray:

@@ -10,8 +10,8 @@ class EventLog(NamedTuple):
 
     An event is a collision of disk `i` with another disk or with a boundary.  If `j` is positive,
     `j` is the id of the second disk.  The values 0, -1, -2 and -3 of `j` denote the left, right,
-    bottom and top side of the box.  The values -4, -5, ... of `j` denote the circular obstacles,
-    followed by the straight walls.  `momentum_change` is the momentum change of disk `i`.
+    bottom and top side of the box.  The values -4, -5, ... of `j` denote the circular obstacles
+    and arcs, followed by the straight walls.  `momentum_change` is the momentum change of disk `i`.
     """
 
     time: np.ndarray
@@ -32,11 +32,83 @@ class Event(NamedTuple):
 
 
 class Obstacle(NamedTuple):
-    """A circular obstacle, which encloses the disks if `inside` is true."""
+    """A circular obstacle, which encloses the disks if `inside` is true, or an arc of a circle.
+
+    An arc extends counter-clockwise from the angle `from_angle` to the angle `to_angle`, in
+    degrees.  For a whole circle the two angles are None.
+    """
 
     centre: np.ndarray
     radius: float
     inside: bool
+    from_angle: float | None = None
+    to_angle: float | None = None
+
+    @property
+    def is_arc(self) -> bool:
+        """True if the obstacle is an arc, which encloses no area."""
+        return self.from_angle is not None
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """Return the distances (...) of points (..., 2) from the outline of the obstacle.
+
+        Parameters
+        ----------
+        points : numpy.ndarray
+            (..., 2) positions [length]
+
+        Returns
+        -------
+        numpy.ndarray
+            (...) distances [length]
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from ricochet import Obstacle
+        >>> arc = Obstacle(np.zeros(2), 1.0, False, 0.0, 90.0)
+        >>> arc.distance(np.array([[0.0, 2.0], [-3.0, 1.0]])).tolist()
+        [1.0, 3.0]
+        """
+        away = np.asarray(points) - self.centre
+        distance = np.abs(np.linalg.norm(away, axis=-1) - self.radius)
+        if self.from_angle is None or self.to_angle is None:
+            return distance
+        angle = np.degrees(np.arctan2(away[..., 1], away[..., 0]))
+        ends = self.ends - self.centre
+        to_ends = np.linalg.norm(away[..., np.newaxis, :] - ends, axis=-1).min(axis=-1)
+        turned = (angle - self.from_angle) % 360
+        return np.where(turned <= self.to_angle - self.from_angle, distance, to_ends)
+
+    @property
+    def ends(self) -> np.ndarray:
+        """End points (2, 2) of an arc [length]."""
+        return self.points(2)
+
+    def points(self, count: int) -> np.ndarray:
+        """Return points of the outline at equal distances, from the first to the last point.
+
+        Parameters
+        ----------
+        count : int
+            Number of points
+
+        Returns
+        -------
+        numpy.ndarray
+            (count, 2) positions [length]
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from ricochet import Obstacle
+        >>> Obstacle(np.zeros(2), 2.0, False, -90.0, 90.0).points(3).round(9).tolist()
+        [[0.0, -2.0], [2.0, 0.0], [0.0, 2.0]]
+        """
+        first = 0.0 if self.from_angle is None else self.from_angle
+        last = 360.0 if self.to_angle is None else self.to_angle
+        angle = np.radians(np.linspace(first, last, count))
+        return self.centre + self.radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
 class Species(NamedTuple):
