@@ -133,14 +133,34 @@ def wall_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
     circles, circle_groups = rows_of(found, "obstacle", "centre", "radius")
     walls, _ = rows_of(found, "wall", "from", "to")
     insides = np.array(found.get("/parameters/obstacle/inside", ()))[circle_groups]
+    angles = angles_of(found)[circle_groups]
     for image in images:
-        for centre, size, inside in zip(*circles, insides, strict=True):
+        for centre, size, inside, (first, last) in zip(*circles, insides, angles, strict=True):
+            if np.isfinite(first):
+                yield from_arc(place - centre - image, size, first, last) - radius, radius
+                continue
             away = np.linalg.norm(place - centre - image, axis=1) - size
             yield (-away if inside else away) - radius, radius
         for begin, end in zip(*walls, strict=True):
             along, start = end - begin, place - begin - image
             part = np.clip(start @ along / (along @ along), 0, 1)
             yield np.linalg.norm(start - part[:, None] * along, axis=1) - radius, radius
+
+
+def angles_of(found: Found) -> np.ndarray:
+    """Return the angles (groups, 2) of the arc of each group of obstacles; NaN for whole circles."""
+    none = np.full(len(found.get("/parameters/obstacle/inside", ())), np.nan)
+    names = ("from_angle", "to_angle")
+    return np.stack([found.get(f"/parameters/obstacle/{name}", none) for name in names], axis=1)
+
+
+def from_arc(away: np.ndarray, size: float, first: float, last: float) -> np.ndarray:
+    """Return the distances of points from an arc around the origin with the given angles."""
+    angle = np.degrees(np.arctan2(away[:, 1], away[:, 0]))
+    ends = [size * np.array([np.cos(a), np.sin(a)]) for a in np.radians([first, last])]
+    to_ends = np.min([np.linalg.norm(away - end, axis=1) for end in ends], axis=0)
+    faces = (angle - first) % 360 <= last - first
+    return np.where(faces, np.abs(np.linalg.norm(away, axis=1) - size), to_ends)
 
 
 def rows_of(found: Found, kind: str, *names: str) -> tuple[list, np.ndarray]:

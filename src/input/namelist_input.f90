@@ -57,7 +57,7 @@ contains
     do k = 1, n
       call name_instance(found(k))
     end do
-    do k = 1, size(overrides)
+    do k = 1, merge(0, size(overrides), too_many)
       call override(overrides(k)%text, -k)
     end do
     allocate (groups(n))
@@ -136,7 +136,7 @@ contains
     !> Reads the whole input text.
     subroutine read_text()
       opened = 0
-      do while (problems%count < most_problems)
+      do while (problems%count < most_problems .and. .not. too_many)
         if (opened == 0) then
           if (token(at)%kind == ending) return
           call between_groups()
@@ -333,9 +333,11 @@ contains
         call add_group(name, opened, instances + 1)
         group = n
       else
-        if (.not. too_many) call problems%add(opened, name, "more than "//written(most_instances)//" groups of this name" &
+        problems = problem_list_t()                       ! only this problem is reported, and the rest of the text is not read
+        call problems%add(opened, name, "more than "//written(most_instances)//" groups of this name" &
           //trim(merge("; a file may hold many obstacles (file)", repeat(" ", 39), any(obstacle_groups == name))))
-        too_many = .true.                                 ! reported only once
+        too_many = .true.
+        complete = .false.
         group = 0
       end if
       if (group > 0) found(group)%first = token(at)%first

@@ -182,7 +182,7 @@ class Case:
     def in_other_units(self, name: str, _seconds: float) -> End:
         """Perform the run with lengths, velocities and masses multiplied by powers of two."""
         length, speed, mass = (2.0 ** self.rng.randint(-30, 30) for _ in range(3))
-        self.units = {"length": length, "velocity": speed, "mass": mass, "s": 1}
+        self.units = {"length": length, "velocity": speed, "mass": mass, "s": 1, "degrees": 1}
         self.units |= {"time": length / speed, "energy": mass * speed**2}
         lines = self.system.text.replace("start.txt", "other.txt").splitlines()
         table = table_of(self.program)

@@ -192,7 +192,7 @@ class Draw:
         return words + self.maybe(0.7, f"phase = {rng.choice([0, 0.5, rng.random()])}")
 
     def obstacles(self) -> list[str]:
-        """Draw circles and straight walls, with space between them for randomly placed disks."""
+        """Draw circles, arcs and walls, with space between them for randomly placed disks."""
         rng, groups, small = self.rng, [], min(self.edges)
         if self.sheared:
             return groups
@@ -201,6 +201,8 @@ class Draw:
                 where = f"centre = {numbers(*self.place(rng.random(), rng.random()))}"
                 radius = rng.uniform(0.01, 0.15) * small
                 groups.append(f"&obstacle {where} radius = {radius!r}{self.law()} /")
+        if self.chance(0.2):
+            groups += [self.arc(small) for _ in range(rng.choice([1, 2, 5]))]
         if self.chance(0.2):
             for k in range(rng.choice([1, 1, 3, 10])):
                 one, two = (self.place(rng.random(), rng.random()) for _ in "12")
@@ -222,6 +224,16 @@ class Draw:
         if groups:
             self.packing = min(self.packing, 0.2)
         return groups
+
+    def arc(self, small: float) -> str:
+        """Draw an arc that lies inside the box, whose shorter edge has the given length."""
+        rng = self.rng
+        where = f"centre = {numbers(*self.place(rng.uniform(0.3, 0.7), rng.uniform(0.3, 0.7)))}"
+        radius = rng.uniform(0.01, 0.3) * small
+        first = rng.choice([90 * rng.randint(-4, 4), rng.uniform(-360, 360)])
+        last = first + rng.choice([90, 180, 270, 360, rng.uniform(1, 360)])
+        angles = f"from_angle = {first!r} to_angle = {last!r}"
+        return f"&obstacle {where} radius = {radius!r} {angles}{self.law()} /"
 
     # --- species and initial states of the disks ---
 

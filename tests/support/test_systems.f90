@@ -37,12 +37,12 @@ module test_systems
     "walls giants dilute", "walls giants gravity", "periodic giants dilute inelastic contact", &
     "walls slants mixture", "channel gravity slants inelastic contact", "periodic slants pegs dilute", &
     "walls dense sizes", "channel dense sizes gravity", "periodic dense sizes inelastic", "walls sizes pegs", &
-    "periodic giant sizes"]
+    "periodic giant sizes", "walls arcs mixture", "channel gravity arcs inelastic contact", "periodic arcs pegs dilute"]
   !> All systems of the list `systems`, and further systems with moving sides.
   character(len=*), parameter :: every_system(*) = [character(len=40) :: systems, "walls shaken", &
     "walls shaken gravity mixture", "channel shaken gravity inelastic contact", "walls shaken bed dilute", &
     "walls shaken pegs inelastic contact", "walls shaken slants gravity", "walls shaken giants gravity", &
-    "walls shaken sizes gravity"]
+    "walls shaken sizes gravity", "walls shaken arcs gravity giant"]
 
 contains
 
@@ -104,7 +104,8 @@ contains
   end subroutine make_room
 
   !> Returns a gas of about a hundred disks in a box of 3 x 2 that does not contain the origin. The words name the features:
-  !> `periodic` or `channel` (periodic in x), otherwise walls; `gravity`; `pegs` and `slants` as obstacles and a `round` container;
+  !> `periodic` or `channel` (periodic in x), otherwise walls; `gravity`; `pegs`, `slants` and `arcs` as obstacles and a `round`
+  !> container;
   !> a `mixture` of two species; a `giant` or two `giants`; a `bed` at rest that is hit by the giant; many `sizes`; `inelastic`;
   !> `smooth` walls; `contact` duration; `shaken` sides; `few`, `dilute` or `dense`.
   function system(words, seed, scale) result(sim)
@@ -134,6 +135,10 @@ contains
       //given("round", " &obstacle centre = 0.5,1.5 radius = 0.98 side = 'inside' /") &
       ! so far from moving sides that no disk is crushed
       //given("slants", " &wall from = -1.0,1.2 to = -0.6,1.6 / &wall from = 0.2,1.9 to = 1.6,1.3 /") &
+      ! half a circle, almost a whole circle with disks inside, and an arc across the left side
+      //given("arcs", " &obstacle centre = 0.75,1.75 radius = 0.25 from_angle = 180 to_angle = 360 /" &
+      //" &obstacle centre = 1.5,1.6 radius = 0.3 from_angle = -60 to_angle = 250 /" &
+      //" &obstacle centre = -1.3,1.5 radius = 0.42 from_angle = -60 to_angle = 60 /") &
       ! with large and small amplitudes, and fast; all start at their mean positions
       //given("shaken", " &side name = 'bottom' motion = 'parabolic' amplitude = 0.5 period = 4 /" &
       //" &side name = 'top' motion = 'sawtooth' velocity = 0.5 /" &
