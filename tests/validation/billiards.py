@@ -2,7 +2,7 @@
 
 import atexit
 from functools import cache, partial
-from math import pi, radians
+from math import acos, cos, log, pi, radians, sin, sqrt
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from ricochet import Run
 
-from .case import Case, Member, relative, sigmas, within
+from .case import AT_MOST, Case, Member, relative, sigmas, within
 from .estimators import angular_momentum, over
 from .inputs import EVERY_EVENT, PERIODIC, disk, namelist
 
@@ -157,6 +157,144 @@ def boltzmann_over(n: float) -> float:
     return 1 - 4 / 3 * n * np.log(n) - 0.8775 * n + 4.519 * (n * np.log(n)) ** 2
 
 
+# --- billiards with arcs ---
+
+#: Radius of the disk in the billiards with arcs.  The radii of the arcs are larger than 1 by BALL, so
+#: that the centre of the disk moves in a billiard with half circles of radius 1.
+BALL = 0.001
+RIM_OF_ARC = 1 + BALL
+
+
+def arc(name: str, centre: tuple, first: float) -> dict:
+    """Return a half circle around the given centre, which begins at the given angle."""
+    angles = {"from_angle": first, "to_angle": first + 180}
+    return {"name": name, "centre": centre, "radius": RIM_OF_ARC, **angles}
+
+
+def stadium(velocity: tuple, events: int) -> Member:
+    """Return a run in a stadium: half circles of radius 1, joined by straight lines of length 2."""
+    lines = [{"from": (-1, y), "to": (1, y)} for y in (-RIM_OF_ARC, RIM_OF_ARC)]
+    return Member(
+        namelist(
+            box={"lower": (-2.2, -1.2), "upper": (2.2, 1.2)}, wall=lines,
+            obstacle=[arc("left", (-1, 0), 90), arc("right", (1, 0), -90)],
+            species=disk((0.25, 0), velocity, BALL),
+            stop={"events": events}, output={"event_log": True},
+        )
+    )  # fmt: skip
+
+
+STADIUM = stadium((cos(1.0), sin(1.0)), 2_000_000)
+ALONG_AXIS = stadium((1, 0), 1001)
+#: Area over perimeter of the region that the centre of the disk can reach.
+STADIUM_PATH = pi * (4 + pi) / (4 + 2 * pi)
+#: A path along the long axis, of length 4 between the arcs, has a stability matrix with trace
+#: 2 - 2 * 4 / 1 = -6, and therefore the stretching factor 3 + sqrt(8) per collision.
+AXIS_EXPONENT = log(3 + sqrt(8)) / 4
+
+
+def stretching(run: Run) -> float:
+    """Return the Lyapunov exponent of a path with speed 1, measured from the event log.
+
+    A narrow beam around the path has the curvature B.  Between collisions 1/B grows by the elapsed
+    time t, and the width of the beam by the factor |1 + B t|.  At a collision B grows by
+    2 k / cos(phi), where k = -1/R at the inner face of an arc and 0 at a wall.  The angle phi
+    follows from the impulse 2 m cos(phi).  See Dellago, Posch and Hoover, Physical Review E 53, 1485
+    (1996).
+    """
+    log_, first_wall = run.event_log(), -4 - len(run.obstacles)
+    reach = np.array([obstacle.radius - run.radius[0] for obstacle in run.obstacles])
+    arcs = log_.j > first_wall
+    inner = reach[np.where(arcs, -4 - log_.j, 0)]
+    turn = np.where(arcs, -4 * run.mass[0] / (log_.impulse * inner), 0.0)
+    flights = np.diff(log_.time)
+    curvature, grown = 1.0, 0.0
+    for flight, bend in zip(flights.tolist(), turn.tolist(), strict=False):
+        curvature += bend
+        factor = 1 + curvature * flight
+        grown += log(abs(factor))
+        curvature /= factor
+    return grown / float(flights.sum())
+
+
+#: The mushroom: half the width of the stem, and the depth of the stem below the cap.
+HALF_STEM, DEPTH = 0.4, 1.0
+BULGE = BALL**2 * pi / 4
+
+
+def mushroom(angular_momentum: float, events: int, **output) -> Member:
+    """Return a run in a mushroom, with a path of speed 1 and the given angular momentum.
+
+    The arc is centred one radius of the disk above the underside of the cap.  The centre of the
+    disk therefore moves in an exact half circle of radius 1, in which collisions conserve the
+    magnitude of the angular momentum.
+    """
+    half, rim = HALF_STEM, RIM_OF_ARC
+    sides = [(s * rim, BALL, s * rim, 0, s * half, 0, s * half, -DEPTH) for s in (-1, 1)]
+    rise = angular_momentum / 0.6
+    return Member(
+        namelist(
+            box={"lower": (-1.2, -DEPTH), "upper": (1.2, 1.2)},
+            obstacle=arc("cap", (0, BALL), 0),
+            wall=[{"name": f"stem{k}", "points": points} for k, points in enumerate(sides)],
+            species=disk((0, BALL + 0.6), (rise, sqrt(1 - rise**2)), BALL),
+            stop={"events": events}, output=output,
+        )
+    )  # fmt: skip
+
+
+REGULAR = mushroom(HALF_STEM + 0.01, 200_000, frames_every_events=1)
+CHAOTIC = mushroom(HALF_STEM - 0.01, 2_000_000, frames_every_events=1)
+
+
+def about_cap(run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Return height above the centre of the cap and magnitude of the angular momentum (F,)."""
+    away, velocity = run.position[:][:, 0] - (0, BALL), run.velocity[:][:, 0]
+    spin = away[:, 0] * velocity[:, 1] - away[:, 1] * velocity[:, 0]
+    return away[:, 1], np.abs(spin)
+
+
+def regular_path(run: Run) -> list[float]:
+    """Return the largest change of the angular momentum, and the collisions in the stem."""
+    height, spin = about_cap(run)
+    stem = np.sum(height < -1e-9) + np.sum(np.abs(run.position[:][:, 0, 0])[height < 1e-9] < HALF_STEM)
+    return [float(np.ptp(spin)), float(stem)]
+
+
+def largest_spin(run: Run) -> float:
+    """Return the largest angular momentum of a chaotic path after collisions in the cap.
+
+    A path leaves the underside of the cap or the arc with the angular momentum that it has until it
+    enters the stem.
+    """
+    height, spin = about_cap(run)
+    edge = np.abs(run.position[:][:, 0, 0]) >= HALF_STEM
+    return float(spin[(height >= 0) & edge].max())
+
+
+def share_in_cap(run: Run) -> float:
+    """Return the fraction of the time that the disk spends in the cap."""
+    height, time = run.position[:][:, 0, 1] - BALL, run.time
+    low, high = height[:-1], height[1:]
+    step = high - low
+    with np.errstate(divide="ignore", invalid="ignore"):
+        part = np.where(step == 0, high >= 0, np.maximum(low, high) / np.abs(step))
+    return float(np.sum(np.clip(part, 0, 1) * np.diff(time)) / time[-1])
+
+
+def chaotic_share() -> float:
+    """Return the exact fraction of the chaotic part of phase space that lies in the cap.
+
+    A path in the cap is regular if its angular momentum exceeds half the width b of the stem.  The
+    regular paths fill the area R^2 arccos(b/R) - b sqrt(R^2 - b^2) times 2 pi of the phase space,
+    with R = 1.  In the stem all paths are chaotic.
+    """
+    b = HALF_STEM
+    cap = pi / 2 - (acos(b) - b * sqrt(1 - b * b))
+    neck = 2 * (b * BALL - BULGE)
+    return cap / (cap + 2 * (b - BALL) * (DEPTH - BALL) + neck)
+
+
 STEP = radians(150.733419431936)
 CASES = [
     Case(
@@ -207,5 +345,30 @@ CASES = [
         "P12-06", "random Lorentz gas, n R^2 = .01: diffusion over Boltzmann's",
         LORENTZ, over(over_boltzmann), 1 / boltzmann_over(DENSITY), within(0.015),
         "Weijland and van Leeuwen 1968, quoted from memory",
+    ),
+    Case(
+        "P12-07", "stadium of two arcs and two walls, 2e6 hits: mean free path",
+        (STADIUM,), free_path, STADIUM_PATH, relative(0.005), "Santalo; Chernov 1997",
+    ),
+    Case(
+        "P12-08", "stadium, unstable path along the axis: Lyapunov exponent",
+        (ALONG_AXIS,), stretching, AXIS_EXPONENT, relative(1e-3), "D: stretching 3 + sqrt(8)",
+    ),
+    Case(
+        "P12-09", "stadium, straight part as long as the width: Lyapunov exponent",
+        (STADIUM,), stretching, 0.43, within(0.01),
+        "Benettin and Strelcyn 1978; Dellago and Posch 1995, quoted from memory",
+    ),
+    Case(
+        "P12-10", "mushroom, regular path of 2e5 hits: angular momentum, hits in the stem",
+        (REGULAR,), regular_path, 0, within(1e-9), "Bunimovich 2001",
+    ),
+    Case(
+        "P12-11", "mushroom, chaotic path: largest angular momentum in the cap",
+        (CHAOTIC,), largest_spin, HALF_STEM, AT_MOST, "Bunimovich 2001",
+    ),
+    Case(
+        "P12-12", "mushroom, chaotic path of 2e6 hits: fraction of time in the cap",
+        (CHAOTIC,), share_in_cap, chaotic_share(), relative(0.02), "D: exact volumes of phase space",
     ),
 ]  # fmt: skip
