@@ -46,7 +46,7 @@ def picture(path: Path, at: float) -> bytes:
     figure = Figure(figsize=(1.6, 1.6), dpi=2 * PIXELS / 1.6, layout="none")
     axes = figure.add_axes((0.02, 0.02, 0.96, 0.96))
     with Simulation(path) as run:
-        box, groups = run.parameters["box"], run.parameters
+        box = run.parameters["box"]
         way = [run.position.copy()]
         for time in np.linspace(0, at, 401 if run.n_disks <= FEW else 2)[1:]:
             way.append(run.advance(time=time).position)
@@ -57,13 +57,13 @@ def picture(path: Path, at: float) -> bytes:
                 room[k % 2, k // 2] = run.observable(place)
         axes.add_patch(Rectangle(lower, *(upper - lower), fill=False, color="0.8", lw=0.8))
         axes.add_patch(Rectangle(room[0], *(room[1] - room[0]), fill=False, color="0.3", lw=0.8))
-        for one in obstacles_of(groups):
+        for one in obstacles_of(run.parameters):
             if one.is_arc:
                 axes.plot(*one.points(181).T, color="0.3", lw=0.8)
                 continue
             colour = "none" if one.inside else "0.8"
             axes.add_patch(Circle(one.centre, one.radius, facecolor=colour, edgecolor="0.3"))
-        walls = walls_of(groups)
+        walls = walls_of(run.parameters)
         axes.add_collection(LineCollection(walls, color="0.3", lw=0.8))
         least = min(0.006, 0.2 / np.sqrt(run.n_disks)) * np.max(upper - lower)
         size = 2 * np.maximum(run.radius, least)

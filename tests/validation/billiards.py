@@ -204,7 +204,7 @@ def stretching(run: Run) -> float:
     """
     log_, first_wall = run.event_log(), -4 - len(run.obstacles)
     reach = np.array([obstacle.radius - run.radius[0] for obstacle in run.obstacles])
-    arcs = log_.j > first_wall
+    arcs = (log_.j <= -4) & (log_.j > first_wall)
     inner = reach[np.where(arcs, -4 - log_.j, 0)]
     turn = np.where(arcs, -4 * run.mass[0] / (log_.impulse * inner), 0.0)
     flights = np.diff(log_.time)
@@ -231,13 +231,13 @@ def mushroom(angular_momentum: float, events: int, **output) -> Member:
     """
     half, rim = HALF_STEM, RIM_OF_ARC
     sides = [(s * rim, BALL, s * rim, 0, s * half, 0, s * half, -DEPTH) for s in (-1, 1)]
-    rise = angular_momentum / 0.6
+    across = angular_momentum / 0.6
     return Member(
         namelist(
             box={"lower": (-1.2, -DEPTH), "upper": (1.2, 1.2)},
             obstacle=arc("cap", (0, BALL), 0),
             wall=[{"name": f"stem{k}", "points": points} for k, points in enumerate(sides)],
-            species=disk((0, BALL + 0.6), (rise, sqrt(1 - rise**2)), BALL),
+            species=disk((0, BALL + 0.6), (across, sqrt(1 - across**2)), BALL),
             stop={"events": events}, output=output,
         )
     )  # fmt: skip
