@@ -384,6 +384,17 @@ def test_the_code_that_the_page_on_output_shows_finds_what_disks_carry(program, 
     assert said.returncode == 0 and "mean=" in said.stdout, said.stderr
 
 
+def test_the_code_that_the_page_on_laws_shows_finds_the_exponent_of_the_stadium(tmp_path):
+    """The exponent of 20000 collisions differs by a few per cent from the published 0.43."""
+    page = section("laws", "## Laws").partition("**Billiards.**")[2].partition("**Diffusion.**")[0]
+    code = "".join(line[4:] for line in page.splitlines(True) if line.startswith("    "))
+    (tmp_path / "input").symlink_to(ROOT / "input")
+    own = environment(PYTHONPATH=ROOT / "post")
+    said = ran(sys.executable, "-c", code, cwd=tmp_path, env=own)
+    assert said.returncode == 0, said.stderr
+    assert abs(float(said.stdout.split()[-1]) - 0.43) < 0.02
+
+
 def test_there_is_one_version(program):
     """Program, CHANGELOG and citation file contain the same version and date."""
     said = ran(program, "--version", check=True).stdout
