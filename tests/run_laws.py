@@ -148,7 +148,7 @@ def wall_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
 
 
 def angles_of(found: Found) -> np.ndarray:
-    """Return the angles (groups, 2) of the arc of each group of obstacles; NaN for whole circles."""
+    """Return the angles (groups, 2) of the arc of each group of obstacles; NaN for circles."""
     none = np.full(len(found.get("/parameters/obstacle/inside", ())), np.nan)
     names = ("from_angle", "to_angle")
     return np.stack([found.get(f"/parameters/obstacle/{name}", none) for name in names], axis=1)

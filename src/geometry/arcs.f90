@@ -70,7 +70,7 @@ contains
     arc%extent = 0.5_real64*(high - low)
     offset = magnitude(arc%centre)
     arc%circumradius = maxval([(magnitude(arc%end_point(k)), k=1, 2)])
-    if (arc%is_in_window(arc%centre)) arc%circumradius = radius + offset   ! the point of the circle that is farthest from the middle
+    if (arc%is_in_window(arc%centre)) arc%circumradius = radius + offset   ! the point of the circle farthest from the middle
   end function new_arc
 
   !> Unit vector in the direction of an angle. For a multiple of 90 degrees the result is exact.
@@ -89,6 +89,7 @@ contains
       e = -e
     case (3)
       e = [e(2), -e(1)]
+    case default                                ! 0: the vector needs no rotation
     end select
   end function unit_vector
 
@@ -97,7 +98,8 @@ contains
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: c(2)            !! [length]
     logical :: yes
-    real(real64) :: after_first, before_last    ! positive if the vector is less than half a turn after the first end, or before the last
+    ! positive if the vector is less than half a turn after the first end, or before the last end
+    real(real64) :: after_first, before_last
 
     associate (first => self%end_direction(:, 1), last => self%end_direction(:, 2))
       after_first = first(1)*c(2) - first(2)*c(1)
@@ -177,9 +179,9 @@ contains
 
   contains
 
-    !> Time until the centre of the disk reaches the outer or the inner face of the arc. A point at which the path crosses the circle
-    !> of the face is a contact if it is in the window of angles, and on the same side of the arc as the face: a disk on the other
-    !> side of the arc is beyond the circle of the face without touching the face.
+    !> Time until the centre of the disk reaches the outer or the inner face of the arc. A point at which the path crosses the
+    !> circle of the face is a contact if the point is in the window of angles, and on the same side of the arc as the face: a disk
+    !> on the other side of the arc is beyond the circle of the face without touching the face.
     pure function time_to_face(rho, inside) result(t)
       real(real64), intent(in) :: rho           !! radius of the circle [length]
       logical, intent(in) :: inside             !! .true. for the inner face
@@ -200,9 +202,9 @@ contains
       t = never
     end function time_to_face
 
-    !> Whether a disk on a straight path moves at a right angle to the vector from a point, up to rounding errors. The disk then does
-    !> not collide with a circle around the point, even if the disk touches the circle. Without this rule, rounding errors after a
-    !> collision could cause a second collision with the same face or end.
+    !> Whether a disk on a straight path moves away from a point, or at a right angle to the vector from the point, up to rounding
+    !> errors. The disk then does not collide with a circle around the point, even if the disk touches the circle. Without this
+    !> rule, rounding errors after a collision could cause a second collision with the same face or end.
     pure function grazes(from) result(yes)
       real(real64), intent(in) :: from(2)       !! vector from the point to the centre of the disk [length]
       logical :: yes

@@ -127,8 +127,8 @@ contains
     end do
   end function from_nearest
 
-  !> Like `from_nearest`, for an outline whose nearest image is not always the image whose middle is nearest to x. The distances of x
-  !> from the outlines of all images are compared.
+  !> Like `from_nearest`, for an outline whose nearest image is not always the image whose middle is nearest to x. The distances of
+  !> x from the outlines of all images are compared.
   pure function from_nearest_outline(shape, x, images, heading) result(d)
     class(shape_t), intent(in) :: shape
     real(real64), intent(in) :: x(2)            !! [length]

@@ -87,3 +87,26 @@ def test_many_obstacles_cost_the_same_each_and_keep_their_area(playing, tmp_path
     zoomed = browser.run("zoom(400); drawStage(); return radii[0] / view.unit")
     assert zoomed == pytest.approx(1e-3)
     assert browser.complaints() == []
+
+
+def test_an_arc_is_drawn_between_its_angles(playing, tmp_path):
+    """The line of an arc from 0 to 90 degrees is in the upper right quarter, and not filled."""
+    browser = playing(still_run(tmp_path / "a.h5", np.full((2, 1, 2), 0.9), radius=1e-3))
+    quarters = browser.run(
+        """film.obstacles = [[0.5, 0.5, 0.3, false, 0, 90]];
+        film.laws.obstacle = [{}];
+        layOutStage();
+        drawStage();
+        const darkness = (x, y) => {
+          const { data } = ground.getImageData(across(x) - 4, up(y) - 4, 9, 9);
+          return 255 - Math.min(...data.filter((_, k) => k % 4 < 3));
+        };
+        const at = (size, k) => {
+          const turn = (k + 0.5) * Math.PI / 2;
+          return darkness(0.5 + size * Math.cos(turn), 0.5 + size * Math.sin(turn));
+        };
+        return [0, 1, 2, 3].map(k => [at(0.3, k), at(0.15, k)]);"""
+    )
+    outline, inside = np.transpose(quarters)
+    assert outline[0] > 100 and (outline[1:] < 20).all() and (inside < 20).all()
+    assert browser.complaints() == []

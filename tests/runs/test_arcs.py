@@ -17,7 +17,9 @@ from whole_runs import FINISHED, USAGE, ran, write_input
 
 INPUTS = Path(__file__).resolve().parents[2] / "input"
 CIRCLE = "&obstacle name = 'ring' centre = 0.5, 0.5 radius = 0.45"
-START = "placement = 'grid' grid = 4, 3 region = 0.3, 0.7, 0.3, 0.7 velocities = 'uniform' speed = 2"
+START = (
+    "placement = 'grid' grid = 4, 3 region = 0.3, 0.7, 0.3, 0.7 velocities = 'uniform' speed = 2"
+)
 LAWS = {
     "elastic": "",
     "inelastic, normal": " restitution = 0.7 rule = 'normal'",
@@ -154,8 +156,15 @@ def test_the_area_beside_an_arc_is_not_accessible(program, tmp_path):
 
 def test_disks_that_overlap_an_arc_are_refused(program, tmp_path):
     arc = "&obstacle name = 'cup' centre = 0.5, 0.5 radius = 0.3 from_angle = 180 to_angle = 360 /"
-    for place, fits in (((0.5, 0.7), True), ((0.5, 0.26), True), ((0.5, 0.24), False),
-                        ((0.5, 0.16), False), ((0.2, 0.54), False), ((0.2, 0.56), True)):  # fmt: skip
+    places = {
+        (0.5, 0.7): True,
+        (0.5, 0.26): True,
+        (0.5, 0.24): False,
+        (0.5, 0.16): False,
+        (0.2, 0.54): False,
+        (0.2, 0.56): True,
+    }
+    for place, fits in places.items():
         text = f"{arc} &species radius = 0.05 position = {place[0]}, {place[1]} velocity = 1, 0 /"
         path = write_input(tmp_path, f"{text} &stop time = 1 /")
         done = ran(program, path, "--check")

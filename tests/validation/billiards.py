@@ -159,8 +159,8 @@ def boltzmann_over(n: float) -> float:
 
 # --- billiards with arcs ---
 
-#: Radius of the disk in the billiards with arcs.  The radii of the arcs are larger than 1 by BALL, so
-#: that the centre of the disk moves in a billiard with half circles of radius 1.
+#: Radius of the disk in the billiards with arcs.  The radii of the arcs are larger than 1 by BALL,
+#: so that the centre of the disk moves in a billiard with half circles of radius 1.
 BALL = 0.001
 RIM_OF_ARC = 1 + BALL
 
@@ -199,8 +199,8 @@ def stretching(run: Run) -> float:
     A narrow beam around the path has the curvature B.  Between collisions 1/B grows by the elapsed
     time t, and the width of the beam by the factor |1 + B t|.  At a collision B grows by
     2 k / cos(phi), where k = -1/R at the inner face of an arc and 0 at a wall.  The angle phi
-    follows from the impulse 2 m cos(phi).  See Dellago, Posch and Hoover, Physical Review E 53, 1485
-    (1996).
+    follows from the impulse 2 m cos(phi).  See Dellago, Posch and Hoover, Physical Review E 53,
+    1485 (1996).
     """
     log_, first_wall = run.event_log(), -4 - len(run.obstacles)
     reach = np.array([obstacle.radius - run.radius[0] for obstacle in run.obstacles])
@@ -257,7 +257,9 @@ def about_cap(run: Run) -> tuple[np.ndarray, np.ndarray]:
 def regular_path(run: Run) -> list[float]:
     """Return the largest change of the angular momentum, and the collisions in the stem."""
     height, spin = about_cap(run)
-    stem = np.sum(height < -1e-9) + np.sum(np.abs(run.position[:][:, 0, 0])[height < 1e-9] < HALF_STEM)
+    stem = np.sum(height < -1e-9) + np.sum(
+        np.abs(run.position[:][:, 0, 0])[height < 1e-9] < HALF_STEM
+    )
     return [float(np.ptp(spin)), float(stem)]
 
 
@@ -369,6 +371,6 @@ CASES = [
     ),
     Case(
         "P12-12", "mushroom, chaotic path of 2e6 hits: fraction of time in the cap",
-        (CHAOTIC,), share_in_cap, chaotic_share(), relative(0.02), "D: exact volumes of phase space",
+        (CHAOTIC,), share_in_cap, chaotic_share(), relative(0.02), "D: phase-space volumes",
     ),
 ]  # fmt: skip

@@ -63,7 +63,7 @@ class State(Session):
         for group in {"obstacle", "wall"} & found.keys():  # the file contains them as columns
             rows = list(found[group].values())
             found |= geometry_of(group, rows)
-            names = dict.fromkeys(name for row in rows for name in row)  # a set would lose the order
+            names = dict.fromkeys(name for row in rows for name in row)  # keeps the order
             found[group] = {name: [row.get(name, np.nan) for row in rows] for name in names}
             if "side" in found[group]:
                 found[group]["inside"] = [side == "inside" for side in found[group]["side"]]
