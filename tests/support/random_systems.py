@@ -202,8 +202,6 @@ class Draw:
                 radius = rng.uniform(0.01, 0.15) * small
                 groups.append(f"&obstacle {where} radius = {radius!r}{self.law()} /")
         if self.chance(0.2):
-            groups += [self.arc(small) for _ in range(rng.choice([1, 2, 5]))]
-        if self.chance(0.2):
             for k in range(rng.choice([1, 1, 3, 10])):
                 one, two = (self.place(rng.random(), rng.random()) for _ in "12")
                 if self.chance(0.5):
@@ -221,6 +219,8 @@ class Draw:
             groups.append(f"&obstacle name = 'bowl' side = 'inside' {size}{self.law()} /")
             self.packing *= small / max(self.edges)
             self.bowl = True
+        if self.chance(0.2):
+            groups += [self.arc(small) for _ in range(rng.choice([1, 2, 5]))]
         if groups:
             self.packing = min(self.packing, 0.2)
         return groups
