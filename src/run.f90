@@ -100,7 +100,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     logical :: folder_is_new, over_broken
 
-    call new_simulation(run%input, run%line, run%sim, error)
+    call new_simulation(run%input, run%line, run%sim, error, unrelaxed=run%command%check)
     call run%line%clear()
     if (allocated(error)) return
     associate (command => run%command)

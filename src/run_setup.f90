@@ -80,13 +80,14 @@ contains
   end subroutine resolve_input
 
   !> Creates the initial state of a run. The disks are sorted in memory by position, so that neighbours are close in memory.
-  subroutine new_simulation(input, line, sim, error)
+  subroutine new_simulation(input, line, sim, error, unrelaxed)
     type(run_input_t), intent(inout) :: input
     class(status_line_t), intent(inout) :: line
     type(simulation_t), intent(out) :: sim
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: unrelaxed                      !! see `create_simulation`
 
-    call create_simulation(input, line, sim, error)
+    call create_simulation(input, line, sim, error, unrelaxed)
     if (.not. allocated(error)) call renumber(sim)
   end subroutine new_simulation
 

@@ -10,6 +10,7 @@ module input_settings
   use input_problems, only: problem_list_t
   use input_species, only: take_species
   use input_surfaces, only: check_least, take_grip, take_obstacles, take_wall_laws
+  use partners, only: n_sides
   use settings, only: sampled, sampled_by, sampling_t, settings_t
   use side_motion, only: piston
   use texts, only: counted, joined, place_of, shown, suggestion, written
@@ -273,6 +274,7 @@ contains
         "a single disk in a periodic box that is sheared (box.shear_rate) or driven (drive.kind): no event ever occurs; give time")
     end associate
     call check_columns()
+    call check_relaxed()
     if (settings%run%dynamics == "steps") call limit("run", "dt", "steps", 1.0e18_real64)
     call limit("drive", "interval", "kicks", 1.0e15_real64)
     call limit("output", "frames_every_time", "samples", 1.0e9_real64)
@@ -293,6 +295,36 @@ contains
         end do
       end associate
     end subroutine check_columns
+
+    !> Checks the conditions for placement = 'relaxed': event chains move all disks of the run in a box with four straight sides at
+    !> rest, and sample the uniform distribution of positions, which is the equilibrium without gravity.
+    subroutine check_relaxed()
+      character(len=*), parameter :: with = "'relaxed' cannot be combined with "
+      logical :: relaxed(size(settings%species))
+      real(real64) :: whole(4)
+      integer :: s(2), k, other
+
+      s = range_of(groups, ["species"])
+      associate (species => settings%species, own => groups(s(1):s(2)), box => settings%box)
+        relaxed = [(species(k)%placement == "relaxed", k=1, size(species))]
+        if (.not. any(relaxed)) return
+        whole = [box%lower(1), box%upper(1), box%lower(2), box%upper(2)]
+        k = findloc(relaxed, .true., dim=1)
+        other = findloc(relaxed, .false., dim=1)
+        if (other > 0) call own(k)%complain("placement", "'relaxed' applies to all species of a run; """//species(other)%name &
+          //""" has placement = '"//species(other)%placement//"'", problems)
+        if (any(groups%name == "obstacle")) call own(k)%complain("placement", with//"&obstacle", problems)
+        if (any(groups%name == "wall")) call own(k)%complain("placement", with//"&wall", problems)
+        if (any(box%surface(:n_sides)%motion%moves())) call own(k)%complain("placement", with//"moving sides (side.motion)", &
+          problems)
+        if (box%has_gravity()) call own(k)%complain("placement", with//"box.gravity: in equilibrium the density would depend on " &
+          //"the height", problems)
+        do k = 1, size(species)
+          if (relaxed(k) .and. any(abs(species(k)%region - whole) > 0)) call own(k)%complain("region", "must be the whole box " &
+            //"with placement = 'relaxed'", problems)
+        end do
+      end associate
+    end subroutine check_relaxed
 
     !> Reports that a variable or group cannot be combined with another setting, if both are present.
     subroutine refuse(together, variable, other)

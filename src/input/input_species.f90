@@ -41,6 +41,7 @@ contains
       call take_count(groups(k), species(k))
       call take_velocities(groups(k), species(k))
     end do
+    call take_sweeps()
     call resolve_sizes()
     total = sum(int(species%count, int64))
     if (total > most_disks) call problems%add(0, "species.count", counted(total, "disk")//"; allowed: up to "// &
@@ -155,6 +156,25 @@ contains
           counted(int(s%count, int64), "disk")//"; allowed: one pair, or one for each disk", problems)
       end associate
     end subroutine take_velocities
+
+    !> Sets the number of sweeps for placement = 'relaxed', which is the same for all species because the relaxation moves all disks.
+    subroutine take_sweeps()
+      integer :: k, giver                                 ! giver: index of the first species that gives the number, or 0
+
+      giver = findloc([(groups(k)%given("relaxation_sweeps"), k=1, size(groups))], .true., dim=1)
+      do k = 1, size(groups)
+        if (groups(k)%given("relaxation_sweeps")) then
+          associate (first => groups(giver)%integer_of("relaxation_sweeps", 0_int64))
+            if (groups(k)%integer_of("relaxation_sweeps", 0_int64) /= first) call groups(k)%complain("relaxation_sweeps", &
+              "must be the same for all species; """//trim(groups(giver)%instance)//""" has "//written(first), problems)
+          end associate
+        else if (giver > 0 .and. species(k)%placement == "relaxed") then
+          call groups(k)%put_text("relaxation_sweeps", written(groups(giver)%integer_of("relaxation_sweeps", 0_int64)))
+        end if
+        if (species(k)%placement == "relaxed") &
+          species(k)%relaxation_sweeps = groups(k)%integer_of("relaxation_sweeps", 0_int64)
+      end do
+    end subroutine take_sweeps
 
     !> Sets the masses and radii of all species. The species in `relative_to` may also have a `relative_to`; the factors of all
     !> species in such a chain are multiplied.

@@ -55,8 +55,9 @@ module settings
     logical :: angle_in_file = .false.                !! .true. if the file contains orientations
     logical :: is_base = .false.                      !! .true. if masses and radii of other species are relative to this species
     real(real64) :: region(4)                         !! xlo, xhi, ylo, yhi [length]
-    !> Method of the initial positions: 'random', 'grid', 'lattice', 'dense', 'explicit', 'file', 'grown'
+    !> Method of the initial positions: 'random', 'grid', 'lattice', 'dense', 'explicit', 'file', 'grown', 'relaxed'
     character(len=:), allocatable :: placement
+    integer(int64) :: relaxation_sweeps = 0           !! number of sweeps of event-chain Monte Carlo for 'relaxed'
     integer :: grid(2)                                !! numbers of columns and rows; 0, 0 if they are not given
     character(len=:), allocatable :: file             !! for placement 'file' or 'grown': text file, or HDF5 file of a run
     !> .true. to scale positions from the output of another run to the box of this run

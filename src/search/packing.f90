@@ -1,5 +1,6 @@
-!> A packing: a set of placed disks, with a test whether another disk fits between them. Each species has its own grid of cells. The
-!> disks of one species have similar radii. The cost of a search therefore does not depend on the radii of other species.
+!> A packing: a set of placed disks, with a test whether another disk fits between them, and a search for the first disk that a moving
+!> disk touches. Each species has its own grid of cells. The disks of one species have similar radii. The cost of a search therefore
+!> does not depend on the radii of other species.
 module packing
   use images, only: images_t
   use kinds, only: int32, real64
@@ -7,6 +8,7 @@ module packing
   use obstacle_cells, only: obstacle_cells_t
   use partners, only: obstacle_code, obstacle_number
   use box_geometry, only: box_t
+  use shapes, only: spare
   implicit none
   private
   public :: packing_t
@@ -44,6 +46,9 @@ module packing
     procedure :: open_all_species
     procedure :: open_species
     procedure :: add
+    procedure :: remove
+    procedure :: shift
+    procedure :: find_contact
     procedure :: find_blocker
     procedure :: list_neighbours
     procedure :: covers
@@ -130,6 +135,148 @@ contains
     self%disk(k)%next = self%layer(s)%head(c(1), c(2))
     self%layer(s)%head(c(1), c(2)) = k
   end subroutine add
+
+  !> Removes disk k from its cell. The record of the disk keeps its position and radius.
+  pure subroutine remove(self, k)
+    class(packing_t), intent(inout) :: self
+    integer(int32), intent(in) :: k
+    integer(int32) :: before
+    integer :: c(2)
+
+    associate (me => self%disk(k))
+      c = cell(self%layer(me%species), me%x)
+      associate (head => self%layer(me%species)%head(c(1), c(2)))
+        if (head == k) then
+          head = me%next
+          return
+        end if
+        before = head
+      end associate
+      do while (self%disk(before)%next /= k)
+        before = self%disk(before)%next
+      end do
+      self%disk(before)%next = me%next
+    end associate
+  end subroutine remove
+
+  !> Moves disk k along an axis, without a test for overlaps. The distance must not exceed the period of a periodic axis.
+  pure subroutine shift(self, k, axis, distance)
+    class(packing_t), intent(inout) :: self
+    integer(int32), intent(in) :: k
+    integer, intent(in) :: axis                     !! 1 for x, 2 for y
+    real(real64), intent(in) :: distance            !! negative for a motion to the left or downwards [length]
+    real(real64) :: p(2)
+
+    associate (me => self%disk(k), box => self%box)
+      p = me%x
+      p(axis) = p(axis) + distance
+      if (box%periodic(axis)) then                  ! the limits at the ends allow for rounding errors
+        if (p(axis) >= box%upper(axis)) p(axis) = max(p(axis) - (box%upper(axis) - box%lower(axis)), box%lower(axis))
+        if (p(axis) < box%lower(axis)) p(axis) = min(p(axis) + (box%upper(axis) - box%lower(axis)), box%upper(axis))
+      end if
+      if (all(cell(self%layer(me%species), p) == cell(self%layer(me%species), me%x))) then
+        me%x = p
+        return
+      end if
+    end associate
+    call self%remove(k)
+    call self%add(k, self%disk(k)%species, p, self%disk(k)%radius)
+  end subroutine shift
+
+  !> Finds the first disk that disk k touches when disk k moves along an axis while all other disks are at rest. On a periodic axis,
+  !> the grid of each species must extend over the whole period.
+  pure subroutine find_contact(self, k, axis, sense, distance, partner)
+    class(packing_t), intent(in) :: self
+    integer(int32), intent(in) :: k
+    integer, intent(in) :: axis                     !! 1 for x, 2 for y
+    integer, intent(in) :: sense                    !! 1 for a motion to the right or upwards, -1 for the opposite direction
+    !> In: distance up to which the procedure searches. Out: distance to the contact, or unchanged if no disk is touched. [length]
+    real(real64), intent(inout) :: distance
+    integer(int32), intent(out) :: partner          !! disk that is touched; 0 if no disk is touched
+    integer :: s
+
+    partner = 0
+    do s = 1, size(self%layer)
+      if (allocated(self%layer(s)%head)) call search_ahead(self, s, k, [axis, sense], distance, partner)
+    end do
+  end subroutine find_contact
+
+  !> Like `find_contact`, but searches only the disks of species s. The arrays of cells ahead of disk k, perpendicular to the motion,
+  !> are searched one after another until the next array is too far away.
+  pure subroutine search_ahead(packing, s, k, way, distance, partner)
+    type(packing_t), intent(in) :: packing
+    integer, intent(in) :: s
+    integer(int32), intent(in) :: k
+    integer, intent(in) :: way(2)                   !! axis and sense
+    real(real64), intent(inout) :: distance
+    integer(int32), intent(inout) :: partner
+    real(real64) :: rho, period(2), start(2), gap
+    integer :: along, across, first, last, n(2), c(2), middle(2), step, row
+
+    along = way(1)
+    across = 3 - along
+    associate (layer => packing%layer(s), me => packing%disk(k), periodic => packing%box%periodic)
+      n = layer%n
+      period = packing%box%edges()
+      rho = (me%radius + layer%radius)*(1 + spare)
+      start = (me%x - layer%lower)*layer%density    ! position in units of cells
+      middle = int(min(max(start, 0.0_real64), n - 1.0_real64))
+      first = floor(start(across) - rho*layer%density(across))
+      last = floor(start(across) + rho*layer%density(across))
+      if (periodic(across)) then
+        last = min(last, first + n(across) - 1)
+      else
+        first = min(max(first, 0), n(across) - 1)
+        last = min(max(last, 0), n(across) - 1)
+      end if
+      do step = 0, n(along) - 1
+        c(along) = middle(along) + way(2)*step
+        gap = way(2)*(c(along) + merge(0, 1, way(2) > 0) - start(along))
+        if (step > 0 .and. gap > (distance + rho)*layer%density(along)) exit
+        if (.not. periodic(along) .and. (c(along) < 0 .or. c(along) >= n(along))) exit
+        c(along) = modulo(c(along), n(along))
+        do row = first, last
+          c(across) = merge(modulo(row, n(across)), row, periodic(across))
+          call search_contact(packing, k, layer%head(c(1) + 1, c(2) + 1), way, period, distance, partner)
+        end do
+      end do
+    end associate
+  end subroutine search_ahead
+
+  !> Like `find_contact`, but searches only the disks in one cell.
+  pure subroutine search_contact(packing, k, head, way, period, distance, partner)
+    type(packing_t), intent(in) :: packing
+    integer(int32), intent(in) :: k, head
+    integer, intent(in) :: way(2)
+    real(real64), intent(in) :: period(2)           !! [length]
+    real(real64), intent(inout) :: distance
+    integer(int32), intent(inout) :: partner
+    real(real64) :: ahead, aside, half_chord_2
+    integer(int32) :: j
+
+    j = head
+    associate (me => packing%disk(k), along => way(1), across => 3 - way(1), periodic => packing%box%periodic)
+      do while (j > 0)
+        associate (other => packing%disk(j))
+          aside = abs(other%x(across) - me%x(across))
+          if (periodic(across)) aside = min(aside, period(across) - aside)
+          half_chord_2 = (me%radius + other%radius)**2 - aside**2
+          if (half_chord_2 > 0 .and. j /= k) then
+            ahead = way(2)*(other%x(along) - me%x(along))
+            if (ahead < 0 .and. periodic(along)) ahead = ahead + period(along)
+            if (ahead >= 0) then
+              ahead = max(ahead - sqrt(half_chord_2), 0.0_real64)
+              if (ahead < distance) then
+                distance = ahead
+                partner = j
+              end if
+            end if
+          end if
+          j = other%next
+        end associate
+      end do
+    end associate
+  end subroutine search_contact
 
   !> Finds a disk or an obstacle that excludes the centres of disks of the given radius from the whole rectangle `centre` +- `half`.
   !> The result `blocker` is the index of the disk, or the code of the obstacle (see `partners`), or 0 if neither a disk nor an

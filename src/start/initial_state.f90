@@ -23,20 +23,26 @@ module initial_state
 contains
 
   !> Creates the simulation that the input describes. The procedure deallocates the tables of disks that were read from files.
-  subroutine create_simulation(input, line, sim, error)
+  subroutine create_simulation(input, line, sim, error, unrelaxed)
     type(run_input_t), intent(inout) :: input
     class(status_line_t), intent(inout) :: line             !! status line that shows the progress of the placement
     type(simulation_t), intent(out) :: sim
     type(error_t), allocatable, intent(out) :: error
+    !> .true. to leave out the placement of species with placement = 'relaxed', which only tests of the input do
+    logical, intent(in), optional :: unrelaxed
     type(problem_list_t) :: problems
+    logical :: without_placement
     integer :: s(2)
+
+    without_placement = .false.
+    if (present(unrelaxed)) without_placement = unrelaxed
 
     s = range_of(input%groups, ["species"])
     associate (settings => input%settings, groups => input%groups(s(1):s(2)))
       call describe_system(settings, sim)
       call sim%list_disks()
       if (sim%drive%kind == active) call draw_orientations(sim)
-      call place_disks(settings%species, groups, settings%run%seed, line, sim, problems)
+      call place_disks(settings%species, groups, settings%run%seed, without_placement, line, sim, problems)
       if (problems%count == 0) call draw_initial_velocities(settings, groups, sim, problems)
       if (problems%count == 0) call check_speeds(sim, problems)
       if (problems%count == 0) call sim%start_sums()

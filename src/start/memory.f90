@@ -110,7 +110,7 @@ contains
         if (.not. settings%features%own_sizes) bytes = max(bytes, inserted)
       case ("file")
         bytes = max(bytes, read_in)
-      case ("dense", "grown")
+      case ("dense", "grown", "relaxed")
         bytes = max(bytes, grown + merge(extra, 0.0_real64, any(settings%box%periodic)))
       case default                                    ! grids and lattices need no additional memory
       end select

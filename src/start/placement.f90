@@ -3,7 +3,8 @@
 !> Species whose positions are fixed (placement 'explicit', 'file', 'grid' or 'lattice') are placed first, in the order of the
 !> input. Species with placement 'random' are placed next, the species with the largest disks first. Species with placement 'dense'
 !> or 'grown' are placed last. All 'dense' and 'grown' species with the same region are compressed together, and disks that were
-!> placed earlier are fixed obstacles during the compression.
+!> placed earlier are fixed obstacles during the compression. If one species has placement 'relaxed', all species have it: their
+!> disks are placed together, by compression or on a lattice, and equilibrated by event chains.
 module placement
   use images, only: images_t
   use kinds, only: int32, int64, pi, real64
@@ -13,6 +14,7 @@ module placement
   use dense_growth, only: grow_disks, smallest_scale
   use disks, only: disks_before
   use errors, only: error_t
+  use event_chains, only: relax, shuffle
   use input_fit, only: report_file_problem, rounding
   use input_groups, only: group_t
   use input_problems, only: problem_list_t
@@ -41,16 +43,22 @@ module placement
   real(real64), parameter :: nearly = 1.25_real64  !! factor in the estimate that is explained at `few`
   !> 'dense' reaches at least this multiple of the packing fraction that 'random' reaches
   real(real64), parameter :: denser = 1.5_real64
+  !> Packing fraction above which 'relaxed' starts equal disks on a lattice if the lattice fits. Above this value the fluid is not
+  !> stable (Engel et al., 2013, doi:10.1103/PhysRevE.87.042134), and a compressed fluid would become a polycrystal, which event chains
+  !> equilibrate only slowly.
+  real(real64), parameter :: freezing = 0.70_real64
   integer, parameter :: most_reports = 5                    !! largest number of problems of one kind reported for one species
 
 contains
 
   !> Sets the positions and radii of all disks, and the velocities of disks that are read from a file with velocities.
-  subroutine place_disks(species, groups, seed, line, sim, problems)
+  subroutine place_disks(species, groups, seed, unrelaxed, line, sim, problems)
     !> Settings of the species, in which the procedure deallocates the tables of disks.
     type(species_settings_t), intent(inout) :: species(:)
     type(group_t), intent(in) :: groups(:)                  !! groups of the species
     integer(int64), intent(in) :: seed
+    !> .true. to leave out the placement of 'relaxed' species: all their disks are then at the centre of the box
+    logical, intent(in) :: unrelaxed
     class(status_line_t), intent(inout) :: line             !! status line that shows the progress of the placement
     !> In: simulation with its box, and with the disks in the order of the input.
     type(simulation_t), intent(inout) :: sim
@@ -63,7 +71,7 @@ contains
 
     packing = packing_t(sim%box, size(sim%disk), size(species))
     random = [(species(k)%placement == "random", k=1, size(species))]
-    dense = [(species(k)%placement == "dense" .or. species(k)%placement == "grown", k=1, size(species))]
+    dense = [(any(["dense  ", "grown  ", "relaxed"] == species(k)%placement), k=1, size(species))]
     do s = 1, size(species)
       if (random(s) .or. dense(s)) cycle
       k = problems%count
@@ -228,18 +236,21 @@ contains
       end associate
     end subroutine place_at_random
 
-    !> Places all 'dense' and 'grown' species of one region by compression, in a box with the shape of the region. The compression
-    !> of 'grown' species starts at positions that are read from a file.
+    !> Places all 'dense', 'grown' or 'relaxed' species of one region by compression, in a box with the shape of the region. The
+    !> compression of 'grown' species starts at positions that are read from a file. Equal 'relaxed' disks start on a lattice above
+    !> the packing fraction of freezing. 'relaxed' disks are then equilibrated.
     subroutine place_densely(members)
       integer, intent(in) :: members(:)                     !! indices of the species
       ! A copy of the packing, to which the small disks at the start of the compression are added.
       type(packing_t) :: small
+      type(box_t) :: box
       real(real64), allocatable :: places(:, :), full(:)    ! positions and full radii of the disks of all given species [length]
       type(error_t), allocatable :: error
-      logical :: grown
+      logical :: grown, relaxed
       integer :: k, last
 
       grown = species(members(1))%placement == "grown"
+      relaxed = species(members(1))%placement == "relaxed"
       if (grown) small = packing
       allocate (places(2, 0), full(0))
       do k = 1, size(members)
@@ -254,19 +265,47 @@ contains
           full = [full, radius]
         end associate
       end do
+      if (relaxed .and. unrelaxed) then
+        packing%disk%radius = full
+        packing%disk%x(1) = 0.5_real64*(packing%box%lower(1) + packing%box%upper(1))
+        packing%disk%x(2) = 0.5_real64*(packing%box%lower(2) + packing%box%upper(2))
+        return
+      end if
+      if (relaxed) call place_on_lattice(full, places)
+      box = growth_box(packing, species(members(1))%region)
       call stream%seed(seed, [members(1), stream_number])
-      call grow_disks(growth_box(packing, species(members(1))%region), species(members)%species_t, full, stream, line, &
-        places, error)
+      if (grown .or. size(places, 2) == 0) call grow_disks(box, species(members)%species_t, full, stream, line, places, error)
       if (allocated(error)) call groups(members(1))%complain("placement", error%message, problems)
+      if (problems%count > 0) return
+      if (relaxed) call relax(box, full, seed, species(members(1))%relaxation_sweeps, line, places)
       last = 0
       do k = 1, size(members)
-        if (problems%count > 0) return
         associate (s => members(k), first => last + 1)
           last = last + species(s)%count
           call add_species(packing, s, places(:, first:last), full(first:last))
         end associate
+        if (problems%count > 0) return
       end do
     end subroutine place_densely
+
+    !> Places all disks on one lattice, in random order, if the disks have equal radii, their packing fraction is above that of
+    !> freezing, and the lattice fits. Otherwise the array of positions remains unchanged.
+    subroutine place_on_lattice(full, places)
+      real(real64), intent(in) :: full(:)                   !! (n) radii of all disks [length]
+      real(real64), allocatable, intent(inout) :: places(:, :)         !! (2,n) [length]
+      type(species_settings_t) :: all_disks
+      type(problem_list_t) :: misfits
+      real(real64), allocatable :: x(:, :)
+
+      if (minval(full) < maxval(full) .or. pi*sum(full**2) < freezing*product(packing%box%edges())) return
+      all_disks = species(1)
+      all_disks%count = size(full)
+      all_disks%radius = full(1)
+      call lattice_positions(all_disks, groups(1), packing%box, x, misfits)
+      if (misfits%count > 0) return
+      call shuffle(seed, x)
+      call move_alloc(x, places)
+    end subroutine place_on_lattice
   end subroutine place_disks
 
   !> Creates the box for a compression: the region, without any part that lies beyond a displaced side. If disks that were placed

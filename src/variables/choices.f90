@@ -71,6 +71,9 @@ module choices
     choice_t("placement", "file", "Positions in the starting file (file)."), &
     choice_t("placement", "grown", "Lubachevsky-Stillinger compression that starts at the positions in the starting file " &
       //"(file): disks grow from smaller radii to the radii in this input."), &
+    choice_t("placement", "relaxed", "Dense start in equilibrium: a lattice or a packing as with 'dense', equilibrated by " &
+      //"event-chain Monte Carlo, with swaps of disks whose radii differ. All species of the run must use it, in a box " &
+      //"without obstacles, moving sides and gravity. --check leaves the placement out."), &
     choice_t("velocities", "rest", "All disks start at rest."), &
     choice_t("velocities", "equal_speed", "All disks have the same speed, in random directions."), &
     choice_t("velocities", "uniform", "Both components are uniformly distributed between -speed and speed."), &

@@ -2,8 +2,8 @@
 module disk_variables
   use collisions, only: restitution_laws, wall_rules
   use drive, only: drive_kinds
-  use variable_rows, only: count_of_disks, fraction, in_motion, moment, not_negative, part_of_all, positive, spread_of_radii, &
-    tangential, unit_interval, variable_t
+  use variable_rows, only: count_of_disks, fraction, in_motion, moment, not_negative, number_of_sweeps, part_of_all, positive, &
+    spread_of_radii, tangential, unit_interval, variable_t
   implicit none
   private
   public :: disk_rows
@@ -57,7 +57,12 @@ module disk_variables
     variable_t("species", "placement", "text", 1, "default", "'random'", &
       "Method that generates the initial positions. If placement is not given, but grid, position or file is given, this " &
       //"variable determines the method.", &
-      choices="random grid lattice dense explicit file grown"), &
+      choices="random grid lattice dense explicit file grown relaxed"), &
+    variable_t("species", "relaxation_sweeps", "integer", 1, "fallback", "1000", &
+      "Number of sweeps of event-chain Monte Carlo that equilibrate the start with placement = 'relaxed'. A sweep consists of " &
+      //"as many event chains as the run has disks, and an event chain moves about as many disks as the square root of their " &
+      //"number. The value applies to all species of the run and may be given with any of them.", &
+      number_of_sweeps, goes_with="placement relaxed"), &
     variable_t("species", "grid", "integer", 2, "required", "10, 10", &
       "Numbers of columns and of rows of the rectangular grid. The product of the two numbers is the number of disks.", &
       count_of_disks, &

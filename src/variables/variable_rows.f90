@@ -38,6 +38,7 @@ module variable_rows
   type(range_t), parameter, public :: first_angle = range_t(-360, 360, "from -360 to 360")
   type(range_t), parameter, public :: last_angle = range_t(-360, 720, "from -360 to 720")
   type(range_t), parameter, public :: moment = range_t(smallest, 1, "> 0 and <= 1")
+  type(range_t), parameter, public :: number_of_sweeps = range_t(0, 1.0e9_real64, "from 0 to 1000000000")
   type(range_t), parameter, public :: per_decade = range_t(1, 1000, "from 1 to 1000")
   type(range_t), parameter, public :: count_of_disks = range_t(1, most_disks, "from 1 to 100000000")
 

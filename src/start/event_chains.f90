@@ -1,0 +1,225 @@
+!> Equilibration of a dense packing by event-chain Monte Carlo (Bernard, Krauth and Wilson, 2009, doi:10.1103/PhysRevE.80.056704). In
+!> a chain one disk moves along an axis until it touches another disk; then the other disk moves on in the same direction, and so on,
+!> until the displacements add up to the length of the chain. Chains along x and along y alternate.
+!>
+!> Along a periodic axis all chains move to the right or upwards. The state of a chain consists of the positions of all disks and of
+!> the moving disk. Each state has exactly one predecessor, and the motion preserves volume. Chains whose first disk is drawn
+!> uniformly from all disks and whose length does not depend on the positions therefore keep the uniform distribution of all
+!> packings (global balance), although no chain moves backwards.
+!>
+!> Along an axis with sides, a disk that reaches a side reverses its direction and continues (Li et al., 2022,
+!> doi:10.1063/5.0126437, straight event chains in a box with walls). The state of the chain then includes the direction, and each
+!> state still has exactly one predecessor: a disk that moves away from a side that it touches has just been reflected there. The
+!> argument requires that both directions are equally probable at the start of a chain, so the first direction is drawn. A chain
+!> that is reversed at its end leads back to its start; these chains also satisfy detailed balance.
+!>
+!> If the radii differ, a swap is attempted after each chain: two disks, drawn uniformly from all disks, exchange their positions
+!> unless the larger disk would overlap another disk or a side (Grigera and Parisi, 2001, doi:10.1103/PhysRevE.63.045102). The pair is
+!> drawn independently of the positions, so swaps satisfy detailed balance.
+module event_chains
+  use kinds, only: int32, int64, pi, real64
+  use box_geometry, only: box_t
+  use packing, only: packing_t
+  use random_stream, only: random_stream_t
+  use status_line, only: status_line_t
+  implicit none
+  private
+  public :: relax, shuffle
+
+  real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! packing fraction of the triangular lattice
+  integer, parameter :: stream_number = 8         !! number that identifies the random streams of this module
+  integer, parameter :: chains_per_look = 1024    !! number of chains between two updates of the status line
+  !> A chain ends as jammed if as many disks as usually move in a complete chain cover less than this fraction of its length.
+  real(real64), parameter :: jammed = 1.0e-3_real64
+
+contains
+
+  !> Equilibrates the disks of a packing without overlaps. The random numbers are a function of the seed and of the number of the
+  !> sweep.
+  subroutine relax(box, radius, seed, sweeps, line, x)
+    type(box_t), intent(in) :: box                !! box without obstacles; its gravity and shear are ignored
+    real(real64), intent(in) :: radius(:)         !! (n) [length]
+    integer(int64), intent(in) :: seed            !! seed of the run
+    integer(int64), intent(in) :: sweeps          !! number of sweeps; a sweep consists of n chains
+    class(status_line_t), intent(inout) :: line   !! status line that shows the progress
+    real(real64), intent(inout) :: x(:, :)        !! (2,n) positions [length]
+    type(packing_t) :: packing
+    type(random_stream_t) :: stream
+    real(real64) :: mean_length(2), u
+    integer(int64) :: sweep
+    integer(int32) :: n, k, first, other
+    integer :: axis, sense, usual_steps
+    logical :: swaps
+
+    n = size(x, 2, kind=int32)
+    call fill(packing, box, radius, x)
+    usual_steps = ceiling(sqrt(real(n, real64))) + 10
+    mean_length = min(sqrt(real(n, real64))*mean_step(box, radius), 0.5_real64*box%edges())
+    swaps = minval(radius) < maxval(radius)
+    do sweep = 1, sweeps
+      call stream%seed(seed, [0, stream_number, int(ibits(sweep, 0, 31)), int(ibits(sweep, 31, 31))])
+      do k = 1, n
+        axis = 1 + modulo(k, 2)
+        call stream%draw_index(n, first)
+        sense = 1
+        if (.not. box%periodic(axis)) then
+          call stream%draw_uniform(u)
+          if (u < 0.5_real64) sense = -1
+        end if
+        call stream%draw_uniform(u)
+        call move_chain(packing, first, axis, sense, 2*u*mean_length(axis), usual_steps)
+        if (swaps) then
+          call stream%draw_index(n, first)
+          call stream%draw_index(n, other)
+          call try_swap(packing, first, other)
+        end if
+        if (modulo(k, chains_per_look) == 0 .or. k == n) call line%show_share("relaxing the packing", &
+          (sweep - 1 + real(k, real64)/n)/sweeps)
+      end do
+    end do
+    do k = 1, n
+      x(:, k) = packing%disk(k)%x
+    end do
+  end subroutine relax
+
+  !> Fills a packing with disks. The radii of the disks in one layer of the packing differ by less than a factor of two.
+  subroutine fill(packing, box, radius, x)
+    type(packing_t), intent(out) :: packing
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: radius(:), x(:, :)
+    integer(int32) :: layer(size(radius)), k
+    real(real64) :: limit
+
+    layer = 1
+    limit = 0.5_real64*maxval(radius)
+    do while (any(radius <= limit))
+      where (radius <= limit) layer = layer + 1
+      limit = 0.5_real64*limit
+    end do
+    packing = packing_t(box, size(radius), int(maxval(layer)))
+    do k = 1, maxval(layer)
+      if (any(layer == k)) call packing%open_species(k, maxval(radius, mask=layer == k), count(layer == k), box%lower, box%upper)
+    end do
+    do k = 1, size(radius, kind=int32)
+      call packing%add(k, layer(k), x(:, k), radius(k))
+    end do
+  end subroutine fill
+
+  !> Estimate of the mean displacement of a disk in a chain. In equilibrium the displacements and the jumps to the next disk, which
+  !> are pi/4 diameters long on average, are related to the pressure (Michel, Kapfer and Krauth, 2014, doi:10.1063/1.4863991): the
+  !> ratio of jumps to displacements is Z - 1. The estimate uses the larger value of Z - 1 of scaled particle theory and of the free
+  !> volume of a crystal.
+  pure function mean_step(box, radius) result(step)
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: radius(:)
+    real(real64) :: step                          !! [length]
+    real(real64) :: packing, excess
+
+    packing = min(pi*sum(radius**2)/product(box%edges()), closest_packing*(1 - 1.0e-6_real64))
+    excess = max(packing*(2 - packing)/(1 - packing)**2, 2*packing/(closest_packing - packing))
+    step = pi/4*2*sum(radius)/size(radius)/excess
+  end function mean_step
+
+  !> Moves the disks of one chain.
+  pure subroutine move_chain(packing, first, axis, first_sense, length, usual_steps)
+    type(packing_t), intent(inout) :: packing
+    integer(int32), intent(in) :: first           !! first disk of the chain
+    integer, intent(in) :: axis                   !! 1 for x, 2 for y
+    integer, intent(in) :: first_sense            !! 1 to start to the right or upwards, -1 to start in the opposite direction
+    real(real64), intent(in) :: length            !! sum of all displacements [length]
+    !> Number of moved disks between two tests for a jam: at closest packing no disk can move, and the chain would not end.
+    integer, intent(in) :: usual_steps
+    real(real64) :: left, left_before, distance   ! [length]
+    integer(int32) :: k, partner
+    integer :: sense, step, bounces               ! bounces: number of successive reflections of the same disk
+
+    k = first
+    sense = first_sense
+    left = length
+    left_before = left
+    bounces = 0
+    step = 0
+    do
+      distance = left
+      if (.not. packing%box%periodic(axis)) distance = min(left, room(packing, k, axis, sense))
+      call packing%find_contact(k, axis, sense, distance, partner)
+      call packing%shift(k, axis, sense*distance)
+      left = left - distance
+      if (.not. left > 0) return
+      if (partner > 0) then
+        k = partner
+        bounces = 0
+      else
+        sense = -sense
+        bounces = bounces + 1
+        ! A disk that moves between two sides without touching another disk repeats its motion.
+        if (bounces == 2) left = modulo(left, max(2*room(packing, k, axis, sense), tiny(left)))
+      end if
+      step = step + 1
+      if (modulo(step, usual_steps) > 0) cycle
+      if (left_before - left < jammed*length) return
+      left_before = left
+    end do
+  end subroutine move_chain
+
+  !> Distance that disk k can move along a walled axis before the disk touches a side.
+  pure function room(packing, k, axis, sense) result(distance)
+    type(packing_t), intent(in) :: packing
+    integer(int32), intent(in) :: k
+    integer, intent(in) :: axis, sense
+    real(real64) :: distance                      !! [length]
+
+    associate (me => packing%disk(k), box => packing%box)
+      if (sense > 0) then
+        distance = box%upper(axis) - me%radius - me%x(axis)
+      else
+        distance = me%x(axis) - me%radius - box%lower(axis)
+      end if
+      distance = max(distance, 0.0_real64)        ! rounding errors may have moved the disk beyond the side
+    end associate
+  end function room
+
+  !> Exchanges the positions of two disks of different radii, unless the larger disk would overlap another disk or a side. The smaller
+  !> disk always fits at the position of the larger disk.
+  pure subroutine try_swap(packing, i, j)
+    type(packing_t), intent(inout) :: packing
+    integer(int32), intent(in) :: i, j
+    real(real64) :: place(2, 2)                   ! positions of the smaller disk and of the larger disk [length]
+    integer(int32) :: small, large, blocker
+
+    if (.not. abs(packing%disk(i)%radius - packing%disk(j)%radius) > 0) return
+    small = i
+    large = j
+    if (packing%disk(i)%radius > packing%disk(j)%radius) then
+      small = j
+      large = i
+    end if
+    associate (disk => packing%disk, box => packing%box)
+      place(:, 1) = disk(small)%x
+      place(:, 2) = disk(large)%x
+      if (any(.not. box%periodic .and. (place(:, 1) < box%lower + disk(large)%radius &
+        .or. place(:, 1) > box%upper - disk(large)%radius))) return
+      call packing%remove(small)
+      call packing%remove(large)
+      call packing%find_blocker(place(:, 1), [0.0_real64, 0.0_real64], disk(large)%radius, blocker)
+      if (blocker == 0) place = place(:, [2, 1])
+      call packing%add(small, disk(small)%species, place(:, 1), disk(small)%radius)
+      call packing%add(large, disk(large)%species, place(:, 2), disk(large)%radius)
+    end associate
+  end subroutine try_swap
+
+  !> Permutes positions at random, so that disks of different species are mixed.
+  subroutine shuffle(seed, x)
+    integer(int64), intent(in) :: seed            !! seed of the run
+    real(real64), intent(inout) :: x(:, :)        !! (2,n) [length]
+    type(random_stream_t) :: stream
+    integer(int32) :: k, other
+
+    call stream%seed(seed, [0, stream_number])
+    do k = size(x, 2, kind=int32), 2, -1
+      call stream%draw_index(k, other)
+      x(:, [k, other]) = x(:, [other, k])
+    end do
+  end subroutine shuffle
+
+end module event_chains
