@@ -8,5 +8,5 @@ all cases and writes the report docs/explanation/validation.md.
 from importlib import import_module
 
 TABLES = "few_disks speeds equilibrium dissipation crater gravity billiards symmetry diffusion"
-TABLES += " driven kicked recycled sheared moved"  # in the order of the report
+TABLES += " driven kicked recycled sheared moved relaxed"  # in the order of the report
 CASES = [case for name in TABLES.split() for case in import_module(f"validation.{name}").CASES]

@@ -37,6 +37,7 @@ TOPICS = {
     "P13": "symmetries: conservation, reversal, boosts, order of the disks",
     "P14": "velocity correlations and diffusion",
     "P15": "thermal walls, rough disks, transport, kicks, recycling, shear, moving sides",
+    "P16": "relaxed starts: pressure and order in equilibrium",
     "W1": "straight walls: a wedge under gravity",
 }
 
