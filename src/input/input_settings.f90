@@ -315,8 +315,8 @@ contains
           //""" has placement = '"//species(other)%placement//"'", problems)
         if (any(groups%name == "obstacle")) call own(k)%complain("placement", with//"&obstacle", problems)
         if (any(groups%name == "wall")) call own(k)%complain("placement", with//"&wall", problems)
-        if (any(box%surface(:n_sides)%motion%moves())) call own(k)%complain("placement", with//"moving sides (side.motion)", &
-          problems)
+        if (any(box%surface(:n_sides)%motion%moves())) call own(k)%complain("placement", with//"sides that move (side.motion) " &
+          //"or are displaced (side.position)", problems)
         if (box%has_gravity()) call own(k)%complain("placement", with//"box.gravity: in equilibrium the density would depend on " &
           //"the height", problems)
         do k = 1, size(species)

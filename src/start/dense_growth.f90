@@ -100,9 +100,9 @@ contains
 
       reached = pi*sum(sim%disk%radius**2)/product(sim%box%edges())
       wanted = pi*sum(full**2)/product(sim%box%edges())
-      advice = "use fewer or smaller disks"
+      advice = "compress in steps: placement = 'grown'; or use fewer or smaller disks"
       if (maxval(full) <= minval(full)) advice = "placement = 'lattice' may pack equal disks more densely; or "//advice
-      call fail(error, exit_usage, "species.placement: dense placement reached "//written(reached)//" of the wanted packing " &
+      call fail(error, exit_usage, "dense placement reached "//written(reached)//" of the wanted packing " &
         //written(wanted)//"; "//advice)
     end subroutine fail_to_grow
 

@@ -25,6 +25,8 @@ module input_fit
   real(real64), parameter, public :: rounding = 1.0e-12_real64        !! relative tolerance for disks that touch
   real(real64), parameter :: random_limit = 0.547_real64      !! packing fraction at which random sequential insertion saturates
   real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! packing fraction of the triangular lattice
+  !> Ratio of two radii above which different sizes allow no denser packing than equal sizes (Blind, 1969, see `densest_packing`)
+  real(real64), parameter :: nearly_equal = 0.743_real64
 
 contains
 
@@ -105,6 +107,7 @@ contains
         call check_species(groups(s(1) + k - 1), species(k), box, settings%n_disks() == 1, problems)
       end do
       if (settings%drive%moves_disks()) call check_recycling(settings, groups(place_of("drive", groups%name)), problems)
+      if (problems%count == 0) call check_compressed(species, settings%run%seed, groups(s(1):s(2)), problems)
       if (problems%count == 0) call check_strokes(box, pi*sum(species%count*species%radius**2), groups, problems)
     end associate
   end subroutine check_fit
@@ -181,6 +184,53 @@ contains
       end do
     end associate
   end function is_in_the_way
+
+  !> Reports species that are to be compressed beyond the packing fraction that is proven to be the largest. All species of the same
+  !> region count, because all their disks lie in the region. Radii in files are not read here, and such regions are not checked.
+  subroutine check_compressed(species, seed, groups, problems)
+    type(species_settings_t), intent(in) :: species(:)
+    integer(int64), intent(in) :: seed                        !! seed of the run
+    type(group_t), intent(in) :: groups(:)                    !! groups of the species
+    type(problem_list_t), intent(inout) :: problems
+    real(real64) :: packing, smallest, largest, most
+    real(real64), allocatable :: radius(:)                    ! [length]
+    logical :: together(size(species))
+    integer :: k, j
+
+    do k = 1, size(species)
+      if (.not. any(["dense  ", "grown  ", "relaxed"] == species(k)%placement)) cycle
+      together = [(all(species(j)%region <= species(k)%region .and. species(j)%region >= species(k)%region), j=1, size(species))]
+      if (any(together .and. (species%radius_in_file .or. species%radius <= 0 .or. species%count < 1))) cycle
+      packing = 0
+      smallest = huge(smallest)
+      largest = 0
+      do j = 1, size(species)
+        if (.not. together(j)) cycle
+        radius = drawn_radii(species(j), j, seed)
+        packing = packing + pi*sum(radius**2)/product(species(k)%region([2, 4]) - species(k)%region([1, 3]))
+        smallest = min(smallest, minval(radius))
+        largest = max(largest, maxval(radius))
+      end do
+      most = densest_packing(smallest/largest)
+      if (packing <= most*(1 + rounding)) cycle
+      call groups(k)%complain("placement", "the disks in this region would fill "//written(packing)//" of it; disks with radii " &
+        //"from "//written(smallest)//" to "//written(largest)//" fill at most "//written(most), problems)
+      return
+    end do
+  end subroutine check_compressed
+
+  !> Upper bound of the packing fraction of disks in the plane. The bound also holds for a rectangle with sides and for a periodic
+  !> box, because copies of a rectangle fill the plane. For nearly equal disks it is the packing fraction of the triangular lattice
+  !> (Blind, Journal für die reine und angewandte Mathematik 236, 145, 1969). For other ratios of the smallest to the largest radius it
+  !> is the packing fraction within the triangle of the centres of a largest and two smallest disks that touch each other (Florian,
+  !> Rendiconti del Circolo Matematico di Palermo 9, 300, 1960). Fernique (2021, arXiv:2107.14079) reviews both bounds.
+  pure function densest_packing(ratio) result(most)
+    real(real64), intent(in) :: ratio                         !! smallest radius divided by largest radius
+    real(real64) :: most
+
+    most = closest_packing
+    if (ratio < nearly_equal) most = (pi*ratio**2 + 2*(1 - ratio**2)*asin(ratio/(1 + ratio)))/(2*ratio*sqrt(1 + 2*ratio))
+  end function densest_packing
 
   !> Reports an invalid position of an obstacle, with the line of the obstacle in its file or the number of the point in its
   !> polyline.

@@ -85,6 +85,7 @@ class Draw:
         self.columns: list[str] = []
         self.table = np.empty((0, 8))
         self.kinds = 1
+        self.displaced = False  # a side moves, or does not start at the edge of the box
         if self.disks < 3 and (self.driven or all(self.periodic)):
             self.disks = 3  # fewer disks might never collide
 
@@ -164,6 +165,8 @@ class Draw:
                 way *= self.rng.random()
                 end = self.lower[k // 2] + (k % 2) * edge
                 words += f" position = {end + (2 * (k % 2) - 1) * way * edge!r}"
+            self.displaced |= bool(re.search("'(sine|parabolic|constant_velocity|piston)'", words))
+            self.displaced |= " position = " in words
             groups.append(f"&side name = '{name}'{words} /")
         return groups
 
@@ -282,6 +285,8 @@ class Draw:
             return [rng.choice([self.from_file, self.from_file, self.by_position])()]
         if self.chance(0.15):
             return self.of_many_sizes()
+        if not (blocked or self.falls or self.displaced) and self.disks <= 400 and self.chance(0.2):
+            return self.relaxed()
         for k in range(rng.choice([1, 1, 1, 2, 3])):
             count = self.disks if k == 0 else rng.randint(1, max(self.disks // 3, 1))
             wide, high = self.region()
@@ -330,6 +335,27 @@ class Draw:
             f" placement = 'random'{self.where}{self.motion(n)} /"
             for k, (n, r) in enumerate(zip(counts, radii, strict=True))
         ]
+
+    def relaxed(self) -> list[str]:
+        """Draw up to three species that fill the whole box and are equilibrated by event chains."""
+        rng, self.where = self.rng, ""
+        self.kinds = rng.choice([1, 1, 2, 3])
+        sweeps = rng.choice([0, 1, 5])
+        groups = []
+        for k in range(self.kinds):
+            count = self.disks if k == 0 else rng.randint(1, max(self.disks // 3, 1))
+            share = max(self.packing, 0.1) / (1 if k == 0 else 6)
+            radius = math.sqrt(share * math.prod(self.edges) / (count * math.pi))
+            radius = min(radius, 0.24 * min(self.edges))
+            size = f"count = {count} radius = {radius!r} mass = {10.0 ** rng.randint(-2, 2)!r}"
+            if self.chance(0.25):
+                size += f" polydispersity = {0.2 * rng.random()!r} radius_distribution = 'uniform'"
+                size = size.replace(f"radius = {radius!r}", f"radius = {radius / 2!r}")
+            given = self.maybe(1 if k == 0 else 0.3, f"relaxation_sweeps = {sweeps}")
+            groups.append(
+                f"&species name = 's{k}' {size} placement = 'relaxed'{given}{self.motion(count)} /"
+            )
+        return groups
 
     def placement(self, k: int) -> str:
         if self.blocked or k > 0:
