@@ -351,6 +351,7 @@ class Draw:
             if self.chance(0.25):
                 size += f" polydispersity = {0.2 * rng.random()!r} radius_distribution = 'uniform'"
                 size = size.replace(f"radius = {radius!r}", f"radius = {radius / 2!r}")
+                size += self.maybe(0.5, "mass_scaling = 'area'")
             given = self.maybe(1 if k == 0 else 0.3, f"relaxation_sweeps = {sweeps}")
             groups.append(
                 f"&species name = 's{k}' {size} placement = 'relaxed'{given}{self.motion(count)} /"

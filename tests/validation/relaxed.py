@@ -90,7 +90,7 @@ CASES = [
     ],
     Case(
         "P16-03", "4096 disks at packing 0.698: P d^2 / kT of 256^2 disks",
-        starts(4, 4096, 0.698, tau=1500, sweeps=300), over(pressure),
+        starts(8, 4096, 0.698, tau=4000, sweeps=300), over(pressure),
         9.1708, relative(0.003), ENGEL,
     ),
     Case(
