@@ -153,3 +153,58 @@ def test_a_gas_that_has_cooled_down_says_so_in_its_file(ricochet, tmp_path, loss
     with h5py.File(tmp_path / "gas.h5") as file:
         note = file["provenance"].attrs["note"].decode()
     assert note and f"note = {note}\n" in run.stdout
+
+
+RELAXED = """&box boundary = 'periodic', 'wall' /
+&species name = 'small' count = 150 radius = 0.02 placement = 'relaxed' relaxation_sweeps = {sweeps}{more} /
+&species name = 'large' count = 150 radius = 0.026 placement = 'relaxed' temperature = 1 /
+&stop collisions_per_disk = 3 /
+"""
+
+
+def relaxed(sweeps: int, more: str = " temperature = 1") -> str:
+    return RELAXED.format(sweeps=sweeps, more=more)
+
+
+def test_check_leaves_the_relaxation_out(ricochet, tmp_path):
+    """With 10**9 sweeps the placement would take years; an impossible packing is still refused."""
+    write_input(tmp_path, relaxed(10**9))
+    run = ricochet("gas.nml", "--check")
+    assert run.returncode == FINISHED and "valid; 300 disks" in run.stdout
+    run = ricochet("gas.nml", "--check", "--set", "species.large.radius=0.04")
+    assert run.returncode == USAGE and "fill at most 0.9" in one_line(run)
+
+
+def test_twenty_sweeps_move_most_disks_by_a_diameter(ricochet, tmp_path):
+    places = {}
+    for sweeps in (0, 20):
+        write_input(tmp_path, relaxed(sweeps))
+        assert ricochet("gas.nml", "-o", "gas.h5", "--force").returncode == FINISHED
+        with h5py.File(tmp_path / "gas.h5") as file:
+            places[sweeps] = file["particles/disks/position/value"][0]
+    steps = places[20] - places[0]
+    steps[:, 0] -= np.rint(steps[:, 0])
+    assert np.median(np.hypot(*steps.T)) > 0.04
+
+
+def test_a_relaxed_start_does_not_depend_on_threads_search_and_pauses(ricochet, tmp_path):
+    write_input(tmp_path, relaxed(5))
+    ways = ([], ["run.threads=2"], ["run.search=pairs"], ["run.queue=heap"])
+    ends = []
+    for k, words in enumerate(ways):
+        more = [word for own in words for word in ("--set", own)]
+        assert ricochet("gas.nml", "-o", f"{k}.h5", *more).returncode == FINISHED
+    early = ["--set", "stop.collisions_per_disk=1"]
+    assert ricochet("gas.nml", "-o", "parts.h5", *early).returncode == FINISHED
+    assert ricochet("gas.nml", "-o", "parts.h5", "--resume").returncode == FINISHED
+    for name in (*range(len(ways)), "parts"):
+        with h5py.File(tmp_path / f"{name}.h5") as file:
+            ends.append(file["particles/disks/position/value"][-1])
+    assert all((end == ends[0]).all() for end in ends)
+
+
+def test_a_relaxed_start_that_is_too_dense_is_told(ricochet, tmp_path):
+    write_input(tmp_path, relaxed(5))
+    run = ricochet("gas.nml", "-o", "gas.h5", "--set", "species.large.radius=0.0385")
+    assert run.returncode == USAGE
+    assert "in steps: placement = 'grown'" in one_line(run)
