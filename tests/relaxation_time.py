@@ -15,8 +15,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "post"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "post"))
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -24,6 +23,7 @@ from matplotlib.figure import Figure
 from ricochet import Run, program, read_run
 from ricochet.analysis.structure import bond_order
 
+ROOT = Path(__file__).resolve().parents[1]
 COUNT, PACKING, SEEDS = 256, 0.702, range(1, 17)
 SWEEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500)
 TAUS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000)
@@ -51,7 +51,7 @@ def order(run: Run, frame: int) -> float:
 
 
 def measure(folder: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Return the order for each seed and number of sweeps, and for each seed and number of events."""
+    """Return the order for each seed and each number of sweeps, and of events per disk."""
     chains = [
         [order(run_of(folder, s, placement="relaxed", relaxation_sweeps=n), 0) for n in SWEEPS]
         for s in SEEDS

@@ -157,7 +157,7 @@ contains
       end associate
     end subroutine take_velocities
 
-    !> Sets the number of sweeps for placement = 'relaxed', which is the same for all species because the relaxation moves all disks.
+    !> Sets the number of sweeps for placement = 'relaxed'. All species have the same number, because a sweep moves all disks.
     subroutine take_sweeps()
       integer :: k, giver                                 ! giver: index of the first species that gives the number, or 0
 

@@ -1,6 +1,6 @@
-!> A packing: a set of placed disks, with a test whether another disk fits between them, and a search for the first disk that a moving
-!> disk touches. Each species has its own grid of cells. The disks of one species have similar radii. The cost of a search therefore
-!> does not depend on the radii of other species.
+!> A packing: a set of placed disks, with a test whether another disk fits between them, and a search for the first disk that a
+!> moving disk touches. Each species has its own grid of cells. The disks of one species have similar radii. The cost of a search
+!> therefore does not depend on the radii of other species.
 module packing
   use images, only: images_t
   use kinds, only: int32, real64
@@ -201,8 +201,8 @@ contains
     end do
   end subroutine find_contact
 
-  !> Like `find_contact`, but searches only the disks of species s. The arrays of cells ahead of disk k, perpendicular to the motion,
-  !> are searched one after another until the next array is too far away.
+  !> Like `find_contact`, but searches only the disks of species s. The procedure searches lines of cells perpendicular to the
+  !> motion, one after another, until the next line is too far ahead of disk k.
   pure subroutine search_ahead(packing, s, k, way, distance, partner)
     type(packing_t), intent(in) :: packing
     integer, intent(in) :: s

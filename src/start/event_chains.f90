@@ -1,6 +1,6 @@
-!> Equilibration of a dense packing by event-chain Monte Carlo (Bernard, Krauth and Wilson, 2009, doi:10.1103/PhysRevE.80.056704). In
-!> a chain one disk moves along an axis until it touches another disk; then the other disk moves on in the same direction, and so on,
-!> until the displacements add up to the length of the chain. Chains along x and along y alternate.
+!> Equilibration of a dense packing by event-chain Monte Carlo (Bernard, Krauth and Wilson, 2009, doi:10.1103/PhysRevE.80.056704).
+!> In a chain one disk moves along an axis until it touches another disk; then the other disk moves on in the same direction, and so
+!> on, until the displacements add up to the length of the chain. Chains along x and along y alternate.
 !>
 !> Along a periodic axis all chains move to the right or upwards. The state of a chain consists of the positions of all disks and of
 !> the moving disk. Each state has exactly one predecessor, and the motion preserves volume. Chains whose first disk is drawn
@@ -14,8 +14,8 @@
 !> that is reversed at its end leads back to its start; these chains also satisfy detailed balance.
 !>
 !> If the radii differ, a swap is attempted after each chain: two disks, drawn uniformly from all disks, exchange their positions
-!> unless the larger disk would overlap another disk or a side (Grigera and Parisi, 2001, doi:10.1103/PhysRevE.63.045102). The pair is
-!> drawn independently of the positions, so swaps satisfy detailed balance.
+!> unless the larger disk would overlap another disk or a side (Grigera and Parisi, 2001, doi:10.1103/PhysRevE.63.045102). The pair
+!> is drawn independently of the positions, so swaps satisfy detailed balance.
 module event_chains
   use kinds, only: int32, int64, pi, real64
   use box_geometry, only: box_t
@@ -179,8 +179,8 @@ contains
     end associate
   end function room
 
-  !> Exchanges the positions of two disks of different radii, unless the larger disk would overlap another disk or a side. The smaller
-  !> disk always fits at the position of the larger disk.
+  !> Exchanges the positions of two disks of different radii, unless the larger disk would overlap another disk or a side. The
+  !> smaller disk always fits at the position of the larger disk.
   pure subroutine try_swap(packing, i, j)
     type(packing_t), intent(inout) :: packing
     integer(int32), intent(in) :: i, j

@@ -221,9 +221,9 @@ contains
 
   !> Upper bound of the packing fraction of disks in the plane. The bound also holds for a rectangle with sides and for a periodic
   !> box, because copies of a rectangle fill the plane. For nearly equal disks it is the packing fraction of the triangular lattice
-  !> (Blind, Journal für die reine und angewandte Mathematik 236, 145, 1969). For other ratios of the smallest to the largest radius it
-  !> is the packing fraction within the triangle of the centres of a largest and two smallest disks that touch each other (Florian,
-  !> Rendiconti del Circolo Matematico di Palermo 9, 300, 1960). Fernique (2021, arXiv:2107.14079) reviews both bounds.
+  !> (Blind, Journal für die reine und angewandte Mathematik 236, 145, 1969). For other ratios of the smallest to the largest
+  !> radius it is the packing fraction within the triangle of the centres of a largest and two smallest disks that touch each other
+  !> (Florian, Rendiconti del Circolo Matematico di Palermo 9, 300, 1960). Fernique (2021, arXiv:2107.14079) reviews both bounds.
   pure function densest_packing(ratio) result(most)
     real(real64), intent(in) :: ratio                         !! smallest radius divided by largest radius
     real(real64) :: most

@@ -44,8 +44,8 @@ module placement
   !> 'dense' reaches at least this multiple of the packing fraction that 'random' reaches
   real(real64), parameter :: denser = 1.5_real64
   !> Packing fraction above which 'relaxed' starts equal disks on a lattice if the lattice fits. Above this value the fluid is not
-  !> stable (Engel et al., 2013, doi:10.1103/PhysRevE.87.042134), and a compressed fluid would become a polycrystal, which event chains
-  !> equilibrate only slowly.
+  !> stable (Engel et al., 2013, doi:10.1103/PhysRevE.87.042134), and a compressed fluid would become a polycrystal, which event
+  !> chains equilibrate only slowly.
   real(real64), parameter :: freezing = 0.70_real64
   integer, parameter :: most_reports = 5                    !! largest number of problems of one kind reported for one species
 

@@ -156,7 +156,7 @@ def test_a_gas_that_has_cooled_down_says_so_in_its_file(ricochet, tmp_path, loss
 
 
 RELAXED = """&box boundary = 'periodic', 'wall' /
-&species name = 'small' count = 150 radius = 0.02 placement = 'relaxed' relaxation_sweeps = {sweeps}{more} /
+&species name = 'small' count = 150 radius = 0.02 relaxation_sweeps = {sweeps}{more} /
 &species name = 'large' count = 150 radius = 0.026 placement = 'relaxed' temperature = 1 /
 &stop collisions_per_disk = 3 /
 """

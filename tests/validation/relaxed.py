@@ -1,11 +1,11 @@
 """Section 16 of the report: dense starts that event chains equilibrate.
 
-No part of a run is left out as equilibration, and several starts are averaged.  The published pressures are for the same
-number of disks and the same shape of the box, so no finite-size shift enters, with one exception:
-for 4096 disks at packing 0.698 the reference is that for 256^2 disks (Engel et al., Physical Review
-E 87, 042134 (2013), 9.1708).  Published values for 870 and 128^2 disks are 9.1341 and 9.1741 (Li et
-al., Journal of Chemical Physics 157, 234111 (2022)), so the shift of 4096 disks lies between -0.4
-and +0.04 %; in proportion to 1/N it is -0.08 %.
+No part of a run is left out as equilibration, and several starts are averaged.  The published
+pressures are for the same number of disks and the same shape of the box, so no finite-size shift
+enters, with one exception: for 4096 disks at packing 0.698 the reference is that for 256^2 disks
+(Engel et al., Physical Review E 87, 042134 (2013), 9.1708).  Published values for 870 and 128^2
+disks are 9.1341 and 9.1741 (Li et al., Journal of Chemical Physics 157, 234111 (2022)), so the
+shift of 4096 disks lies between -0.4 and +0.04 %; in proportion to 1/N it is -0.08 %.
 """
 
 from math import pi, sqrt
@@ -48,11 +48,10 @@ def order(run: Run) -> float:
 #: Height of the box over its width, and P d^2 / kT at packing 0.73, of 72 disks.
 SMALL = {8 * sqrt(3) / 18: 9.52740, 1.0: 10.08124}
 #: The same for a box in which the crystal has several orientations that change rarely into each
-#: other.  The start therefore needs ten times as many sweeps, and the pressures of two starts differ
-#: by more than in the other boxes.
+#: other.  The start therefore needs ten times as many sweeps, and pressures of starts differ more.
 TURNING = (sqrt(3) / 2, 11.40956)
-#: Packing fraction: P d^2 / kT of 870 disks in a square box, and collisions per disk of a run, which
-#: average over fluctuations that are slow near melting.
+#: Packing fraction: P d^2 / kT of 870 disks in a square box, and collisions per disk of a run, in
+#: which fluctuations that are slow near melting are averaged.
 SQUARE = {0.69: (8.969898, 2000), 0.698: (9.13414, 6000)}
 
 
