@@ -34,12 +34,12 @@ SHOWN = {
 WIDTH, COLOURS = 1100, 64
 
 
-def reduced(path: Path) -> bytes:
-    """Return a figure as a PNG file with at most `WIDTH` pixels per row and `COLOURS` colours."""
+def reduced(path: Path, width: int = WIDTH) -> bytes:
+    """Return a figure as a PNG file with at most `width` pixels per row and `COLOURS` colours."""
     picture = Image.open(path).convert("RGB")
-    if picture.width > WIDTH:
-        height = round(picture.height * WIDTH / picture.width)
-        picture = picture.resize((WIDTH, height), Image.Resampling.LANCZOS)
+    if picture.width > width:
+        height = round(picture.height * width / picture.width)
+        picture = picture.resize((width, height), Image.Resampling.LANCZOS)
     file = io.BytesIO()
     picture.quantize(COLOURS, dither=Image.Dither.NONE).save(file, format="png", optimize=True)
     return file.getvalue()

@@ -1,9 +1,10 @@
 """Tests of the code on the pages of docs/: each fenced block is executed in the order of the page.
 
 A block of the language `fortran` whose first line is a comment `! runs/NAME.nml: ...` is written to
-this file.  Blocks of the language `bash` are executed in a folder that looks like the project, and
-all blocks of the language `python` of a page form one program, which is executed in parts.  Blocks
-of the language `text` show output and are not executed.
+this file, and so is a block of the language `c` that begins with `// runs/NAME.c: ...`.  Blocks of
+the language `bash` are executed in a folder that looks like the project, and all blocks of the
+language `python` of a page form one program, which is executed at the end.  Blocks of the language
+`text` show output and are not executed.
 
 A comment `<!-- test: OLD => NEW; OLD => NEW -->` before a block replaces texts in the block, so
 that a long run becomes a short one.  The comment `<!-- test: not run, REASON -->` excludes a block.
@@ -12,6 +13,7 @@ that a long run becomes a short one.  The comment `<!-- test: not run, REASON --
 import re
 import shutil
 import sys
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -22,6 +24,8 @@ from whole_runs import environment, ran
 BLOCK = re.compile(
     r"^(?:<!-- test: (?P<note>.*?) -->\n+)?```(?P<language>\w*)\n(?P<code>.*?)^```$", re.M | re.S
 )
+#: The first line of a block that is written to a file, by language.
+FIRST_LINE = {"fortran": r"! (runs/[\w-]+\.nml)\b", "c": r"// (runs/[\w-]+\.c)\b"}
 LANGUAGES = {"bash", "python", "fortran", "text", "diff", "mermaid", "c"}
 PAGES = [path for path in sorted(ROOT.glob("docs/*/*.md")) if "```" in path.read_text()]
 RUN = [path for path in PAGES if path.parent.name in ("tutorials", "guides")]
@@ -34,14 +38,17 @@ class Block(NamedTuple):
     code: str
 
 
-def blocks_of(page: str) -> list[Block]:
-    """Return the blocks of a page that are executed, after the replacements for the test."""
+def blocks_of(page: str, short: bool = True) -> list[Block]:
+    """Return the blocks of a page that are executed.
+
+    Texts are replaced for the test, unless `short` is false.
+    """
     found = []
     for one in BLOCK.finditer(page):
         code, note = one["code"], one["note"] or ""
         if note.startswith("not run, "):
             continue
-        for change in filter(None, note.split("; ")):
+        for change in filter(None, note.split("; ") if short else ()):
             old, new = change.split(" => ")
             assert old in code, f"the block does not contain {old!r}"
             code = code.replace(old, new)
@@ -49,37 +56,46 @@ def blocks_of(page: str) -> list[Block]:
     return found
 
 
-def make_project(folder, program):
+def make_project(folder: Path, program: Path) -> None:
     """Make a folder that looks like the project to the commands of a page."""
     (folder / "runs").mkdir()
     (folder / "build").mkdir()
-    (folder / "build" / "ricochet").symlink_to(program)
+    for made in (program, *program.parent.glob("libricochet*.so")):
+        (folder / "build" / made.name).symlink_to(made)
     for script in (ROOT / "runs").glob("*.sh"):
         shutil.copy(script, folder / "runs")
-    for name in ("input", "post", "docs"):
+    for name in ("input", "post", "docs", "src"):
         (folder / name).symlink_to(ROOT / name)
 
 
-@pytest.mark.parametrize("page", RUN, ids=lambda path: f"{path.parent.name}/{path.stem}")
-def test_the_code_of_a_page_works(page, program, tmp_path):
-    make_project(tmp_path, program)
+def execute(blocks: list[Block], folder: Path, program: Path) -> None:
+    """Execute blocks in a folder that looks like the project."""
     own = environment(
         PYTHON=sys.executable, RICOCHET=program, PYTHONPATH=ROOT / "post", MPLBACKEND="Agg"
     )
     code = ""
-    for block in blocks_of(page.read_text()):
-        if block.language == "fortran":
-            name = re.match(r"! (runs/[\w-]+\.nml)\b", block.code)
+    for block in blocks:
+        if block.language in FIRST_LINE:
+            name = re.match(FIRST_LINE[block.language], block.code)
             assert name, f"the first line names no file: {block.code.splitlines()[0]}"
-            (tmp_path / name[1]).write_text(block.code)
+            (folder / name[1]).write_text(block.code)
         elif block.language == "bash":
-            shell = re.sub(r"(?m)^(?:\.venv/bin/)?python ", f"{sys.executable} ", block.code)
-            ran("bash", "-ec", shell, cwd=tmp_path, env=own, check=True)
+            shell = re.sub(r"(?m)^( *)(?:\.venv/bin/)?python ", rf"\1{sys.executable} ", block.code)
+            ran("bash", "-ec", shell, cwd=folder, env=own, check=True)
         elif block.language == "python":
             code += block.code
     if code:
-        said = ran(sys.executable, "-W", "error::UserWarning", "-c", code, cwd=tmp_path, env=own)
+        said = ran(sys.executable, "-W", "error::UserWarning", "-c", code, cwd=folder, env=own)
         assert said.returncode == 0, said.stderr
+
+
+@pytest.mark.parametrize("page", RUN, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_the_code_of_a_page_works(page, program, tmp_path):
+    text = page.read_text()
+    if "libricochet" in text and not (program.parent / "libricochet.so").exists():
+        pytest.skip("make library builds it")
+    make_project(tmp_path, program)
+    execute(blocks_of(text), tmp_path, program)
 
 
 def test_each_block_names_its_language():
@@ -96,3 +112,17 @@ def test_a_block_that_fails_is_noticed():
     assert blocks_of("<!-- test: not run, it asks -->\n```bash\nsudo\n```\n") == []
     with pytest.raises(AssertionError, match="does not contain"):
         blocks_of("<!-- test: a => b -->\n```bash\nc\n```\n")
+
+
+def test_the_guides_make_their_own_figures():
+    """The commands of a guide that shows the picture NAME.png make the figure `runs/NAME.png`."""
+    shown = {}
+    for page in sorted(ROOT.glob("docs/guides/*.md")):
+        text = page.read_text()
+        made = {
+            name for block in blocks_of(text) for name in re.findall(r"runs/(\w+)\.png", block.code)
+        }
+        for name in re.findall(r"!\[[^]]*\]\((\w+)\.png\)", text):
+            assert name in made, f"no command of {page.name} makes runs/{name}.png"
+            shown[name] = page
+    assert {path.stem for path in ROOT.glob("docs/guides/*.png")} == {*shown}
