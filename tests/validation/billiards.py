@@ -300,7 +300,7 @@ def chaotic_share() -> float:
 STEP = radians(150.733419431936)
 CASES = [
     Case(
-        "P12-01", "round container: first hit, place; interval; polar step",
+        "P12-01", "round container: first collision, interval, polar step",
         (ROUND,),
         lambda run: [
             run.event_log().time[0], *run.position[1][0], np.diff(run.event_log().time[:2])[0],
@@ -310,29 +310,29 @@ CASES = [
         relative(1e-12), "D",
     ),
     Case(
-        "P12-02", "round container, 100 further hits: angular momentum, polar steps",
+        "P12-02", "round container, 100 collisions: angular momentum, polar steps",
         (ROUND,), lambda run: [*(angular_momentum(run) / 0.24), *(np.diff(angles(run)) / STEP)],
         1, within(1e-9), "D",
     ),
     Case(
-        "P12-02", "round container, hit 101: time and polar angle",
+        "P12-02", "round container, collision 101: time and polar angle",
         (ROUND,), lambda run: [run.event_log().time[100], angles(run)[100] % (2 * pi)],
         [184.576068641872, 6.14074471547], relative(1e-9), "D",
     ),
     Case(
-        "W1-01", "right-angled wedge of two straight walls under gravity, 160 hits: path",
+        "W1-01", "right-angled wedge under gravity, 160 collisions: deviation of the path",
         (FALL,), miss, 0, within(1e-10), "two independent bouncing balls",
     ),
     Case(
-        "W1-03", "the wedge with time steps of 1e-5, 8 hits: path",
+        "W1-03", "wedge with time steps of 1e-5, 8 collisions: deviation of the path",
         (STEPS,), miss, 0, within(1e-3), "two independent bouncing balls",
     ),
     Case(
-        "P12-03", "Sinai's billiard, 2e6 hits: mean free path",
+        "P12-03", "Sinai's billiard, 2e6 collisions: mean free path",
         (SINAI,), free_path, mean_path(DISK, HOLE), relative(0.005), "Santalo; Chernov 1997",
     ),
     Case(
-        "P12-04", "light disk about a very heavy one: hits per time on disk and sides",
+        "P12-04", "light disk around a heavy one: rates of collisions with disk and sides",
         (HEAVY,),
         lambda run: [
             last(run, "collisions") / run.time[-1], last(run, "side_collisions") / run.time[-1]
@@ -344,7 +344,7 @@ CASES = [
         LORENTZ, over(free_time), FREE_TIME, sigmas(4, 0.005), "D",
     ),
     Case(
-        "P12-06", "random Lorentz gas, n R^2 = .01: diffusion over Boltzmann's",
+        "P12-06", "random Lorentz gas, n R² = 0.01: diffusion coefficient over Boltzmann's",
         LORENTZ, over(over_boltzmann), 1 / boltzmann_over(DENSITY), within(0.015),
         "Weijland and van Leeuwen 1968, quoted from memory",
     ),

@@ -85,24 +85,24 @@ NO_TC = tuple(
 
 CRATERS = [
     Case(
-        "P10-02", "bed of 20 000, before a side is hit: disks hit less M (1/f - 1)",
+        "P10-02", "crater, 20 000 disks: number of disks hit minus M (1/f - 1)",
         (crater(20000),), hit_less_bound, 0, AT_LEAST, "D",
     ),
     Case(
-        "P10-03", "masses 1 to 25, 12 beds each: rises of the disks hit, in their errors",
+        "P10-03", "craters, masses 1 to 25: increase of the disks hit, in standard errors",
         SCAN, rises, 2, AT_LEAST, "granulargas, R",
     ),
     Case(
-        "P10-03", "masses 1 to 25: disks hit close to linear, correlation with the mass",
+        "P10-03", "craters, masses 1 to 25: correlation of the disks hit with the mass",
         SCAN, straightness, 0.97, AT_LEAST, "granulargas, R",
     ),
     Case(
-        "P10-04", "no TC model, 12 beds of 2000: part that collapses, and is reported as such",
+        "P10-04", "craters without TC model: fraction of 12 runs that end in a reported collapse",
         NO_TC, lambda *runs: np.mean([run.path.suffix == ".part" for run in runs]),
         0.5, AT_LEAST, "R",
     ),
     Case(
-        "P10-07", "energy after each event: largest rise",
+        "P10-07", "crater: largest increase of the energy in an event",
         (crater(500, output={"observables_every_events": 1}),),
         lambda run: np.max(np.diff(fraction_left(run))), 0, AT_MOST, "EX",
     ),
@@ -151,12 +151,13 @@ def attempts(*runs: Run) -> list[float]:
 
 RSA = [
     Case(
-        "P10-06", "part of the area free for one more at coverage .1, .2",
+        "P10-06",
+        "random placement: fraction of the area free for one more disk at packing 0.1, 0.2",
         inserted(0.1) + inserted(0.2), lambda *runs: [free_part(*runs[:8]), free_part(*runs[8:])],
         [0.6345, 0.3436], relative(0.01), "Schaaf and Talbot 1989, R",
     ),
     Case(
-        "P10-06", "attempts x disk area to reach .1, .2, .3, .4, .5",
+        "P10-06", "random placement: attempts times disk area to reach packing 0.1 to 0.5",
         FILLED, attempts, [0.126, 0.339, 0.807, 2.33, 25.6],
         Tolerance("1 / 1 / 3 / 3 / 10 %", lambda ref, _: ref * [0.01, 0.01, 0.03, 0.03, 0.1]), "R",
     ),

@@ -65,14 +65,14 @@ def enskog_ratio(run: Run) -> float:
 CASES = [
     *[
         Case(
-            "P14-01", f"packing {eta}: velocity autocorrelation at w t = .5, 1",
+            "P14-01", f"packing {eta}: velocity autocorrelation at w t = 0.5 and 1",
             watched(8, eta, 0.25, 500), over(half_and_one),
             [0.609, 0.3755], within(0.01), "D, R",
         )
         for eta in PACKINGS
     ],
     Case(
-        "P14-02", "packing .05: diffusion at w t = 8 to 28 over Enskog's",
+        "P14-02", "packing 0.05: diffusion coefficient over Enskog's",
         watched(6, 0.05, 1.0, 1200), over(enskog_ratio),
         1.05, within(0.04), "D, R",
     ),

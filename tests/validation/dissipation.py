@@ -106,14 +106,14 @@ def loss_per_hit(run: Run) -> float:
 GAS = [
     *[
         Case(
-            "P9-01", f"cooling, restitution {xi}: K / K0 after {tau} collisions per disk",
+            "P9-01", f"cooling, ξ = {xi}: K / K(0) after {tau} collisions per disk",
             COOLING[xi], over(lambda run, tau=tau: left(run, tau)),
             hd.haff_by_collisions(tau, xi), relative(0.03), "van Noije and Ernst; R",
         )
         for xi, tau in ((0.9, 10), (0.9, 20), (0.8, 10))
     ],
     Case(
-        "P9-02", "cooling, restitution 0.9: K / K0 at w0 t = 12.8",
+        "P9-02", "cooling, ξ = 0.9: K / K(0) after 12.8 initial mean free times",
         COOLING[0.9], over(lambda run: left_at_time(run, 12.8)),
         hd.haff_by_time(12.8, 0.9), relative(0.015), "Haff 1983; R",
     ),
@@ -124,17 +124,17 @@ GAS = [
         )
         for law in SOFT
         for what, of, value, part in (
-            ("exponent of K ~ t^-p at late times", late_exponent, 5 / 3, 0.02),
-            ("K by the law with Maxwell's velocities", over_the_law, 1.0, 0.05),
+            ("exponent p of K ~ t^-p at late times", late_exponent, 5 / 3, 0.02),
+            ("K over the law for Maxwell's distribution", over_the_law, 1.0, 0.05),
         )
     ],
     Case(
-        "P9-12", "cooling without end: ends by itself, decades that T has fallen",
+        "P9-12", "unlimited cooling: decades of T until the program ends the run",
         ENDLESS, each(fall), 26, within(1), "D",
     ),
     *[
         Case(
-            "P9-04", f"walls, rule '{rule}': mean loss per hit over (1 - xi^2) kT",
+            "P9-04", f"walls, rule '{rule}': mean energy loss per collision over (1 - ξ²) kT",
             slow_loss(rule), over(loss_per_hit),
             share * 2000 / 2001, sigmas(3, 0.01), "D",
         )
@@ -171,16 +171,17 @@ def steps(*runs: Run) -> float:
 EXAM = tuple(member for xi in (1.0, 0.9, 0.8) for member in mixtures(xi, 16, 0.004))
 MIXTURE = [
     Case(
-        "P9-05", "mixture between walls: ratio rises from xi = 1 to .9 to .8, in its errors",
+        "P9-05",
+        "mixture: increase of K_heavy / K_light from ξ = 1 to 0.9 to 0.8, in standard errors",
         EXAM, steps, 3, AT_LEAST, "EX; Garzo and Dufty 1999",
     ),
     Case(
-        "P9-05", "mixture between walls, xi = 1: K_heavy / K_light after 10 collisions per disk",
+        "P9-05", "mixture, ξ = 1: K_heavy / K_light after 10 collisions per disk",
         EXAM[:16], over(temperature_ratio), 1, relative(0.03), "D",
     ),
     *[
         Case(
-            "P9-06", f"dilute periodic mixture, xi = {xi}: K_heavy / K_light",
+            "P9-06", f"dilute mixture in a periodic box, ξ = {xi}: K_heavy / K_light",
             mixtures(xi, 64, 0.001, **PERIODIC), over(temperature_ratio), cooling_ratio(4, xi),
             relative(0.03), "Garzo and Dufty 1999; D",
         )
@@ -245,12 +246,13 @@ def wrong_flags(run: Run) -> int:
 
 TC = [
     Case(
-        "P9-07", "packing .05, .1: collisions less than t_c after another, w t_c = .01 to 2",
+        "P9-07",
+        "TC model: fraction of collisions within t_c of the previous one, w t_c = 0.01 to 2",
         ELASTIC, each(flag_fractions),
         2 * [0.0186, 0.090, 0.172, 0.32, 0.62, 0.86, 0.98], within(0.01), "R",
     ),
     Case(
-        "P9-07", "TC model, t_c up to no limit: events that are wrongly elastic, or wrongly not",
+        "P9-07", "TC model, any t_c: number of events treated wrongly",
         FLAGGED, each(wrong_flags), 0, EXACT, "Luding and McNamara 1998",
     ),
 ]  # fmt: skip
@@ -296,28 +298,28 @@ FIRST_SIX = [
 ]  # fmt: skip
 COLLAPSE = [
     Case(
-        "P9-10", "three on a line, 1.03 and 1.4 of the critical xi: they part, with a speed of",
+        "P9-10", "three disks on a line, 1.03 and 1.4 times the critical ξ: speed of separation",
         symmetric(1.03, 1.4), each(spread), 1e-12, AT_LEAST,
         "Bernu and Mazighi 1990",
     ),
     Case(
-        "P9-10", "three on a line, 0.97 and 0.7 of the critical xi: they collapse, speed left",
+        "P9-10", "three disks on a line, 0.97 and 0.7 times the critical ξ: speed at the collapse",
         symmetric(0.97, 0.7), each(spread), 1e-16, AT_MOST,
         "Bernu and Mazighi 1990",
     ),
     Case(
-        "P9-11", "xi = .05: times of the first six collisions",
+        "P9-11", "collapse, ξ = 0.05: times of the first six collisions",
         (COLLAPSED,), lambda run: run.event_log().time[:6], FIRST_SIX,
         within(1e-12), "D, 120 digits",
     ),
     Case(
-        "P9-11", "xi = .05: time, velocities, place of the collapse",
+        "P9-11", "collapse, ξ = 0.05: time, velocities, position",
         (COLLAPSED,),
         lambda run: [run.event_log().time[26], *run.velocity[-1][:, 0], run.position[27][1, 0]],
         [7 / 45, 1 / 6, 1 / 6, 1 / 6, 0.525925925925926], within(1e-9), "D, 120 digits",
     ),
     Case(
-        "P9-11", "xi = .1: collisions, time of the last, velocities",
+        "P9-11", "ξ = 0.1: number of collisions, time of the last one, velocities",
         (DISPERSED,),
         lambda run: [len(run.event_log().time), run.event_log().time[-1], *run.velocity[-1][:, 0]],
         [6, 0.195077620020993, 0.1659559375, 0.166739203125, 0.167304859375],

@@ -131,24 +131,24 @@ def enskog_ratios(*runs: Run) -> Estimate:
 
 CASES = [
     Case(
-        "P15-01", "one smooth disk between T = 4 and 1: heat per time",
+        "P15-01", "one smooth disk between walls at T = 4 and 1: heat per time",
         between_walls(False), over(flux), 1.5 * FLUX, sigmas(4, 0.02), "D",
     ),
     Case(
-        "P15-01", "one disk that turns: heat per time",
+        "P15-01", "one rotating disk between thermal walls: heat per time",
         between_walls(True), over(flux), 2 * FLUX, sigmas(4, 0.02), "D",
     ),
     Case(
-        "P15-02", "variance of the energy over N T^2",
+        "P15-02", "thermal walls: variance of the energy over N T²",
         HEATED, over(lambda run: energies(run).var() / (COUNT * KT**2)), 1, sigmas(4, 0.2), "D",
     ),
     Case(
-        "P15-02", "speeds against Maxwell's law at T: probability",
+        "P15-02", "thermal walls: p-value of the speeds against Maxwell's distribution",
         HEATED, maxwell_p, 0.001, AT_LEAST, "D",
     ),
     *[
         Case(
-            "P15-03", f"rough disks, restitution {xi}, tangential {beta}: T_rot / T",
+            "P15-03", f"rough disks, ξ = {xi}, β = {beta}: T_rot / T",
             cooling(xi, beta), over(ratio), expected, within(0.01), "D",
         )
         for (xi, beta), expected in ROUGH_RATIOS.items()

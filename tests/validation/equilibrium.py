@@ -51,7 +51,7 @@ def rate_reference(eta: float) -> float:
 
 BULK = [
     Case(
-        "P7-01", f"periodic, packing {eta:.2f}: collision rate",
+        "P7-01", f"periodic box, packing {eta:.2f}: collision rate",
         bulk(eta), pooled(reduced_rate),
         rate_reference(eta), relative(0.004), "KR",
     )
@@ -61,19 +61,19 @@ BULK = [
     for eta in (0.1, 0.3, 0.5)
     for case in (
         Case(
-            "P8-01", f"periodic, packing {eta}: Z by the virial",
+            "P8-01", f"periodic box, packing {eta}: Z by the virial",
             bulk(eta), pooled(z_virial),
             hd.simulated_finite(eta, N), sigmas(3, 0.003), "KR",
         ),
         Case(
-            "P8-01", f"periodic, packing {eta}: one over the other",
+            "P8-01", f"periodic box, packing {eta}: Z by the virial over Z by the collision rate",
             bulk(eta), lambda *runs: pooled(z_virial)(*runs).mean / pooled(z_rate)(*runs).mean,
             1, within(1e-3), "D",
         ),
     )
 ] + [
     Case(
-        "P8-01", "periodic, packing 0.3, N = 256: Z by the virial",
+        "P8-01", "periodic box, packing 0.3, N = 256: Z by the virial",
         long_gases(4, 256, 4000, packing_fraction=0.3, periodic=True),
         pooled(z_virial),
         hd.simulated_finite(0.3, 256), sigmas(3, 0.003), "KR",
@@ -93,7 +93,7 @@ WALLED = {  # radius: w, collision rate of all sides, force on a side, length in
 
 WALLS = [
     Case(
-        "P7-02", f"walls, radius {radius}: collision rate, hits, force",
+        "P7-02", f"walls, radius {radius}: rates of pair and wall collisions, force",
         long_gases(1, N, values[3], radius=radius),
         lambda run: several([collision_rate(run), hit_rate(run), force(run)]),
         values[:3], relative(0.01), "R",
@@ -116,7 +116,7 @@ def two_exact(s: float) -> list[float]:
 
 TWO = [
     Case(
-        "P7-04", f"two disks, radius {radius}: pair rate, hits, force",
+        "P7-04", f"two disks, radius {radius}: rates of pair and wall collisions, force",
         ensemble(
             (7,), species={"count": 2, "radius": radius, "speed": ROOT_2},
             stop={"collisions": 4_000_000}, output={"observables_every_collisions": 2000},
@@ -153,7 +153,7 @@ def identity_terms(run: Run) -> tuple[float, float, float]:
 
 DILUTE_CASES = [
     Case(
-        "P7-05", "dilute gas between walls: F a / (N kT)",
+        "P7-05", "dilute gas between walls: force on a side, F a / (N kT)",
         DILUTE, pooled(z_wall),
         1.0664, relative(0.003), "D, R",
     ),
@@ -163,12 +163,12 @@ DILUTE_CASES = [
         1, within(1e-3), "D",
     ),
     Case(
-        "P7-06", "virial identity after 1e5 collisions, N = 2 and 100: wall over virial pressure",
+        "P7-06", "virial theorem, N = 2 and 100: wall pressure over virial pressure",
         IDENTITIES[:3], each(lambda run: np.divide(*identity_terms(run)[:2])),
         1, within(1e-3), "D",
     ),
     Case(
-        "P7-06", "virial identity with its boundary term, N up to 1000: exact",
+        "P7-06", "virial theorem with its boundary term, N up to 1000: exact",
         IDENTITIES, each(lambda run: np.dot(identity_terms(run), (1, -1, 1))),
         0, within(1e-11), "D",
     ),
@@ -220,7 +220,7 @@ def polydisperse(eta: float, law: str, spread: float) -> tuple[Member, ...]:
 MIXTURES = [
     *[
         Case(
-            "P8-02", f"radii 1 : 1.4, packing {eta}: Z",
+            "P8-02", f"mixture, radii 1 : 1.4, packing {eta}: Z over the equation of state",
             mixtures(3, radii_for(eta, 1.4), (1, 1), observables_every_collisions=500),
             pooled(over_equation_of_state), 1,
             relative(0.004), "Santos, Yuste and Lopez de Haro 1999",
@@ -229,7 +229,8 @@ MIXTURES = [
     ],
     *[
         Case(
-            "P8-02", f"{law} radii, spread {spread}, packing {eta}: Z over the equation of state",
+            "P8-02",
+            f"{law} radii, polydispersity {spread}, packing {eta}: Z over the equation of state",
             polydisperse(eta, law, spread), pooled(over_equation_of_state),
             1, relative(0.005), "Santos, Yuste and Lopez de Haro 1999",
         )
@@ -237,7 +238,7 @@ MIXTURES = [
         for eta in (0.3, 0.5)
     ],
     Case(
-        "P7-07", "radii 1 : 2, masses 1 : 4, packing 0.1: w_ij",
+        "P7-07", "radii 1 : 2, masses 1 : 4, packing 0.1: collision rates of each pair of species",
         mixtures(4, radii_for(0.1, 2), (1, 4), event_log=True), over(species_rates),
         mixture_rates(2 * np.array(radii_for(0.1, 2)), [N / 2, N / 2], [1, 4]).ravel(),
         relative(0.01), "section 7",
@@ -279,7 +280,7 @@ DENSE = [
     for eta, pressure in NEAR_FREEZING.items()
 ] + [
     Case(
-        "P8-05", "lattice start, crystal at packing 0.80: Z",
+        "P8-05", "crystal from a lattice, packing 0.80: Z",
         CRYSTAL, z_virial, hd.crystal(0.80, 960), relative(0.005),
         "Alder, Hoover and Young 1968",
     ),

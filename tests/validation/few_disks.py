@@ -87,82 +87,82 @@ TC = tuple(
 
 ONE = [
     Case(
-        "P1-04", "closed path: order and times of the hits",
+        "P1-04", "one disk on a closed path: order and times of the collisions",
         (square_path(events=4),),
         lambda run: [*run.event_log().j, *run.event_log().time],
         [-1, -3, 0, -2, 0.4, 0.65, 1.2, 1.45], within(1e-14), "EX B.1",
     ),
     Case(
-        "P1-04", "from the middle, into corners: back after 4 hits",
+        "P1-04", "one disk from the centre into the corners: back after 4 collisions",
         (square_path((0.5, 0.5), time=1.6),),
         lambda run: [*run.position[-1][0], *final(run), len(run.event_log().time)],
         [0.5, 0.5, 1, 1, 4], within(1e-14), "EX B.1",
     ),
     Case(
-        "P1-05", "walls without rebound: velocity and events",
+        "P1-05", "walls with restitution 0: velocity and number of events",
         (square_path(contact={"wall_restitution": 0}, time=2),),
         lambda run: [*final(run), len(run.event_log().time), run.time[-1]],
         [0, 0, 1, 2], EXACT, "EX B.1",
     ),
     Case(
-        "P1-06", "walls with 0.9, whole velocity: times of 6 hits",
+        "P1-06", "walls, rule 'velocity', ξ = 0.9: times of 6 collisions",
         (SLOWED,), lambda run: run.event_log().time, PATH_TIMES, within(1e-13), "D",
     ),
     Case(
-        "P1-06", "walls with 0.9, whole velocity: speeds .9^k",
+        "P1-06", "walls, rule 'velocity', ξ = 0.9: speeds 0.9^k",
         (SLOWED,), lambda run: np.abs(run.velocity[:]).ravel(),
         np.repeat(0.9 ** np.arange(7), 2), within(1e-13), "D",
     ),
     Case(
-        "P1-07", "walls with 0.9, normal velocity: 4 hits, velocity",
+        "P1-07", "walls, rule 'normal', ξ = 0.9: times of 4 collisions, velocity",
         (square_path(contact={"wall_restitution": 0.9, "wall_rule": "normal"}, events=4),),
         lambda run: [*run.event_log().time, *final(run)],
         [0.4, 0.65, 1.288888888888889, 1.538888888888889, 0.81, 0.81], within(1e-13), "D",
     ),
     Case(
-        "P1-08", "bounces from a height of 1: mean time of 10 000, apex of all",
+        "P1-08", "elastic bounces from height 1: mean duration of 10 000, all heights",
         (dropped(1.04, 10001),), lambda run: [np.diff(run.event_log().time).mean(), *apexes(run)],
         [0.903047281971462, *[1.04] * 10001], relative(1e-9), "D",
     ),
     Case(
-        "P1-10", "thrown up with 20: time to ceiling and back, speed at the ceiling",
+        "P1-10", "disk thrown upwards: time to the ceiling and back, speed there",
         (dropped(SMALL, 2, (0, 20)),),
         lambda run: [run.event_log().time[1], -run.velocity[1][0, 1]],
         [2.16877950901169, 9.36213650829766], relative(1e-12), "D",
     ),
     *[
         Case(
-            "P1-12", f"restitution {xi}: all impacts until flights of 1e-12",
+            "P1-12", f"bouncing disk, ξ = {xi}: all impacts until flights last 1e-12",
             (member,), lambda run: run.event_log().time, impacts(xi, until_rest(xi)),
             relative(1e-12), "D",
         )
         for xi, member in zip(REST, bouncing(), strict=True)
     ],
     Case(
-        "P1-12", "restitution .5, .8, .9, .95: comes to rest at t0 (1 + xi) / (1 - xi)",
+        "P1-12", "bouncing disk: comes to rest at t0 (1 + ξ) / (1 - ξ)",
         bouncing(), each(lambda run: run.event_log().time[-1]), REST_TIMES, relative(1e-11), "D",
     ),
     Case(
-        "P1-13", "distance until rest, normal velocity reduced",
+        "P1-13", "distance until rest, rule 'normal'",
         bouncing("normal", 1), each(lambda run: run.position[-1][0, 0] - 1),
         REST_TIMES, relative(1e-9), "D",
     ),
     Case(
-        "P1-13", "distance until rest, whole velocity reduced",
+        "P1-13", "distance until rest, rule 'velocity'",
         bouncing("velocity", 1)[:3], each(lambda run: run.position[-1][0, 0] - 1),
         [0.752539401642885, 2.05694103115722, 4.30135679044302], relative(1e-9), "D",
     ),
     Case(
-        "P1-14", "TC model, t_c = 1e-3 and 1e-6: impacts that take energy",
+        "P1-14", "TC model, t_c = 1e-3 and 1e-6: number of inelastic impacts",
         TC, each(dissipating), [10, 20], EXACT, "D",
     ),
     Case(
-        "P1-14", "TC model, t_c = 1e-3 and 1e-6: length of the flights for ever after",
+        "P1-14", "TC model, t_c = 1e-3 and 1e-6: final duration of the bounces",
         TC, each(last_flight),
         [8.81882111300256e-4, 8.61212999316656e-7], relative(1e-9), "D",
     ),
     Case(
-        "P1-14", "TC model, t_c = 1e-3 and 1e-6: height of the flights for ever after",
+        "P1-14", "TC model, t_c = 1e-3 and 1e-6: final height of the bounces",
         TC, each(lambda run: run.velocity[-1][0, 1] ** 2 / (2 * 9.81)),
         [0.25**10, 0.25**20], relative(1e-9), "D",
     ),
@@ -190,7 +190,7 @@ NO_MEETING = (
 
 TWO = [
     Case(
-        "P2-04", "unequal disks, .7: time, velocities, energy lost",
+        "P2-04", "two unequal disks, ξ = 0.7: time, velocities, dissipated energy",
         (UNEQUAL,),
         lambda run: [
             run.event_log().time[0], *final(run), run.observable("dissipated_energy").value[-1]
@@ -202,12 +202,12 @@ TWO = [
         within(1e-13), "EX eq. 7, 11; D",
     ),
     Case(
-        "P2-06", "grazing, receding, at relative rest: collisions",
+        "P2-06", "two disks that graze, recede or are at relative rest: number of collisions",
         NO_MEETING, each(lambda run: np.sum(run.event_log().j > 0)),
         [0, 0, 0], EXACT, "EX eq. 7",
     ),
     Case(
-        "P2-07", "both falling: time, places, velocities",
+        "P2-07", "two falling disks: time, positions, velocities",
         (MONKEY,),
         lambda run: [run.event_log().time[0], *run.position[-1].ravel(), *final(run)],
         [0.492, 3.952, 10.74867608, 4, 10.81267608, 0, -4.82652, 6, 3.17348],
@@ -253,12 +253,12 @@ def deflection(run: Run) -> float:
 
 SCATTERING = [
     Case(
-        "P3-01", "angle against impact parameter, finite mass [deg]",
+        "P3-01", "scattering angle against impact parameter, finite mass, in degrees",
         SCATTERED, each(deflection),
         ANGLES, within(1e-9), "EX 1; D",
     ),
     Case(
-        "P3-01", "speed after over speed before, less 1",
+        "P3-01", "ratio of the speeds after and before, minus 1",
         SCATTERED, each(lambda run: run.speed(-1)[1] - 1),
         SLOWING, within(1e-12), "D",
     ),
@@ -297,7 +297,7 @@ TONKS = [
     for number, (frame, tolerance) in enumerate({1: 1e-12, 10: 1e-11, 100: 1e-9}.items(), start=1)
     for case in (
         Case(
-            f"P4-0{number}", f"ten disks on a line, t = {0.97 * frame:g}: places",
+            f"P4-0{number}", f"ten disks on a line, t = {0.97 * frame:g}: positions",
             (RODS,), lambda run, k=frame: run.position[k][:, 0],
             ROD_PLACES[frame], within(tolerance), "Tonks gas; D",
         ),
@@ -309,7 +309,7 @@ TONKS = [
 ]  # fmt: skip
 TONKS.append(
     Case(
-        "P4-03", "ten disks on a line, t = 97: the set of speeds is that of the start",
+        "P4-03", "ten disks on a line, t = 97: set of speeds, as at the start",
         (RODS,), lambda run: np.sort(np.abs(run.velocity[-1][:, 0])),
         np.sort(np.abs(ROD_V)), within(1e-12), "D",
     )

@@ -97,23 +97,23 @@ def at_energy(mean: float) -> Callable[[Run], float]:
 MEANS = [
     *[
         Case(
-            "P11-01", f"v0 = {v0}: E/N, 100 seeds", boxes(100, v0, 1e-3),
+            "P11-01", f"gravity, v0 = {v0}: E/N, 100 seeds", boxes(100, v0, 1e-3),
             over(start_energy), energy, sigmas(3, 0.03), "D",
         )
         for v0, energy in ENERGIES.items()
     ],
     Case(
-        "P11-02", "5 energies: <K> over kT(E/N)",
+        "P11-02", "gravity, 5 energies: mean K over kT(E/N)",
         LONG_RUNS, each(lambda run: kinetic(run) / temperature_of(start_energy(run))),
         1, relative(0.006), "D, R",
     ),
     Case(
-        "P11-02", "5 energies: <K_A> / <K_B>",
+        "P11-02", "gravity, 5 energies: ratio of the mean energies of both species",
         LONG_RUNS, each(share), 1, within(0.015), "D",
     ),
     *[
         Case(
-            "P11-03", f"v0 = {v0}: kT at the mean energy", boxes(8, v0, 2000.0),
+            "P11-03", f"gravity, v0 = {v0}: kT at the mean energy", boxes(8, v0, 2000.0),
             over(at_energy(ENERGIES[v0])), kt, relative(0.006), "D",
         )
         for v0, kt in SCAN_KT.items()
@@ -178,20 +178,21 @@ def exponent(mean: float, length: float) -> float:
 
 LAWS = [
     Case(
-        "P11-05", "1024 seeds: <K_B> / <K_A> at 0-.5, .5-1, 1-1.5, 3.5-4",
+        "P11-05", "gravity, 1024 seeds: K_B / K_A in four intervals up to t = 4",
         FALLING, lambda *runs: window_ratios(*runs)[:4], [1.99, 1.78, 1.26, 1.00],
         within(0.06), "R",
     ),
     Case(
-        "P11-05", "1024 seeds: <K_B> / <K_A> after the thermalisation, 5-10",
+        "P11-05", "gravity, 1024 seeds: K_B / K_A after relaxation, t = 5 to 10",
         FALLING, lambda *runs: window_ratios(*runs)[4], 1.00, within(0.03), "R",
     ),
     Case(
-        "P11-06", "v^2 of both species against their law: KS distance sqrt(n)",
+        "P11-06",
+        "gravity: v² of both species, exact distribution: √n times the Kolmogorov-Smirnov distance",
         SAMPLED, middle(square_distances), 1.63, AT_MOST, "URB, D",
     ),
     Case(
-        "P11-07", "heights of both species: slope over m g / kT",
+        "P11-07", "gravity: slope of ln(density) against height over m g / kT",
         SAMPLED, over(slopes), 1, within(0.03), "URB, D, R",
     ),
 ]  # fmt: skip
@@ -236,7 +237,7 @@ def rate_ratio(stepped: Run, exact: Run) -> float:
 
 STEPS = [
     Case(
-        "P11-10", f"time steps of {dt}: collision rate over the exact one, over that expected",
+        "P11-10", f"time steps of {dt}: fraction of collisions found, over the predicted fraction",
         (*boxes((2,), 0.5, 5000.0, run={"dynamics": "steps", "dt": dt}), LONG_RUNS[1]),
         rate_ratio, 1, within(0.01), "D, see the docstring of too_short",
     )

@@ -209,7 +209,7 @@ def compressibility(run: Run) -> float:
 CASES = [
     *[
         Case(
-            "P15-05", f"inelastic gas and noise, xi = {xi}: T",
+            "P15-05", f"inelastic gas with white noise, ξ = {xi}: T",
             heated(xi), over(steady_temperature), hd.noise_temperature(STRENGTH, xi, ETA, 1.0),
             sigmas(4, 0.01), "van Noije and Ernst 1998",
         )
@@ -217,7 +217,7 @@ CASES = [
     ],
     *[
         Case(
-            "P15-05", f"inelastic gas and noise, xi = {xi}: a2",
+            "P15-05", f"inelastic gas with white noise, ξ = {xi}: a2",
             heated(xi), over(steady_kurtosis), noise_kurtosis(xi), within(0.005),
             "van Noije and Ernst 1998",
         )
@@ -225,42 +225,43 @@ CASES = [
     ],
     *[
         Case(
-            "P15-05", f"inelastic gas and noise, xi = {xi}: diffusion over kinetic theory's",
+            "P15-05",
+            f"inelastic gas with white noise, ξ = {xi}: diffusion coefficient over theory",
             heated(xi), over(diffusion), 1, within(0.03), "Garzo 2004",
         )
         for xi in (0.8, 0.6)
     ],
     Case(
-        "P15-06", "Andersen kicks, free disks: <v v(t)> m / 2 kT after 0, 1, 2, 5 of them",
+        "P15-06", "Andersen, free disks: velocity autocorrelation after 0 to 5 kicks",
         BATHED, over(memory), [(1 - FRACTION) ** k for k in (0, *LAGS)], sigmas(4, 0.02), "D",
     ),
     *[
         Case(
-            "P15-06", f"{kind} kicks, rough mixture: moving and turning, both species, over T",
+            "P15-06", f"{kind}, rough mixture: temperatures of translation and rotation over T",
             bathed(kind, **more), over(shares), 1, sigmas(4, 0.01), "D",
         )
         for kind, more in (("andersen", {"fraction": 0.2}), ("brownian", {}))
     ],
     Case(
-        "P15-06", "andersen kicks, rough mixture: variance of the energy over N T^2",
+        "P15-06", "andersen, rough mixture: variance of the energy over N T²",
         bathed("andersen", fraction=0.2), over(heat_capacity), 1.5, sigmas(4, 0.1), "D",
     ),
     Case(
-        "P15-07", "Brownian free disks: <dr^2> over 4 D t at 1, 5, 20 kicks",
+        "P15-07", "Brownian free disks: mean square displacement over 4 D t",
         DIFFUSING, over(spread((1, 5, 20), lambda kicks: 2 * BATH / MASS * KICK**2 * kicks)),
         1, sigmas(4, 0.02), "D",
     ),
     Case(
-        "P15-07", "Brownian disks at packing .3: Z by the virial",
+        "P15-07", "Brownian disks at packing 0.3: Z by the virial",
         CROWDS, over(compressibility), float(hd.simulated(CROWDED)), sigmas(4, 0.01), "KR",
     ),
     Case(
-        "P15-08", "active free disks: <dr^2> over its law at D_r t = .2, 2, 20",
+        "P15-08", "active free disks: mean square displacement over theory",
         SWIMMING, over(spread((1, 10, 100), lambda frames: swum(10 * frames))),
         1, sigmas(4, 0.02), "Howse et al. 2007, D",
     ),
     Case(
-        "P15-08", "active free disks: <cos> of the turn at D_r t = .2, .4, 1",
+        "P15-08", "active free disks: mean cosine of the rotation at D_r t = 0.2, 0.4, 1",
         SWIMMING, over(headings), [exp(-TURN * 10 * KICK * k) for k in LAGS], sigmas(4, 0.02), "D",
     ),
 ]  # fmt: skip

@@ -199,43 +199,44 @@ def fuller_share(run: Run) -> float:
 
 CASES = [
     Case(
-        "P15-11", "floor that strikes with V, xi = .5, .75: velocity over V (1 + xi) / (1 - xi)",
+        "P15-11", "sawtooth floor, ξ = 0.5, 0.75: velocity over V (1 + ξ) / (1 - ξ)",
         STRUCK, lambda *runs: [leaving(r)[-1] / V / f for r, f in zip(runs, (3, 7), strict=True)],
         1, relative(1e-12), "D",
     ),
     Case(
-        "P15-11", "floor of a sine, .98 of the doubling, xi = .5, .8: velocity at each bounce",
+        "P15-11", "sine floor, 0.98 of the period doubling: velocity at each bounce",
         BELOW, each(lambda run: leaving(run)[-1]), 0.5, within(1e-4), "D",
     ),
     Case(
-        "P15-11", "floor of a sine, 1.02 of the doubling: difference of two bounces in turn",
+        "P15-11", "sine floor, 1.02 of the period doubling: difference of successive bounces",
         ABOVE, each(lambda run: abs(leaving(run)[-1] - leaving(run)[-2])),
         0.01, AT_LEAST, "D",
     ),
     Case(
-        "P15-11", "floor of a sine, 1.02 of the doubling: of each bounce and the next but one",
+        "P15-11", "sine floor, 1.02 of the period doubling: difference of every second bounce",
         ABOVE, each(lambda run: abs(leaving(run)[-1] - leaving(run)[-3])),
         1e-4, AT_MOST, "D",
     ),
     Case(
-        "P15-12", "slow piston on a dilute gas: T x area over its start at three places",
+        "P15-12", "slow compression of a dilute gas: T times area over its initial value",
         PISTON, over(adiabats), 1, sigmas(4, 0.02), "D",
     ),
     Case(
-        "P15-14", "slow steady side on a dense gas, packing 0.2 to 0.4: ln of T over its start",
+        "P15-14", "slow compression of a dense gas, packing 0.2 to 0.4: ln T/T(0)",
         PRESSED, over(heated), pressed(), SOUND, "Kolafa 2006, D",
     ),
     Case(
-        "P15-15", "three rods push a side: mean width and its variance",
+        "P15-15", "piston and three rods: mean width and its variance",
         (RODS,), room, room_of_rods(), sigmas(4), "Tonks 1936, D",
     ),
     Case(
-        "P15-16", "a dense gas pushes a side: mean width and its variance",
+        "P15-16", "piston and a dense gas: mean width and its variance",
         PUSHED, room, room_of_gas(), sigmas(4), "Kolafa 2006, D",
     ),
     *[
         Case(
-            "P15-13", f"Maxwell's demon, floor with {velocity:g} of the threshold: fuller share",
+            "P15-13",
+            f"Maxwell's demon, floor at {velocity:g} of the threshold: share of the fuller chamber",
             chambers(velocity * THRESHOLD), over(fuller_share),
             demon_share(HOLE / (velocity * THRESHOLD) ** 2, LAYERS, XI), within(0.05),
             "after Eggers 1999",

@@ -10,79 +10,97 @@ from .case import Verdict
 
 HEAD = """# Physics validation
 
-Written by `python tests/validate.py --report docs/explanation/validation`. Each case runs the
-program on its own input and compares the result with an exact value, a derivation, or published
-numbers.
+This page is for researchers who want to know how far the numbers of the program can be trusted. It
+lists all physics cases with their reference values, measured values and verdicts. The command
+`python tests/validate.py --report docs/explanation/validation` writes the page. Each case runs the
+program on an input of its own and compares the result with an exact value, a derived formula or
+published numbers.
 
-Cases of one number share a row, which shows the value that comes nearest to its tolerance. The
-*verdict* is its deviation divided by the allowed one: up to 1 it passes, beyond it fails. What must
-hold to rounding (1e-9 or better) is only counted in the row of its topic. `validation.json` has all
-cases, with tolerances and sources.
+The values of a case share a row, which shows the value that is closest to its tolerance. The
+*verdict* is the deviation from the reference divided by the tolerance: a value passes if its
+verdict is at most 1. A reference with ≤ or ≥ is a bound, and the verdict is 0 if the bound is
+satisfied. Values that must agree to rounding (1e-9 or better) are only counted, in the row of their
+topic. The file `validation.json` beside this page contains all values with tolerances and sources.
 
 """
 
 TOPICS = {
     "P1": "one disk: walls, bounces, TC model",
     "P2": "two disks: collisions",
-    "P3": "scattering",
-    "P4": "ten disks on a line: the exact path of hard rods",
-    "P5": "speeds of a gas",
-    "P6": "mixture",
-    "P7": "collision rates, forces on walls",
-    "P8": "pressure, from dilute gas to crystal",
-    "P9": "inelastic gases: cooling, no equipartition, TC model, collapse",
-    "P10": "craters; random placement up to saturation",
-    "P11": "disks under gravity; contacts that time steps miss",
-    "P12": "billiards",
-    "P13": "symmetries: conservation, reversal, boosts, order of the disks",
+    "P3": "scattering of a light disk off a heavy one",
+    "P4": "ten disks on a line: exact paths of hard rods",
+    "P5": "speeds in a gas",
+    "P6": "equilibrium and relaxation of a mixture",
+    "P7": "collision rates and forces on walls",
+    "P8": "pressure, from the dilute gas to the crystal",
+    "P9": "inelastic gases: cooling, partition of energy, TC model, collapse",
+    "P10": "craters, and random placement",
+    "P11": "disks under gravity, and time steps",
+    "P12": "billiards and Lorentz gases",
+    "P13": "symmetries: conservation laws, time reversal, moving frames, order of the disks",
     "P14": "velocity correlations and diffusion",
-    "P15": "thermal walls, rough disks, transport, kicks, recycling, shear, moving sides",
+    "P15": "thermal walls, rough disks, transport, driving, recycling, shear, moving sides",
     "P16": "relaxed starts: pressure and order in equilibrium",
     "W1": "straight walls: a wedge under gravity",
 }
 
 
 NOTES = """
-## References that needed a second look
+## Notes on single cases
 
-- **P11-10**: the share of collisions that time steps miss is P(q) with q = g Δt / s, not g Δt / 2s:
-  two disks overlap on a chord, but collide only while they approach, on its first half.
-- **P11-01**: the published table lets centres start in [R, 8]; here a disk lies wholly in its
-  region, so it is taken up to 8 + R.
-- **P6-03**: a published 1.39(1) after 2 collisions per disk is too low: the program finds 1.468(6),
-  with time steps 1.485(11), when dilute 1.449(8); the Boltzmann equation gives 1.455.
-- **P9-07**: the fractions hold to .01 up to packing .1. Beyond, the same disks meet again: .850 at
-  packing .2 for w t_c = 1 (table: .86), .612 for .5 (.62).
-- **P10-04**: not every bed collapses before a tenth of the energy is left; 14 of 18 did.
-- **P7-07**: the contact values are approximate: to first order in the density they are wrong by
-  +.26, +.16, -.29 % (pairs 11, 12, 22) at packing .1; found are +.11(5), +.14(7), -.45(6) %.
-- **P8-05**: the formula of the crystal is good to .2 %.
-- **P15-09**: the theory of sheared grains is linear in the stress. For ξ = .95 it has .2276, .2142,
-  .9518, found are .2275(6), .2168(6), .9494(6); for ξ = .8 .475, .379, .826, found .490(1),
-  .386(1), .818(1).
-- **P15-20**: the rate holds for an opening that is much narrower than the mean free path and than
-  the chamber. With .05 of the chamber it is 1.9(6) % higher; with .2 mean free paths besides,
-  5.4(6) %.
-- **P15-21**: the tolerance is that of the literature, k between 1 and 2; k and the exponent were
-  fitted with the other one fixed, because they are strongly correlated. Smooth grains do not obey
-  the law: 2000 of them have an exponent of 1.29(3) with k = 1.3(2).
-- **P15-13**: the threshold of Maxwell's demon, .73 here, holds for many dilute grains. The 120
-  disks of the case become evenly distributed near .65; 600 disks of a fifth of the diameter are
-  still separated there.
-- **P12-06**: the coefficients -4/3, -.8775 and 4.519 of the expansion of D_0/D are quoted from
-  memory: the papers of van Leeuwen and Weijland could not be consulted, nor could a published
-  simulation be found. Exact are the limit, D_0 = 3v/(16nR) of the Boltzmann equation, and the mean
-  free time of P12-05. `runs/lorentz.sh` measured D/D_0 at six densities n R^2 of 100 000 scatterers
-  (four runs of 10^6 events each): .984(2), .968(3), .947(2), .909(3), .842(1), .719(3) at .0025,
-  .005, .01, .02, .04, .08, where the expansion gives .982, .967, .941, .897, .825, .723, and
-  without its last term .983, .970, .950, .920, .880, .834. So the first two terms are confirmed
-  within the errors up to .005; the terms that are left out matter from .01 on.
-- **P12-09**: the Lyapunov exponent .43 of the stadium is quoted from memory, because the papers of
-  Benettin and Strelcyn and of Dellago and Posch could not be consulted. The estimator is confirmed
-  by the exact exponent of an unstable path (P12-08). An independent program for points (4000 paths
-  of 2000 collisions) found .4292(5).
-- **P8-03** is no case: up to packing .70 the program agrees with Li et al. (2022) within .03
-  to .2 %, its errors.
+Some references need a remark: they are approximate, or differ from a publication, or hold under
+conditions. A number in parentheses is the standard error of the last digit.
+
+- **P6-03, relaxation of a mixture.** A published ratio of energies, 1.39(1) after 2 collisions per
+  disk, is too low. The program finds 1.468(6), with time steps 1.485(11), and in a dilute gas
+  1.449(8). The Boltzmann equation gives 1.455.
+- **P7-07, collision rates of a mixture.** The reference contains approximate contact values. To
+  first order in the density their errors at packing 0.1 are +0.26, +0.16 and -0.29 % for the pairs
+  11, 12 and 22. The measured deviations are +0.11(5), +0.14(7) and -0.45(6) %.
+- **P8-03, pressure of a dense fluid.** This number has no case in the table. Up to packing 0.70 the
+  program agrees with Li et al. (2022) within 0.03 to 0.2 %, which are the errors of the program.
+- **P8-05, pressure of the crystal.** The formula of the reference is accurate to 0.2 %.
+- **P9-07, TC model.** The fractions of elastic collisions hold to 0.01 up to packing 0.1. At higher
+  packing the same disks collide repeatedly: at packing 0.2 the fraction is 0.850 for w t_c = 1
+  (0.86 at low packing) and 0.612 for w t_c = 0.5 (0.62 at low packing). Here w is the collision
+  rate of a disk.
+- **P10-04, craters without the TC model.** A collapse does not occur in every run before a tenth of
+  the energy is left. It occurred in 14 of 18 runs.
+- **P11-01, energy under gravity.** In the published table the centres of the disks start between R
+  and 8. Here a disk lies completely inside its starting region, so the region ends at 8 + R.
+- **P11-10, time steps.** The fraction of collisions that time steps miss is P(q) with q = g Δt / s,
+  where g is the relative speed, Δt the time step and s the sum of the radii. It is not P(q / 2):
+  two disks overlap along a chord, but a collision is detected only while they approach each other,
+  on the first half of the chord.
+- **P12-06, diffusion in a Lorentz gas.** The density expansion of D_0/D has the coefficients -4/3,
+  -0.8775 and 4.519, which are quoted from memory: the papers of van Leeuwen and Weijland could not
+  be consulted, and no published simulation was found. Two references are exact: the limit of low
+  density, D_0 = 3v/(16nR) from the Boltzmann equation, and the mean free time of P12-05. The table
+  below compares the expansion with `runs/lorentz.sh`, which simulates 100 000 scatterers (four
+  runs of 10^6 events for each density). The first two terms agree with the measured values within
+  their errors up to n R^2 = 0.005. From 0.01 on, the omitted terms matter.
+
+  | n R^2 | 0.0025 | 0.005 | 0.01 | 0.02 | 0.04 | 0.08 |
+  |---|---|---|---|---|---|---|
+  | measured D/D_0 | 0.984(2) | 0.968(3) | 0.947(2) | 0.909(3) | 0.842(1) | 0.719(3) |
+  | expansion | 0.982 | 0.967 | 0.941 | 0.897 | 0.825 | 0.723 |
+  | expansion without its last term | 0.983 | 0.970 | 0.950 | 0.920 | 0.880 | 0.834 |
+
+- **P12-09, Lyapunov exponent of the stadium.** The value 0.43 is quoted from memory, because the
+  papers of Benettin and Strelcyn and of Dellago and Posch could not be consulted. The estimator is
+  confirmed by the exact exponent of an unstable path (P12-08). An independent program for points
+  (4000 paths of 2000 collisions) found 0.4292(5).
+- **P15-09, sheared inelastic gas.** The theory is linear in the stress, and its error grows with
+  the inelasticity. The table has the reduced shear rate, -P_xy and P_yy.
+
+  | restitution ξ | theory | measured |
+  |---|---|---|
+  | 0.95 | 0.2276, 0.2142, 0.9518 | 0.2275(6), 0.2168(6), 0.9494(6) |
+  | 0.8 | 0.475, 0.379, 0.826 | 0.490(1), 0.386(1), 0.818(1) |
+
+- **P15-13, Maxwell's demon.** The threshold, here a floor velocity of 0.73, is derived for many
+  dilute grains. The 120 disks of the case distribute evenly from about 0.65 on. 600 disks with a
+  fifth of the diameter are still separated at this velocity.
 """
 
 
@@ -162,26 +180,32 @@ def outcome(cases: list[dict], seconds: float) -> str:
 BARS = """
 ## Error bars and p-values
 
-The tables are written by `python tests/coverage_tables.py`. The lists of systems and quantities
-were made before the first run. The seeds of the tables were not used to improve the estimators,
-with two exceptions: these seeds showed that the errors of the flow and of the slopes under gravity
-were wrong, and their rows were measured again with the corrected estimators. An error bar belongs
-to a single run, or to a group of runs if the name of the system states a number of runs; *bars* is
-the number of runs or groups. *Held* is the percentage of the error bars that contain the true
-value, which is exact, or the mean over all bars, or the value of 3000 runs from which the groups
-are drawn (disks that fall). The expected percentage is 68, and 61 to 75 are allowed; the
-percentage of n bars has a standard deviation of 47 / √n by chance. *Error / scatter* is the mean
-error divided by the standard deviation of the measured values; Student's t makes this ratio larger
-than 1. *Three* is the percentage for means over three bars, whose errors follow from their
-scatter.
+The tables of this section show how often the error bars of the scripts contain the true value. They
+are written by `python tests/coverage_tables.py`. The systems and quantities were chosen before the
+first run. The seeds of the tables were not used to improve the estimators, with two exceptions:
+these seeds showed that the errors of the flow and of the slopes under gravity were wrong, and the
+corresponding rows were measured again with corrected estimators.
 
-| system | quantity | bars | held | error / scatter | three |
+An error bar belongs to a single run, or to a group of runs if the name of the system states a
+number of runs. The columns are:
+
+- *bars*: the number of runs or groups.
+- *coverage*: the percentage of the error bars that contain the true value, which is exact or the
+  mean over all bars. The expected value is 68 %, and 61 to 75 % are allowed. The percentage of n
+  bars has a standard deviation of 47 / √n by chance.
+- *error / scatter*: the mean error divided by the standard deviation of the measured values.
+  Errors with Student's t make this ratio larger than 1.
+- *three*: the coverage of means over three bars, whose errors follow from their scatter.
+
+| system | quantity | bars | coverage | error / scatter | three |
 |---|---|---|---|---|---|
 """
 P_VALUES = """
-The second table contains p-values of `speeds.py` for valid runs. Of 100 p-values 5 should be below
-0.05 and 32 below 0.32. *Uniform* is the p-value of a Kolmogorov-Smirnov test of these p-values
-against the uniform distribution. The seeds of the mixtures begin at 20001, all other seeds at 1001.
+The second table contains p-values of `speeds.py` for runs to which the tested law applies. Of 100
+p-values 5 should be below 0.05 and 32 below 0.32. *KS* is the Kolmogorov-Smirnov test of the
+speeds, and χ² is the χ² test. *Uniform* is the p-value of a Kolmogorov-Smirnov test of these
+p-values against the uniform distribution. The seeds of the mixtures begin at 20001, all other seeds
+at 1001.
 
 | system | species | runs | KS: < .05 | < .32 | uniform | χ²: < .05 | < .32 | uniform |
 |---|---|---|---|---|---|---|---|---|
@@ -225,7 +249,7 @@ def markdown(data: dict, tables: str = "") -> str:
     cases = data["cases"]
     return (
         f"{HEAD}{outcome(cases, data['seconds'])}. Program: {data['program']}.\n\n"
-        "| case | what | reference | measured | verdict |\n|---|---|---|---|---|\n"
+        "| case | quantity | reference | measured | verdict |\n|---|---|---|---|---|\n"
         + "\n".join(rows(cases))
         + f"\n{NOTES}{tables}"
     )

@@ -135,25 +135,25 @@ def drop(name: str) -> Callable[[Run], float]:
 CASES = [
     *[
         Case(
-            "P15-09", f"sheared gas, packing {eta}: heating over that by Enskog's viscosity",
+            "P15-09", f"sheared gas, packing {eta}: viscosity from the heating over Enskog's",
             heating(eta), over(heated_by_shear(eta)), 1, sigmas(4, 0.05), "D",
         )
         for eta in (0.05, 0.2)
     ],
     *[
         Case(
-            "P15-09", f"sheared grains, xi = {xi}: shear rate, -P_xy, P_yy, reduced",
+            "P15-09", f"sheared grains, ξ = {xi}: reduced shear rate, -P_xy, P_yy",
             steady(xi), over(of_steady_shear), sheared_grains(xi), relative(0.05),
             "Santos, Garzo and Dufty 2004",
         )
         for xi in (0.95, 0.8)
     ],
     Case(
-        "P15-10", "gas between walls at T = 4, 1: slope of T over that by Enskog's conductivity",
+        "P15-10", "gas between walls at T = 4 and 1: temperature gradient over Enskog's",
         between(0.2, (4.0, 1.0), 0.0), over(drop("temperature")), 1, sigmas(4, 0.05), "D",
     ),
     Case(
-        "P15-10", "gas between sliding walls: slope of the flow over that by Enskog's viscosity",
+        "P15-10", "gas between sliding walls: velocity gradient over Enskog's",
         between(0.2, (1.0, 1.0), 1.5), over(drop("flow_y")), 1, sigmas(4, 0.05), "D",
     ),
 ]  # fmt: skip

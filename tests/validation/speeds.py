@@ -45,7 +45,7 @@ def obeyed(
         values, law = sample(run)
         return goodness_of_fit(values, law).ks * sqrt(len(values))
 
-    what = f"{what}: KS distance sqrt(n)"
+    what = f"{what}: √n times the Kolmogorov-Smirnov distance"
     return Case(name, what, members, middle(distance), LEAST, AT_MOST, source)
 
 
@@ -86,9 +86,9 @@ def component(run: Run) -> tuple:
 
 
 LAWS = [
-    obeyed("P5-01", "speeds against the Maxwell law", LARGE, large, "EX, LAB"),
+    obeyed("P5-01", "speeds, Maxwell's distribution", LARGE, large, "EX, LAB"),
     *[
-        obeyed("P5-03", f"N = {count}: {what} against the exact law", members, sample)
+        obeyed("P5-03", f"N = {count}: {what}, exact distribution", members, sample)
         for count, members in FINITE.items()
         for what, sample in (("speeds", finite), ("vx", component))
     ],
@@ -148,16 +148,20 @@ def contacts(run: Run) -> tuple[np.ndarray, np.ndarray]:
 
 WALLED, BULK = hits_on_record(False), hits_on_record(True)
 COLLISIONS = [
-    obeyed("P5-06", "speeds of hits on sides against the flux law", WALLED, wall_speeds),
+    obeyed("P5-06", "normal speeds at sides, flux distribution", WALLED, wall_speeds),
     Case(
-        "P5-06", "energy of a disk that hits a side, over kT",
+        "P5-06", "mean energy of a disk that collides with a side, over kT",
         WALLED, lambda *runs: in_parts(wall_energies, runs),
         1.5 * 200 / 201, sigmas(3, 0.03), "D, for N = 100",
     ),
-    obeyed("P5-07", "approach speeds of pairs against their law", BULK, approach_speeds),
-    obeyed("P5-07", "impact parameters are uniform", BULK, lambda run: (contacts(run)[1], uniform)),
+    obeyed("P5-07", "approach speeds of pairs, exact distribution", BULK, approach_speeds),
     obeyed(
-        "P5-07", "directions of contact are uniform", BULK, lambda run: (contacts(run)[0], uniform)
+        "P5-07", "impact parameters, uniform distribution", BULK,
+        lambda run: (contacts(run)[1], uniform),
+    ),
+    obeyed(
+        "P5-07",
+        "directions of contact, uniform distribution", BULK, lambda run: (contacts(run)[0], uniform)
     ),
 ]  # fmt: skip
 
@@ -211,17 +215,17 @@ def ratios(*runs: Run) -> np.ndarray:
 
 MIXTURE = [
     Case(
-        "P5-05", "from equal speeds: a2 at 0, 1, 2, 3, 4, 5, 6, 8 collisions per disk",
+        "P5-05", "start with equal speeds: a2 after 0 to 8 collisions per disk",
         EQUAL_SPEEDS, kurtosis, [-0.5, -0.370, -0.264, -0.184, -0.125, -0.0855, -0.0565, -0.025],
         within(A2_TOLERANCE), "DSMC",
     ),
     Case(
-        "P6-02", "in equilibrium: <K> and <v> of light and heavy",
+        "P6-02", "light and heavy disks in equilibrium: mean energies, mean speeds",
         MIXED, over(energies),
         [1.25, 1.25, 1.401248, 0.700624], relative(0.005), "D; a student's report",
     ),
     Case(
-        "P6-03", "K_heavy / K_light at 0, 1, 2, 3, 4, 5, 6, 8 collisions per disk",
+        "P6-03", "K_heavy / K_light after 0 to 8 collisions per disk",
         MIXING, ratios, [4, 2.02, 1.455, 1.228, 1.115, 1.062, 1.031, 1.005],
         within(0.02 + 0.063 / sqrt(len(MIXING))), "DSMC",
     ),

@@ -140,16 +140,16 @@ def return_errors(*runs: Run) -> np.ndarray:
 
 CASES = [
     Case(
-        "P13-02", "round container, 5e5 events: energy, angular momentum, relative change",
+        "P13-02", "round container, 5e5 events: change of energy and angular momentum",
         (ROUND,), lambda run: [energy_drift(run), spin_drift(run)], 1e-11, AT_MOST, "D, R",
     ),
     Case(
-        "P13-04", "periodic, seen from a moving frame: places and times",
+        "P13-04", "periodic box, moving frame of reference: positions and times",
         (PLAIN, BOOSTED), boost_error, 1e-9, AT_MOST, "D",
     ),
     *[
         Case(
-            "P13-05", f"forth and back, N = {count}, r = {radius}: log10 error at tau = "
+            "P13-05", f"reversed velocities, N = {count}, r = {radius}: log10 of the error at τ = "
             + ", ".join(map(str, expected)),
             tuple(
                 member
@@ -161,7 +161,7 @@ CASES = [
         for (count, radius), expected in REVERSALS.items()
     ],
     Case(
-        "P13-06", "the same disks in another order: places and times",
+        "P13-06", "the same disks in another order: positions and times",
         (LISTED, RELABELLED), label_error, 1e-9, AT_MOST, "D",
     ),
 ]  # fmt: skip
