@@ -189,9 +189,9 @@ BARS = """
 
 The tables of this section show how often the error bars of the scripts contain the true value. They
 are written by `python tests/coverage_tables.py`. The systems and quantities were chosen before the
-first run. The seeds of the tables were not used to improve the estimators, with two exceptions:
-these seeds showed that the errors of the flow and of the slopes under gravity were wrong, and the
-corresponding rows were measured again with corrected estimators.
+first run. The seeds of the tables were not used to improve the estimators, with two exceptions.
+These seeds showed that the errors of the flow and of the slopes under gravity were wrong. The rows
+of these two quantities were measured again with corrected estimators.
 
 An error bar belongs to a single run, or to a group of runs if the name of the system states a
 number of runs. The columns are:
