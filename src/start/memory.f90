@@ -97,7 +97,8 @@ contains
     bytes = int(settings%n_disks()*max(running, starting), int64) + per_process + settings%box%n_obstacles()*per_obstacle
   end function peak
 
-  !> Memory in bytes per disk during the placement of disks. The result does not include optional data such as individual masses.
+  !> Memory in bytes per disk during the placement of disks, without optional data such as individual masses. For
+  !> 'relaxed' disks it is that of the compression, which needs more than the event chains; a start on a lattice needs less.
   pure function starting_bytes(settings) result(bytes)
     type(settings_t), intent(in) :: settings
     real(real64) :: bytes
