@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from browser import browsing
+from gas_inputs import GAS, USUAL
 from ricochet import read_run
-from synthetic_run import run_script
+from synthetic_run import ROOT, run_script
 from whole_runs import FINISHED, write_input
 
 
@@ -58,3 +59,28 @@ def playing(browser, tmp_path):
         return browser
 
     return play
+
+
+#: Settings of the gases that the fixture `bulk` simulates.
+RUNS = (
+    ("species.disks.packing_fraction=0.05",),
+    ("species.disks.packing_fraction=0.3",),
+    ("species.disks.packing_fraction=0.02", "contact.restitution=0.9"),
+)
+
+
+@pytest.fixture
+def bulk(simulated):
+    """Simulate small gases at two packing fractions and a cooling gas."""
+    settings = ["species.disks.count=100", "stop.collisions_per_disk=60"]
+    settings += ["output.frames_every_time=0.02", "output.observables_every_collisions=25"]
+    settings += ["output.event_log=true"]
+    system = ROOT / "input" / "bulk.nml"
+    each = enumerate(RUNS)
+    return [simulated(system, *settings, *more, name=f"{k}").path for k, more in each]
+
+
+@pytest.fixture
+def gas(simulated):
+    """Write a run of a periodic gas with additional features."""
+    return lambda name="gas", **unusual: simulated(GAS.format(**USUAL | unusual), name=name)
