@@ -146,6 +146,14 @@ def run_script(name, *arguments):
     return 0
 
 
+def refusal(capsys, script, *arguments, code=2):
+    """Return the message of a script that refuses its arguments (exit code 1 if a law fails)."""
+    assert run_script(script, *arguments) == code
+    said = capsys.readouterr().err
+    assert said.startswith(f"{script}.py: ") and said.count("\n") == 1
+    return said
+
+
 def drawn(folder, script, *arguments):
     """Run a script that draws and writes its table; return the rows of the table."""
     figure, table = folder / f"{script}.png", folder / f"{script}.csv"

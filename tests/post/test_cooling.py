@@ -1,11 +1,20 @@
-"""Cooling gases: laws of Haff for hard and soft disks, structure, and the script haff."""
+"""Cooling gases: laws of Haff for hard and soft disks, and the scripts haff and cooling."""
 
 import numpy as np
 import pytest
 
-from ricochet import cooling as cool, equilibrium, hard_disks as hd, read_run, thermodynamics as td
+import haff
+from ricochet import (
+    cooling,
+    equilibrium,
+    hard_disks as hd,
+    read_run,
+    theory,
+    thermodynamics as td,
+)
 from ricochet.reading.reader import Restitution
-from synthetic_run import drawn
+from synthetic_gases import TWO, cooled, gas
+from synthetic_run import drawn, written
 
 
 def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp_path, capsys):
@@ -22,7 +31,7 @@ def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp
     contact = (hd.simulated(eta) - 1) / (2 * eta)  # paths do not depend on the speed
     enskog = 1 / (2 * np.sqrt(2) * density * diameter * contact)
     assert float(rows["mean_free_path"]) == pytest.approx(enskog, rel=0.1)
-    found, rate, *_ = cool.haff([cool.energy_left(run)], 0.9)
+    found, rate, *_ = cooling.haff([cooling.energy_left(run)], 0.9)
     for y, law in (("K_by_time", "haff"), ("K", "law")):
         early = found[law] > 0.1
         np.testing.assert_allclose(found[y].mean[early], found[law][early], rtol=0.2)
@@ -34,7 +43,7 @@ def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp
 def test_the_first_rate_is_counted_where_no_equation_of_state_is_known(bulk, simulated, tmp_path):
     """Both methods agree for equal disks; a gas of two sizes cools by the same laws."""
     run = read_run(bulk[2])
-    assert cool.counted_rate(run) == pytest.approx(cool.first_rate(run), rel=0.1)
+    assert cooling.counted_rate(run) == pytest.approx(cooling.first_rate(run), rel=0.1)
     two = simulated(
         """&box boundary = 'periodic', 'periodic' / &contact restitution = 0.9 /
         &species name = 'small' count = 400 radius = 0.005 temperature = 1 /
@@ -43,7 +52,7 @@ def test_the_first_rate_is_counted_where_no_equation_of_state_is_known(bulk, sim
         &output observables_every_collisions_per_disk = 0.1 /""",
         name="two",
     )
-    w0_t, tau, left = cool.energy_left(two)
+    w0_t, tau, left = cooling.energy_left(two)
     np.testing.assert_allclose(left, hd.haff_by_collisions(tau, 0.9), rtol=0.1)
     np.testing.assert_allclose(left, hd.haff_by_time(w0_t, 0.9), rtol=0.15)
     drawn(tmp_path, "haff", two.path)
@@ -55,7 +64,7 @@ def test_soft_disks_cool_by_a_law_of_their_own(simulated, tmp_path, law):
     hard = hd.haff_soft(Restitution(0.7, law, 1e-9), 1.0)
     np.testing.assert_allclose(hard[2][:99], hd.haff_by_time(hard[0][:99], 0.7), rtol=1e-3)
     soft = hd.haff_soft(Restitution(0.7, law, 10.0), 1.0)
-    assert cool.exponent(soft[0], soft[2]) == pytest.approx(5 / 3, abs=0.01)
+    assert cooling.exponent(soft[0], soft[2]) == pytest.approx(5 / 3, abs=0.01)
     run = simulated(
         f"""&box boundary = 'periodic', 'periodic' /
         &contact restitution = 0.8 restitution_law = '{law}' reference_speed = 10 /
@@ -64,8 +73,69 @@ def test_soft_disks_cool_by_a_law_of_their_own(simulated, tmp_path, law):
         &output observables_per_decade = 20 decades_from = 0.01 /""",
         name=law,
     )
-    curves, *_ = cool.haff([cool.energy_left(run)], 0.8, cool.soft_law([run]))
+    curves, *_ = cooling.haff([cooling.energy_left(run)], 0.8, cooling.soft_law([run]))
     np.testing.assert_allclose(curves["K_by_time"].mean, curves["haff"], rtol=0.15)
     assert "soft_contacts" in run.nature and np.isnan(run.restitution)
     (row,) = (row for row in drawn(tmp_path, "haff", run.path)[:1])
     assert any("below 10" in name for name in row)
+
+
+def test_cooling_averages_over_runs_on_one_grid(tmp_path):
+    """Relative energies are drawn against collisions, energies in input units against time."""
+    paths = [
+        cooled(tmp_path / f"{k}.h5", 0.9, decay, points=p)
+        for k, (decay, p) in enumerate([(1.0, 401), (2.0, 301)])
+    ]
+    found = cooling.energies([read_run(path) for path in paths])
+    tau, all_of_them = found["collisions_per_disk"], found["K_all"]
+    assert tau[-1] == 20 and found["time"][-1] == 1
+    one, other = np.exp(-tau / 20), np.exp(-tau / 10)
+    np.testing.assert_allclose(all_of_them.mean, (one + other) / 2, atol=1e-4)
+    np.testing.assert_allclose(all_of_them.error, TWO * np.abs(one - other) / 2, atol=2e-4)
+    np.testing.assert_allclose(found["ratio"].mean, 2)
+    heavy, t = found["energy_heavy"].mean, found["time"]
+    np.testing.assert_allclose(heavy, 2 * (np.exp(-t) + np.exp(-2 * t)), rtol=1e-3)
+
+
+def test_a_gas_of_one_kind_cools_without_a_ratio(tmp_path, rng):
+    path = gas(tmp_path / "gas.h5", rng, names=("all",))  # all/kinetic_energy, disks of that name
+    (row, *_) = drawn(tmp_path, "cooling", path)
+    assert not any("ratio" in name for name in row)
+
+
+@pytest.mark.parametrize("end", [25.0, None])
+def test_the_cooling_rate_is_that_of_the_homogeneous_state(rng, end):
+    """The rate is three per cent above the law with a scatter of one, and half of it later."""
+    tau, true = np.linspace(0, 60, 601), 1.03 * cooling.hard_disks.haff_rate(0.9)
+    tracks = []
+    for factor in 1 + 0.01 * rng.normal(size=20):
+        lost = true * factor * np.minimum(tau, end or 60)
+        lost += 0.5 * true * np.maximum(tau - (end or 60), 0)
+        tracks.append((tau, tau, np.exp(-lost)))
+    curves, rate, until, known = cooling.haff(tracks, 0.9)
+    assert rate.mean == pytest.approx(true, abs=4 * rate.error)
+    assert rate.error == pytest.approx(0.01 * true / np.sqrt(20), rel=0.5)
+    assert curves["rate"].mean[100] == pytest.approx(true * (0.5 if end else 1), rel=0.01)
+    assert known.mean == pytest.approx(end, abs=1 + known.error) if end else np.isnan(known.mean)
+    said = " ".join(haff.apart(0.9, curves, until))
+    assert not said if end else "here K is 0.8" in said and "after 60 coll" in said
+
+
+def test_the_steady_ratio_has_forgotten_its_start(monkeypatch, tmp_path):
+    """Runs that follow the law start without rotation or with too much rotation."""
+    law, tau = (0.9, 0.0, 0.5), np.linspace(0, 25, 251)
+
+    def run(start, last=251):
+        both = theory.rough_temperatures(tau, (1.0, start), *law)[:, :last]
+        names = ("all/temperature", "all/rotational_temperature")
+        observables = {"collisions": tau[:last], **dict(zip(names, both, strict=True))}
+        x, path = np.zeros((1, 2, 2)), tmp_path / "a.h5"
+        more = {"observable_time": tau[:last], "observables": observables}
+        return written(path, x, x, **more), both
+
+    for start in (0.0, 2.0):
+        found = cooling.steady_ratio([run(start)[0]], law).mean
+        assert found == pytest.approx(theory.rough_ratio(*law), rel=cooling.SETTLED)
+    short, (t, r) = run(0.0, 51)
+    late = np.mean(r[25:] / t[25:])
+    assert cooling.steady_ratio([short], law).mean == pytest.approx(late)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gas_inputs import UNLIKE
-from synthetic_run import run_script, write_run
+from synthetic_run import refusal, run_script, write_run
 
 HAFF = "smooth disks that only cool"
 
@@ -98,3 +98,16 @@ def test_runs_that_a_script_is_not_for_are_refused(gas, tmp_path, capsys, unusua
         words = capsys.readouterr().err
         assert words.startswith(f"{script}.py: ") and words.count("\n") == 1
         assert said in words and str(path) in words
+
+
+EVERY = " &output frames_every_time = 0.5 observables_every_time = 0.1 /"
+NEEDY = (
+    "correlations crater crater_scan equipartition gravity haff melting mixture rough scattering"
+)
+
+
+@pytest.mark.parametrize("script", [*NEEDY.split(), "speeds", "transport"])
+def test_a_run_for_which_the_law_does_not_hold_is_refused_with_exit_1(simulated, capsys, script):
+    """The runs have two equal disks between walls; errors of files and options are exit 2."""
+    run = simulated("&species count = 2 radius = .05 speed = 1 / &stop time = 20 /" + EVERY)
+    assert str(run.path) in refusal(capsys, script, run.path, code=1)
