@@ -1,0 +1,172 @@
+"""Changes of a running simulation, saved simulations, and their continuation by the program."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from library_systems import GAS
+from ricochet import ProgramError, Simulation, read_run
+from whole_runs import ran
+
+
+def test_the_table_says_what_may_change_in_a_running_simulation(program):
+    """A variable that the table does not mark as changeable is refused for this reason."""
+    table = json.loads(ran(program, "--print-variables", check=True).stdout)
+    system = GAS + "&side name = 'top' / &wall name = 'w' from = 0.4, 0.5 to = 0.6, 0.5 /"
+    system += "&obstacle name = 'o' centre = 0.5, 0.5 radius = 0.01 /"
+    names = {"side": "top", "wall": "w", "obstacle": "o", "species": "a"}
+    gas, refused = Simulation(system), "cannot change in a running simulation"
+    for group, rows in table.items():
+        for name, row in rows.items():
+            value = row["default"] if row["example"] is None else row["example"]
+            full = ".".join([group, *([names[group]] if group in names else []), name])
+            try:
+                gas.change({full: value})
+                reason = ""
+            except ProgramError as error:
+                reason = error.message
+            assert row["changeable"] == (refused not in reason), full
+            assert not (row["changeable"] and row["resumable"]), full
+
+
+def test_a_saved_simulation_goes_on_in_the_program_and_back(program, tmp_path, whole):
+    """The final state is bit-identical to the final state of an uninterrupted run."""
+    (tmp_path / "gas.nml").write_text(GAS)
+    Simulation(GAS).advance(events=150).save(tmp_path / "gas.h5")
+    with pytest.raises(ProgramError, match="exists already"):
+        Simulation(GAS).save(tmp_path / "gas.h5")
+    saved = Simulation(GAS).advance(events=150).time
+    assert read_run(tmp_path / "gas.h5.part").provenance["saved_at"] == saved
+    ran(program, "gas.nml", "-o", "gas.h5", "--resume", "--set=stop.collisions=300", cwd=tmp_path)
+    assert read_run(tmp_path / "gas.h5").provenance["saved_at"] == saved
+    gas = Simulation.load(tmp_path / "gas.h5").advance(collisions=400)
+    assert np.array_equal(gas.position, whole.position[-1])
+    assert np.array_equal(gas.velocity, whole.velocity[-1])
+
+
+def test_a_side_is_held_moved_and_released_where_it_is():
+    """The energy balance holds, and the saved input contains the position of the side."""
+    side = "side.right"
+    system = {
+        "box": {"upper": [2, 1]},
+        "side": {"name": "right", "motion": "piston", "mass": 10, "force": 100},
+        "species": {"count": 60, "radius": 0.02, "temperature": 1},
+        "stop": {"time": 9},
+    }
+    held = {f"{side}.motion": "still", f"{side}.mass": None, f"{side}.force": None}
+    moved = {f"{side}.motion": "constant_velocity", f"{side}.velocity": 0.1}
+    moved |= {f"{side}.start_time": 3, f"{side}.end_time": 5}
+    free = {f"{side}.motion": "piston", f"{side}.mass": 5, f"{side}.force": 0}
+    free |= {name: None for name in moved if "time" in name or "velocity" in name}
+    gas = Simulation(system)
+
+    def balance():
+        now = {name: gas.observable(name) for name in ("total_energy", "dissipated_energy", "work")}
+        return now["total_energy"] + now["dissipated_energy"] - now["work"]
+
+    start, fewest = balance(), []
+    for k, change in enumerate([held, moved, free, held]):
+        place = gas.advance(time=1.0 + 1.5 * k).observable("sides/right/position")
+        gas.change(change)
+        assert gas.observable("sides/right/position") == pytest.approx(place, rel=1e-15)
+        again = Simulation(gas.input)
+        if change is not moved:
+            assert again.observable("sides/right/position") == pytest.approx(place, rel=1e-15)
+        fewest.append(gas.observable("sides/right/collisions"))
+    assert np.all(np.diff(fewest) > 0), "it is hit between any two changes"
+    place = gas.observable("sides/right/position")
+    assert gas.advance(time=8).observable("sides/right/position") == place
+    assert balance() == pytest.approx(start, rel=1e-12)
+
+
+def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypatch):
+    """The program continues with the saved input, and refuses the initial input."""
+    monkeypatch.chdir(tmp_path)
+    Path("gas.nml").write_text(GAS)
+    gas = Simulation("gas.nml", {"run.seed": 5}).advance(events=50)
+    gas.velocity = gas.velocity[::-1]
+    assert "seed = 5" in gas.input
+    gas.advance(events=100)
+
+    def balance():
+        flows = [gas.observable(name) for name in ("heat", "work") if name in gas.observables]
+        return gas.observable("total_energy") + gas.observable("dissipated_energy") - sum(flows)
+
+    before = balance()
+    soft = {"contact.restitution_law": "power", "contact.reference_speed": 1}
+    gas.change({"box.gravity": (0, 3), "side.top.temperature": 2, **soft})
+    gas.advance(events=150).change({"contact.restitution": 0.7})
+    gas.advance(events=200).velocity = 2 * gas.velocity
+    gas.advance(events=300)
+    assert balance() == pytest.approx(before, rel=1e-12)
+    assert {"changed", "thermal_walls", "gravity", "soft_contacts"} <= gas.nature
+    gas.save("gas.h5", input="changed.nml")
+    told = ran(program, "gas.nml", "-o", "gas.h5", "--resume", "--quiet", "--set=run.seed=5")
+    assert told.returncode == 2 and "there box.gravity = [0, 3]" in told.stderr
+    ran(program, "changed.nml", "-o", "gas.h5", "--resume", "--quiet", check=True)
+    whole, gas = read_run("gas.h5"), gas.advance()
+    assert np.array_equal(whole.velocity[-1], gas.velocity)
+    assert whole.nature == gas.nature
+    assert Simulation.load("gas.h5").changes == gas.changes
+    assert [name for _, name, _ in gas.changes][-2:] == ["contact.restitution", "velocity"]
+
+
+@pytest.mark.parametrize(
+    "groups",
+    [
+        {"drive": {"kind": "noise", "interval": 0.01, "strength": 1}},
+        {
+            "drive": {
+                "kind": "active",
+                "interval": 1e-4,
+                "temperature": 1,
+                "self_propulsion_speed": 2,
+            }
+        },
+        {"output": {"frames_every_time": 0.1, "observables_every_time": 1e-3}},
+        {"output": {"frames_per_decade": 5, "decades_from": 1e-3, "observables_at": [0.1, 0.2]}},
+        {"run": {"dynamics": "steps", "dt": 1e-4}},
+        {"species": {"name": "a", "count": 1, "radius": 0.1, "speed": 1}}
+        | {"drive": {"kind": "noise", "interval": 0.01, "strength": 1, "keep_momentum": False}}
+        | {"box": {"boundary": ("periodic", "periodic")}},
+    ],
+)
+def test_a_simulation_needs_no_stop(groups, program, tmp_path, monkeypatch):
+    """A simulation in memory needs no stop rule; the program can continue it with a stop rule."""
+    monkeypatch.chdir(tmp_path)
+    system = {"species": {"name": "a", "count": 20, "radius": 0.01, "speed": 1}} | groups
+    box = Simulation(system).advance(time=0.25)
+    assert box.time == 0.25 and "stop" not in box.input
+    box.save("box.h5", input="box.nml")
+    told = ran(program, "box.nml", "-o", "box.h5", "--resume")
+    assert told.returncode == 2 and "no rule ends the run" in told.stderr
+    ran(program, "box.nml", "-o", "box.h5", "--resume", "--set=stop.time=0.5", check=True)
+    there = Simulation({**system, "stop": {"time": 0.5}}).advance()
+    assert np.array_equal(read_run("box.h5").position[-1], there.position)
+    assert Simulation.load("box.h5").advance(time=0.6).time == 0.6
+
+
+def test_an_input_is_saved_over_nothing_but_a_saved_one(tmp_path, monkeypatch):
+    """An input is saved only over a file that was saved before, which is checked in advance."""
+    monkeypatch.chdir(tmp_path)
+    gas = Simulation(GAS)
+    Path("mine.nml").write_text("! my comments\n")
+    Path("link.nml").symlink_to("mine.nml")
+    Path("dangling.nml").symlink_to("none.nml")
+    Path("folder").mkdir()
+    places = ["mine.nml", "link.nml", "dangling.nml", "folder", "no/where.nml"]
+    files = ["gas.h5", "gas.h5.part", "gas.h5.part_new", "gas.h5.lock", "folder/../gas.h5.part"]
+    for place in [*places, *files]:
+        with pytest.raises(ProgramError, match=place.split("/")[0]) as caught:
+            gas.save("gas.h5", input=place)
+        assert caught.value.code == 3
+    assert {path.name for path in Path().iterdir()} == {*places[:4]}
+    assert Path("mine.nml").read_text() == "! my comments\n"
+    assert gas.save("gas.h5", input="new.nml") == Path("gas.h5.part")
+    gas.advance(events=50).change({"box.gravity": (0, 1)}).save("gas.h5", True, "new.nml")
+    assert Simulation("new.nml").input == gas.input
+    Path("new.nml").write_text(Path("new.nml").read_text() + "! edited\n")
+    with pytest.raises(ProgramError, match=r"new\.nml"):
+        gas.save("gas.h5", True, "new.nml")
