@@ -1,5 +1,7 @@
 """Fixtures of the tests of post/."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +9,10 @@ import pytest
 
 from browser import browsing
 from gas_inputs import GAS, USUAL
+from laboratory_page import moving
 from ricochet import read_run
 from synthetic_run import ROOT, run_script
-from whole_runs import FINISHED, write_input
+from whole_runs import FINISHED, PATIENCE, write_input
 
 
 @pytest.fixture
@@ -59,6 +62,22 @@ def playing(browser, tmp_path):
         return browser
 
     return play
+
+
+@pytest.fixture
+def opened(browser, program, tmp_path, monkeypatch):
+    """Return the browser with the laboratory when the first run moves."""
+    monkeypatch.setenv("RICOCHET", str(program))
+    command = [sys.executable, ROOT / "post/lab.py", "--no-open"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    try:
+        browser.open(process.stdout.readline().split()[0])
+        yield moving(browser)
+        assert browser.complaints() == []
+    finally:
+        browser.open("about:blank")
+        process.terminate()
+        assert process.wait(PATIENCE) == 0
 
 
 #: Settings of the gases that the fixture `bulk` simulates.

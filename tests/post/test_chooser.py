@@ -1,0 +1,48 @@
+"""The inputs of the laboratory: their pictures, descriptions and sliders."""
+
+import importlib.util
+
+import pytest
+from PIL import Image
+
+import player
+from laboratory_page import CHOOSER
+from ricochet import Simulation
+from ricochet.pages.lab import form
+from synthetic_run import ROOT
+
+INPUTS = sorted(set((ROOT / "input").glob("*.nml")) - {ROOT / "input/reference.nml"})
+
+
+def test_every_input_has_its_place_in_the_chooser_and_a_picture_of_now():
+    source = ROOT / "docs/chooser_pictures.py"
+    spec = importlib.util.spec_from_file_location("chooser_pictures", source)
+    pictures = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(pictures)
+    assert {path.stem for path in INPUTS} == CHOOSER.keys()
+    assert [one["name"] for one in player.chooser(INPUTS)] == list(CHOOSER)
+    for path in INPUTS:
+        own, drawn = CHOOSER[path.stem], ROOT / f"input/pictures/{path.stem}.png"
+        assert own["title"] and own["subject"] and own["sentence"].endswith((".", "?"))
+        assert drawn.stat().st_size < 10_000
+        shown = Image.open(drawn).text["input"]
+        message = f"make it anew: python docs/chooser_pictures.py {path.stem}"
+        assert shown == pictures.digest(path, own["at"]), message
+
+
+@pytest.mark.parametrize("path", INPUTS, ids=lambda path: path.stem)
+def test_both_ends_of_each_slider_run(path, monkeypatch, program):
+    monkeypatch.setenv("RICOCHET", str(program))
+    given = {group["place"]: group["given"] for group in form(path)["groups"]}
+    assert len(CHOOSER[path.stem]["sliders"]) == 5
+    for name, words, *ends in CHOOSER[path.stem]["sliders"]:
+        assert not set("&_'") & set(words), "in words, not in names of variables"
+        variable, _, component = name.removesuffix("]").partition("[")
+        place, _, own = variable.rpartition(".")
+        for end in ends[:2]:
+            value = end
+            if component:
+                value = [*map(float, given.get(place, {}).get(own, "0,0").split(","))]
+                value[int(component)] = end
+            with Simulation(path, {variable: value}) as run:
+                run.advance(time=1e-3)

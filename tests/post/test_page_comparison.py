@@ -1,0 +1,187 @@
+"""The page of the laboratory: kept runs beside the next run, in equal boxes and at equal times."""
+
+import pytest
+
+from laboratory_page import inside, moving, slide, type_at
+from whole_runs import wait_for
+
+
+def test_kept_runs_stand_beside_the_next_in_equal_boxes_and_plots(opened):
+    opened.press("k")
+    moving(opened, 1)
+    slide(opened, 0, 0.7)
+    wait_for(lambda: "speed" in opened.run("return current().words"))
+    sizes = """return state.boxes.map(box => filmOf(box).document.getElementById('stage'))
+    .map(stage => [stage.offsetWidth, stage.offsetHeight].join());"""
+    wait_for(lambda: len(set(opened.run(sizes))) == 1)
+    seen = "['energy', 'pressure'].map(id => filmOf(current()).document.getElementById(id))"
+    below = opened.run(f"return Math.max(...{seen}.map(one => one.getBoundingClientRect().bottom))")
+    assert below < opened.run("return $('runs').clientHeight")
+    assert opened.run("return state.boxes.map(box => box.letter)") == ["A", "B"]
+    wait_for(lambda: len(inside(opened, "overlaid")) == 1)
+    opened.press("p")
+    wait_for(lambda: opened.run("return films().every(one => !one.inside().state.playing)"))
+    opened.run("remove(state.boxes[0])")
+    assert opened.run("return state.boxes.map(box => box.letter)") == ["B"]
+
+
+def are_at_one_time(times, other_than):
+    """Return whether all times are equal and differ from an earlier time."""
+    return min(times) == max(times) != other_than
+
+
+TIMES = "return films().map(one => one.inside().moment.shown)"
+
+
+def test_compared_runs_show_one_time_and_go_on_alone(opened):
+    """This holds while they play, at each step, and when a paused film goes to another time."""
+    wait_for(lambda: inside(opened, "moment.time") > 0.1)
+    for kept in (1, 2):
+        opened.press("k")
+        moving(opened, kept)
+    opened.run("set('species.gas.count', '3000')")
+    moving(opened, 3)
+    seen = set()
+    while len(seen) < 20 or min(seen) == max(seen):
+        times = opened.run(TIMES)
+        assert len(times) == 3 and min(times) == max(times)
+        seen.add(times[0])
+    wait_for(lambda: opened.run(TIMES)[0] > 0.15)  # beyond the kept frames
+    opened.press("p")
+    wait_for(lambda: opened.run("return films().every(one => !one.inside().state.playing)"))
+    for key in ("\ue012", "\ue011", "\ue014", "\ue010", "\ue014", "n", "n", "\ue012"):
+        before = opened.run(TIMES)[0]
+        opened.press(key)  # left, Home, right, End, ...
+        wait_for(lambda old=before: are_at_one_time(opened.run(TIMES), old))
+    opened.press("p")
+    last = opened.run(TIMES)[0]
+    wait_for(lambda: opened.run(TIMES)[0] > last)
+    for _ in range(2):
+        opened.run("remove(state.boxes[0])")
+    last = opened.run(TIMES)[0]
+    wait_for(lambda: opened.run(TIMES)[0] > last + 0.02)
+    assert len(opened.run(TIMES)) == 1
+
+
+#: Scripts that keep a run and change the next run while the frame of the next run loads.
+#: Each script comes with the settings and the number of the run that starts in the end.
+WHILE_LOADING = {
+    "a possible value": ("keep(); set(key, '2');", {"species.gas.speed": "2"}, 3),
+    "an impossible value": ("keep(); busy -= PLACING; set(key, '-1');", {}, 3),
+    "a value after a long wait": (
+        "keep(); busy -= PLACING; set(key, '2');",
+        {"species.gas.speed": "2"},
+        2,
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WHILE_LOADING)
+def test_a_run_beside_a_kept_run_starts_whatever_is_changed_meanwhile(opened, case):
+    """Each request starts one run; the last run has the newest possible values, and moves."""
+    script, settings, number = WHILE_LOADING[case]
+    opened.run(f"const key = 'species.gas.speed'; {script}")
+    wait_for(lambda: opened.run("return !busy && !again && current().run === state.runs"))
+    moving(opened, number - 1)
+    assert opened.run("return [state.has, state.runs]") == [settings, number]
+    reached = inside(opened, "moment.time")
+    wait_for(lambda: inside(opened, "moment.time") > reached)
+
+
+#: Two texts for the first slider of each input of the lesson.
+LESSON = {
+    "crater": ("50", "30"),
+    "mixture": ("25", "9"),
+    "cooling": ("0.8", "0.7"),
+    "gas": ("2", "3"),
+}
+
+
+@pytest.mark.parametrize("name", LESSON)
+def test_a_value_typed_beside_a_kept_run_starts_both_from_their_start(opened, name):
+    """Shortcuts act after Enter, and no worker is asked for the time of the previous run."""
+    before = opened.run("return current().run")
+    opened.run("choose(arguments[0])", name)
+    moving(opened, before)
+    wait_for(lambda: opened.run("return document.querySelectorAll('.slider').length") == 5)
+    key = opened.run("return state.input.sliders[0].key")
+    for kept, text in enumerate(LESSON[name], 1):
+        opened.press("k")
+        wait_for(lambda count=kept: opened.run("return state.boxes.length") == count + 1)
+        type_at(opened, 0, text)
+        wait_for(lambda now=text: opened.run("return state.has[arguments[0]]", key) == now)
+        moving(opened, kept)
+    asked = """const film = filmOf(current()), { reach } = film, times = [];
+        film.reach = time => { times.push(time); reach(time); };
+        run();
+        clock.next = null;  // as when a message of the new run has arrived, but not its first frame
+        clock.shown = -Infinity;  // the next picture is due
+        conducts(film);
+        return times"""
+    before = opened.run("return current().run")
+    assert opened.run(asked) == []
+    moving(opened, before)
+    assert opened.run("return films().map(one => one.inside().past[0].time)") == [0, 0, 0]
+
+
+def test_compared_runs_have_numbers_and_histograms_side_by_side(opened):
+    opened.press("k")
+    moving(opened, 1)
+    opened.run("set('species.gas.speed', '2')")
+    wait_for(lambda: "speed" in opened.run("return current().words"))
+    moving(opened, 2)
+    table = """const { rows } = filmOf(current()).document.getElementById('numbers');
+        const texts = [...rows].map(row => [...row.cells].map(cell => cell.textContent));
+        return Object.fromEntries(texts.map(([name, ...rest]) => [name, rest]));"""
+
+    def is_complete(found):
+        heads = found.get("", []) == ["A", "theory", "B", "theory"]
+        return heads and float(found["temperature"][3]) > 1
+
+    wait_for(lambda: is_complete(opened.run(table)))
+    found = opened.run(table)
+    for name, power in (("temperature", 4), ("mean speed", 2), ("pressure of an ideal gas", 4)):
+        slow, fast = (float(found[name][k]) for k in (1, 3))
+        assert fast == pytest.approx(power * slow, rel=1e-3), name
+    assert float(found["temperature"][1]) == pytest.approx(0.5 * (1 - 1 / 1000))
+    seen = "overlaid.map(one => [one.letter, one.speeds().counts[0].reduce((a, b) => a + b)])"
+    own = inside(opened, seen)
+    assert own == [["A", 1000]]
+
+
+def test_another_input_removes_the_kept_runs_and_the_same_input_keeps_them(opened):
+    """Plots never contain curves of different inputs."""
+    opened.press("k")
+    moving(opened, 1)
+    for name, letters in (("gas", ["A", "B"]), ("cooling", ["A"])):
+        before = opened.run("return current().run")
+        opened.run("choose(arguments[0])", name)
+        moving(opened, before)
+        assert opened.run("return state.boxes.map(box => box.letter)") == letters
+        wait_for(lambda kept=letters[1:]: len(inside(opened, "overlaid")) == len(kept))
+    assert opened.run("return document.querySelectorAll('iframe').length") == 1
+    assert "A: as in the file" in opened.run("return $('shelf').textContent")
+
+
+def test_a_scan_beside_a_kept_run_is_seen_and_moves_nothing(opened):
+    """The figure is in the form, in the visible part of the window, and covers no other element."""
+    opened.press("k")
+    moving(opened, 1)
+    places = """const parts = ['stage', 'controls', 'speeds', 'energy', 'pressure'];
+        return films().flatMap(one => parts.map(id => one.document.getElementById(id)))
+          .map(one => one.getBoundingClientRect().toJSON());"""
+    before = opened.run(places)
+    opened.run("$('scanning').open = true")
+    opened.click("scan")
+    wait_for(lambda: opened.run("return scan.points.length"))
+    for _ in range(2):
+        seen = """const canvas = $('curve'), box = canvas.getBoundingClientRect();
+            const { left, top, right, bottom } = box;
+            return document.elementFromPoint((left + right) / 2, (top + bottom) / 2) === canvas
+              && top >= 0 && bottom <= innerHeight && right - left > 200"""
+        assert opened.run(seen)
+        drawn = "const image = $('curve').toDataURL(); $('curve').width += 0; "
+        drawn += "const empty = $('curve').toDataURL(); drawScan(); return image !== empty"
+        assert opened.run(drawn)
+        assert opened.run(places) == before
+        wait_for(lambda: opened.run("return scan.points.length") == 5)
