@@ -9,6 +9,7 @@ import pytest
 
 from browser import browsing
 from gas_inputs import GAS, USUAL
+from laboratory import laboratory
 from laboratory_page import moving
 from ricochet import read_run
 from synthetic_run import ROOT, run_script
@@ -78,6 +79,14 @@ def opened(browser, program, tmp_path, monkeypatch):
         browser.open("about:blank")
         process.terminate()
         assert process.wait(PATIENCE) == 0
+
+
+@pytest.fixture(scope="module")
+def address(program, tmp_path_factory):
+    """Return the address of a laboratory for tests that do not change it."""
+    with laboratory(program, tmp_path_factory.mktemp("lab")) as (process, address):
+        yield address
+        assert process.poll() is None
 
 
 #: Settings of the gases that the fixture `bulk` simulates.
