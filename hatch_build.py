@@ -9,6 +9,8 @@ from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 ROOT = Path(__file__).parent
 SCRIPTS = sorted((ROOT / "post").glob("*.py"))
+#: The shell scripts of sweeps, and their names in the package.
+SWEEP_SCRIPTS = {"ensemble.sh": "ricochet-ensemble", "ensemble_folder.sh": "ensemble_folder.sh"}
 BUILT = {"ricochet": "bin", "libricochet.so": "lib", "libricochet_files.so": "lib"}
 
 
@@ -35,8 +37,8 @@ class Package(BuildHookInterface):
         except (OSError, subprocess.CalledProcessError) as problem:
             tools = "make, bash, gfortran and HDF5 with its compiler h5fc (Debian: libhdf5-dev)"
             raise SystemExit(f"cannot build Ricochet ({problem}); it needs {tools}") from None
-        sweep_script = str(ROOT / "runs/ensemble.sh")
-        build_data["force_include"][sweep_script] = "ricochet/bin/ricochet-ensemble"
+        for script, place in SWEEP_SCRIPTS.items():
+            build_data["force_include"][str(ROOT / "runs" / script)] = f"ricochet/bin/{place}"
         for name, place in BUILT.items():
             build_data["force_include"][str(folder / name)] = f"ricochet/{place}/{name}"
         build_data |= {"pure_python": False, "infer_tag": False, "tag": f"py3-none-{platform()}"}

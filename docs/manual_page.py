@@ -114,4 +114,4 @@ def page(command: Path, prefix: str) -> str:
 if __name__ == "__main__":
     if len(sys.argv) != 3:
         raise SystemExit(__doc__)
-    sys.stdout.write(page(Path(sys.argv[1]).resolve(), sys.argv[2]))
+    sys.stdout.write(page(Path(sys.argv[1]).absolute(), sys.argv[2]))

@@ -156,137 +156,6 @@ check_names() {
   done
 }
 
-# --- files in the folder: the script does not write through links, into FIFOs, or into files that it did not create ---
-
-# ordinary FILE: returns success if FILE does not exist or is an ordinary file.
-may_be_ours() { [[ ! -L $1 && (! -e $1 || -f $1) ]]; }
-
-check_ordinary() {
-  may_be_ours "$1" ||
-    fail 3 "$1 is not an ordinary file: remove it, or choose another folder"
-}
-
-# replace FILE: writes standard input to FILE. The file is either written completely or not changed. An existing file is replaced by
-# a new file; therefore other hard links of the existing file keep its old contents.
-put() {
-  local new=$folder/.new.$$.${HOSTNAME:-} reason
-  check_ordinary "$1"
-  if ! reason=$({ rm -f -- "$new" && (set -C && cat >"$new") && mv -fT -- "$new" "$1"; } 2>&1); then
-    rm -f -- "$new" 2>/dev/null || true
-    fail 3 "cannot write $1: ${reason##*: }"
-  fi
-}
-
-# Sets `last_line` to the last line of the log of member NAME. The function starts no process, because there can be 100 000 member
-# runs.
-read_last_line() {
-  local lines=()
-  last_line=''
-  [[ -s $folder/$1.log ]] && may_be_ours "$folder/$1.log" || return 0
-  { mapfile -t lines <"$folder/$1.log"; } 2>/dev/null || return 0
-  ((${#lines[@]} == 0)) || last_line=${lines[-1]}
-}
-
-# Prints the last line of the log of member NAME.
-last_words() {
-  local last_line
-  read_last_line "$1"
-  printf '%s\n' "$last_line"
-}
-
-is_finished=': is a finished run, ' # the answer to --resume if a stop rule is met already
-goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line in the log of a member that has not failed
-
-# Returns success if the member run NAME has a finished output file, or an output file from which it can continue. If a member run
-# has failed, its log file states the reason.
-has_data() { [[ -e $folder/$1.h5 || -e $folder/$1.h5.part && $(last_words "$1") =~ $goes_on ]]; }
-
-# If a finished output file is older than the input file, or if a run is extending it, the file is not the result of the present
-# settings.
-is_done() { [[ -e $folder/$1.h5 && ! -e $folder/$1.h5.part && ! $folder/input.nml -nt $folder/$1.h5 ]]; }
-
-# may_continue NAME OVERRIDES: returns success if the program can continue the member run NAME with these settings.
-may_continue() {
-  local arguments=("$input" -o "$folder/$1.h5" --resume --check --quiet) said
-  add_overrides "$2"
-  said=$("$program" "${arguments[@]}" 2>&1 </dev/null) || [[ $said == *"$is_finished"* ]]
-}
-
-has_failed() {
-  local last_line
-  [[ ! -e $folder/$1.h5 ]] || return
-  read_last_line "$1"
-  [[ ! $last_line =~ $goes_on ]]
-}
-
-# Appends an empty line to the log file of the member run NAME. Without the empty line, the last line of the log file could be
-# attributed to the next attempt.
-forget_failure() {
-  local lock
-  has_failed "$1" && open_log "$folder/$1.log" || return 0
-  echo >&"$lock"
-  exec {lock}>&-
-}
-
-# Checks that the member runs of earlier commands in this folder have the same settings. This check is necessary because results are
-# identified only by the names of the member runs.
-remember() {
-  local line name k door='' changed='' mended='' extended=() found=()
-  local -A before=() linked=()
-  if { exec {door}<"$folder"; } 2>/dev/null; then # one command at a time, if the file system supports locks
-    flock -w 60 -E 75 "$door" 2>/dev/null || (($? != 75)) ||
-      fail 3 "$folder is locked by another command: try again later"
-  fi
-  for name in input.nml manifest.txt; do check_ordinary "$folder/$name"; done
-  while IFS= read -r -d '' name; do
-    linked[x$name]=1
-  done < <(find "$folder/" -maxdepth 1 -name '*.log' -links +1 -printf '%f\0' 2>/dev/null)
-  if [[ -e $folder/manifest.txt ]]; then
-    while IFS= read -r line; do before[x${line%%$'\t'*}]=${line#*$'\t'}; done <"$folder/manifest.txt"
-  fi
-  [[ -e $folder/input.nml ]] || found=("${names[@]}") # results from elsewhere are left as they are
-  if [[ -e $folder/input.nml ]] && ! cmp -s -- "$input" "$folder/input.nml"; then
-    [[ -e $folder/manifest.txt ]] ||
-      fail 3 "$folder/input.nml is not the input of an ensemble: choose another folder"
-    mended=1
-    for name in "${!before[@]}"; do
-      has_data "${name#x}" || continue
-      may_continue "${name#x}" "${before[$name]}" ||
-        die "$folder holds members of another input, or of $input before a change (see $folder/input.nml):" \
-          "choose another folder, or remove this one"
-      break
-    done
-  fi
-  for k in "${!names[@]}"; do
-    name=${names[k]}
-    check_ordinary "$folder/$name.log"
-    [[ ! -e $folder/$name.log || -n ${before[x$name]+known} && -z ${linked[x$name.log]:-} ]] ||
-      fail 3 "$folder/$name.log is not a log of this ensemble: remove it, or choose another folder"
-    if [[ ${before[x$name]-${overrides[k]}} != "${overrides[k]}" ]] && has_data "$name"; then
-      may_continue "$name" "${overrides[k]}" ||
-        die "$folder holds a member '$name' with other settings (${before[x$name]}):" \
-          "choose another folder or name"
-      extended+=("$name")
-    fi
-    [[ ${before[x$name]-none} == "${overrides[k]}" ]] || changed=1
-    [[ -z $mended && ${before[x$name]-${overrides[k]}} == "${overrides[k]}" ]] || forget_failure "$name"
-    before[x$name]=${overrides[k]}
-  done
-  cmp -s -- "$input" "$folder/input.nml" || put "$folder/input.nml" <"$input"
-  [[ -z $changed ]] ||
-    for name in "${!before[@]}"; do printf '%s\t%s\n' "${name#x}" "${before[$name]}"; done | sort |
-    put "$folder/manifest.txt" || exit 3
-  for name in "${found[@]}"; do
-    [[ ! -e $folder/$name.h5 || -e $folder/$name.h5.part ]] || touch -- "$folder/$name.h5"
-  done
-  # While a .part file exists, the program is extending the output file and identifies the output file by its modification time;
-  # this time is then not changed.
-  for name in "${extended[@]}"; do
-    [[ ! -e $folder/$name.h5 || -e $folder/$name.h5.part ]] || touch -d @1 -- "$folder/$name.h5"
-  done
-  [[ -z $door ]] || exec {door}<&-
-}
-
 # --- worker processes, which perform the member runs ---
 
 # Appends the overrides of a member run to the array `arguments`. A value in quotes may contain the text ' --set '.
@@ -347,15 +216,6 @@ tell_kill() {
   [[ $2 != 'killed by signal'*twice* ]] || given_up='given up after three attempts: '
   [[ $2 != 'killed by signal'* ]] || how+=', twice'
   printf '%skilled by signal %d%s, %(%FT%T%z)T on %s\n' "$given_up" "$(($1 - 128))" "$how" -1 "$host"
-}
-
-# Opens the log file of a member run with the file descriptor `lock`. The log file must be an ordinary file with a single hard link,
-# and its path must still refer to the opened file.
-open_log() {
-  may_be_ours "$1" && { exec {lock}>>"$1"; } 2>/dev/null || return
-  [[ ! -L $1 && $1 -ef /dev/fd/$lock && $(stat -L -c %h "/dev/fd/$lock") == 1 ]] && return
-  exec {lock}>&-
-  return 1
 }
 
 # Performs all member runs that no other worker process and no other copy of this script performs. Each member run is reserved by a
@@ -610,7 +470,12 @@ exit \$status"
 
 trap 'fail 75 "stopped before any member ran"' TERM INT
 unset CDPATH
-script=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)/${BASH_SOURCE[0]##*/}
+here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
+script=$here/${BASH_SOURCE[0]##*/}
+functions=$(dirname -- "$(realpath -- "${BASH_SOURCE[0]}")")/ensemble_folder.sh # of the file to which a link refers
+[[ -r $functions ]] || die "cannot read $functions, which contains functions of $me: copy it to this place"
+# shellcheck source=runs/ensemble_folder.sh
+. "$functions"
 input='' folder='' seeds='' manifest='' engine=pool hosts='' share='' dry='' tasks='' retry='' task='' jobs=$(nproc 2>/dev/null || echo 1)
 common='' scans=() host=$(uname -n)
 for word; do [[ $word != *[[:cntrl:]]* ]] || die "'$word' contains control characters"; done
@@ -687,7 +552,6 @@ if [[ -n $share ]]; then
   ((${#names[@]} > 0)) || exit 0
 fi
 
-here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 program=${here%/*}/build/ricochet
 [[ ! -x $here/ricochet ]] || program=$here/ricochet # program and script are installed in the same folder
 program=${RICOCHET:-$program}

@@ -22,13 +22,13 @@ completions=share/bash-completion/completions
 declare -A behind
 plan() {
   local text command
-  behind=([bin/ricochet]=$build/ricochet [bin/ricochet-ensemble]=runs/ensemble.sh
+  behind=([bin/ricochet]=$build/ricochet [bin/ricochet-ensemble]="-> ../$shared/runs/ensemble.sh"
     [$completions/ricochet]=docs/ricochet-completion.bash [$completions/ricochet-ensemble]='-> ricochet'
     [$manuals/ricochet.1]='' [$manuals/ricochet-ensemble.1]='' [$module]='' [include/ricochet.h]=src/ricochet.h
     [$shared/post/requirements.txt]=requirements.txt)
   for text in LICENSE README.md CHANGELOG.md CITATION.cff docs/*.{md,png} docs/*/*.{md,png,ipynb} docs/reference/input/*.md; do behind[$documents/$text]=$text; done
   behind[$documents/input]="-> ../../ricochet/input" # pages lead there
-  for text in input/*.* input/pictures/* post/*.* post/ricochet/{,*/}*.* post/page/*.*; do behind[$shared/$text]=$text; done
+  for text in runs/ensemble{,_folder}.sh input/*.* input/pictures/* post/*.* post/ricochet/{,*/}*.* post/page/*.*; do behind[$shared/$text]=$text; done
   for text in libricochet.so libricochet_files.so; do
     [[ -e $build/$text ]] || continue # made by make library
     behind[$package/lib/$text]=$build/$text

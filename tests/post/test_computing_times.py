@@ -6,6 +6,7 @@ import pytest
 import cost
 import scaling
 from ricochet import RunError, read_run
+from ricochet.figures.drawing import plt
 from synthetic_run import drawn, write_run
 
 

@@ -95,6 +95,12 @@ def test_a_tool_that_is_missing_is_told(lab, tool, engine, said):
     assert done.returncode == 2 and said in done.stderr and done.stderr.count("\n") == 1
 
 
+def test_a_script_without_the_file_of_its_functions_says_so(lab):
+    done = ran(shutil.copy(SCRIPT, lab), "gas.nml", "-d", "out", "--seeds", "1", cwd=lab)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
+    assert f"cannot read {lab}/ensemble_folder.sh" in done.stderr
+
+
 def started(lab, *options, members):
     """Start a sweep in which members wait until the file `hold` is removed."""
     before = len(starts(lab))

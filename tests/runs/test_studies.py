@@ -9,7 +9,7 @@ import pytest
 from whole_runs import environment, executable, ran
 
 ROOT = Path(__file__).resolve().parents[2]
-NO_SYSTEM = ("common", "ensemble", "figures", "bench", "memory", "scaling")
+NO_SYSTEM = ("common", "ensemble", "ensemble_folder", "figures", "bench", "memory", "scaling")
 SYSTEMS = sorted(p.stem for p in (ROOT / "runs").glob("*.sh") if p.stem not in NO_SYSTEM)
 
 
