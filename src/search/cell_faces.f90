@@ -254,8 +254,8 @@ contains
   end subroutine set
 
   !> Finds the columns and rows in which a piston may touch disks before the piston has moved by the width of a cell. A disk outside
-  !> of all cells is assigned to an outermost cell. A piston outside of all cells, beyond its own or the opposite side of the box, can
-  !> therefore touch disks that are assigned to the outermost cells.
+  !> of all cells is assigned to an outermost cell. A piston outside of all cells, beyond its own or the opposite side of the box,
+  !> can therefore touch disks that are assigned to the outermost cells.
   pure subroutine find_strips(self, box, small, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box

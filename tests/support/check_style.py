@@ -24,6 +24,7 @@ MOST_LINES_OF_FILE = 600
 MOST_LINES_OF_PROCEDURE = 60
 MOST_ARGUMENTS = 7
 MOST_FILES_OF_FOLDER = 15
+CODE = {".F90", ".c", ".f90", ".js", ".pf", ".py", ".sh"}
 ARROWS = re.compile(r"^ *(\w+) *--> *(\w+(?: *& *\w+)*) *$", re.MULTILINE)
 UNIT = re.compile(r"\s*(?:module|program|(submodule)\s*\(\w+\))\s+(\w+)\s*$")
 USE = re.compile(r"\s*use(?:\s*,\s*intrinsic\s*::)?\s+(\w+)\s*(,\s*only\s*:)?")
@@ -137,8 +138,9 @@ def imports_of(path: Path, package: Path) -> Iterator[tuple[int, str]]:
 
 
 def length_problems(root: Path) -> Iterator[Problem]:
-    """Return the Python files in `post/` that are too long."""
-    for path in sorted((root / "post").rglob("*.py")):
+    """Return the files of code outside `src/` that are too long."""
+    paths = [path for name in ("post", "runs", "tests") for path in (root / name).rglob("*.*")]
+    for path in sorted(path for path in paths if path.suffix in CODE):
         if (count := len(path.read_text().splitlines())) > MOST_LINES_OF_FILE:
             what = f"more than {MOST_LINES_OF_FILE} lines"
             yield Problem(path.relative_to(root), count, what)

@@ -313,6 +313,16 @@ def test_words_of_python_pages_and_helps_are_looked_at(tmp_path):
 
 
 @pytest.mark.parametrize(("lines", "expected"), [(600, []), (601, ["more than 600 lines"])])
+@pytest.mark.parametrize("name", ["runs/study.sh", "tests/post/test_x.py", "tests/unit/test_x.pf"])
+def test_a_file_of_tests_or_runs_has_at_most_600_lines(tmp_path, name, lines, expected):
+    path = tmp_path / name
+    path.parent.mkdir(parents=True)
+    path.write_text("\n" * lines)
+    problems = [f"{name}:{lines}: {words}" for words in expected]
+    assert style_problems(tmp_path, MODULE) == problems
+
+
+@pytest.mark.parametrize(("lines", "expected"), [(600, []), (601, ["more than 600 lines"])])
 def test_a_python_file_of_the_scripts_has_at_most_600_lines(tmp_path, lines, expected):
     path = tmp_path / "post" / "ricochet" / "analysis" / "means.py"
     path.parent.mkdir(parents=True)
