@@ -281,6 +281,11 @@ GENERIC = ("speeds", "snapshot", "animate", "energy", "trajectory", "export", "p
 SETTLED = ("correlations", "equation_of_state", "rates", "melting", "transport")
 SOON = ("--equilibration", "1", "--min-separation", "1")
 FROM_HEIGHT = {"gravity": SOON[:2], "driven": ("--show", "height")}
+REFILLED = """&box gravity = 0, -1 / &wall from = 0, 0.6 to = 0.4, 0.4 /
+&wall from = 1, 0.6 to = 0.6, 0.4 / &species count = 30 radius = 0.02 region = 0, 1, 0.7, 1 /
+&drive kind = 'recycle' interval = 0.05 velocity = 0, -0.5 from_region = 0, 1, 0, 0.3
+to_region = 0, 1, 0.7, 1 / &contact restitution = 0.9 contact_time = 1e-4 /
+"""
 #: Inputs, and the scripts (with options) that draw their runs.
 RUNNING = [
     ([MIXTURE.split("&contact")[0] + SHORT], dict.fromkeys(GENERIC, ()) | {"mixture": SOON}),
@@ -292,6 +297,7 @@ RUNNING = [
     ([BULK + ROUGH + SHORT], {"rough": ()}),
     ([BULK + "&contact restitution = 0.9 /\n" + SHORT], {"haff": ()}),
     ([PAIR.format(x) + LONGER for x in (0.3, 0.300001)], {"lyapunov": ("--largest", "0.1")}),
+    ([REFILLED + SHORT], {"discharge": ("--after", "0")}),
     ([LORENTZ + LONGER], {"lorentz": ("--lags", "1", "3")}),
     ([FALLING + SHORT, FALLING + STEPS + SHORT], {"missed": SOON[:2]}),
 ]
