@@ -191,7 +191,8 @@ The tables of this section show how often the error bars of the scripts contain 
 are written by `python tests/coverage_tables.py`. The systems and quantities were chosen before the
 first run. The seeds of the tables were not used to improve the estimators, with two exceptions.
 These seeds showed that the errors of the flow and of the slopes under gravity were wrong. The rows
-of these two quantities were measured again with corrected estimators.
+of these two quantities were measured again with corrected estimators. Curves against
+time of cooling gases are compared at one time for all groups.
 
 An error bar belongs to a single run, or to a group of runs if the name of the system states a
 number of runs. The columns are:
