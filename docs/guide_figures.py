@@ -5,8 +5,7 @@
 The script executes the blocks of code of the guides with the given names, or of all guides, as
 tests/runs/test_pages.py does, but without the replacements that make runs short.  A guide that
 shows the picture `NAME.png` makes the figure `runs/NAME.png`; the script stores it beside the
-page, with fewer pixels and colours.  The folder of the runs and the printed tables are kept if
-the variable GUIDE_RUNS names a folder.
+page, with fewer pixels and colours.  The runs are kept if the variable GUIDE_RUNS names a folder.
 """
 
 import os
