@@ -45,6 +45,7 @@ module cell_grid
     procedure :: take_out
     procedure :: predict_with_care                 ! type-bound, so that the compiler does not inline the procedure
     procedure :: read_ahead
+    procedure, private :: find_event_of_big        ! type-bound for the same reason
     procedure, private :: cross_with_care
     procedure, private :: follow_big
     procedure, private :: list
@@ -510,7 +511,7 @@ contains
     near%disk = i
     known = merge(latest_clock, 0, has_collided) + merge(0, no_gravity, self%faces%falling)
     if (sim%disk(i)%radius > self%patch%small) then
-      call find_event_of_big()
+      call self%find_event_of_big(sim, known, near)
     else if (.not. self%patch%holds(sim%tag(i)%cell)) then
       call self%take_out(sim%tag(i), i)
       sim%disk(i)%collision_counter = sim%disk(i)%collision_counter + 1
@@ -522,27 +523,32 @@ contains
     sim%disk(i)%event_time = near%time
     sim%disk(i)%partner = near%partner
     sim%tag(i)%partner_counter = sim%disk(max(near%partner, 1))%collision_counter
-  contains
+  end subroutine predict_with_care
 
-    !> Finds the earliest event of a big disk: a collision with a side, an obstacle, another big disk or a small disk in the cells
-    !> along its boundary, or its departure from the margin around its reference position.
-    subroutine find_event_of_big()
-      real(real64) :: t_margin
-      integer(int32) :: number, image
+  !> Finds the earliest event of a big disk: a collision with a side, an obstacle, another big disk or a small disk in the cells
+  !> along its boundary, or its departure from the margin around its reference position.
+  subroutine find_event_of_big(self, sim, known, near)
+    class(cell_grid_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: known            !! as in `earliest_contact`
+    type(prediction_t), intent(inout) :: near
+    real(real64) :: t_margin
+    integer(int32) :: number, image
 
+    associate (i => near%disk)
       number = self%reach%number_of(i)
       call next_side(sim%box, sim%disk(i), near%time, near%partner)
       call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%last_partner, self%reach%big(number)%obstacles, near%time, near%partner)
       t_margin = sim%now + time_to_circle(sim%position(i) - self%reach%big(number)%centre, sim%velocity(i), &
         sim%box%gravity, self%reach%margin, inside=.true.)
-      if (t_margin < near%time) near%partner = looks_again
-      near%time = min(near%time, t_margin)
-      do image = 1, self%images%count()
-        call scan_disks(sim, self%reach%big%disk, self%images%image(self%images%around(image)), known, near)
-      end do
-      call scan_rim(self%cells, sim, self%reach%big(number)%rim, self%images, known, near)
-    end subroutine find_event_of_big
-  end subroutine predict_with_care
+    end associate
+    if (t_margin < near%time) near%partner = looks_again
+    near%time = min(near%time, t_margin)
+    do image = 1, self%images%count()
+      call scan_disks(sim, self%reach%big%disk, self%images%image(self%images%around(image)), known, near)
+    end do
+    call scan_rim(self%cells, sim, self%reach%big(number)%rim, self%images, known, near)
+  end subroutine find_event_of_big
 
   !> Finds the earliest event of a small disk.
   subroutine find_event_of_small(self, sim, known, near)
