@@ -157,7 +157,13 @@ const fromWorker = {
     stream.live = moment.time === last();
     if (stream.live && !parent.isComparing()) send({ do: 'play' });
   },
-  rest() { send({ do: 'pause' }); if (stream.live && !parent.isComparing()) show(last(), true); },  // the newest frame is shown
+  // The newest frame is shown. Frames that the pause keeps from being drawn are confirmed, too, because the worker process would
+  // otherwise wait for them and ignore the next step.
+  rest() {
+    send({ do: 'pause' });
+    if (stream.live && !parent.isComparing()) show(last(), true);
+    drawn();
+  },
   // A step beyond the last received frame is computed by the worker process.
   goOn(what) {
     play(false);
