@@ -23,8 +23,8 @@ GROUPS = {
     "side": "A side of the box that is a wall, with its motion "
     "([theory](../../explanation/theory.md#sides-that-move)); one group for each side that is "
     "described. Its collision rule is described under [boundaries](boundaries.md).",
-    "obstacle": "A circular obstacle or an arc, or many of them from a file; repeated for each. Its "
-    "collision rule is described under [boundaries](boundaries.md).",
+    "obstacle": "A circular obstacle or an arc, or many of them from a file; repeated for each. "
+    "Its collision rule is described under [boundaries](boundaries.md).",
     "wall": "A straight wall, a polyline, or many walls from a file; repeated for each. Disks "
     "bounce off both faces and off the end points. Its collision rule is described under "
     "[boundaries](boundaries.md).",

@@ -64,7 +64,8 @@ def measure(folder: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def main() -> None:
-    target = Path(sys.argv[1] if len(sys.argv) > 1 else ROOT / "docs" / "guides" / "event_chains.png")
+    shown = ROOT / "docs" / "guides" / "event_chains.png"
+    target = Path(sys.argv[1] if len(sys.argv) > 1 else shown)
     with tempfile.TemporaryDirectory() as folder:
         chains, dynamics = measure(Path(folder))
     figure = Figure(figsize=(6, 4), layout="constrained")

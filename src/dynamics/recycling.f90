@@ -35,7 +35,7 @@ contains
 
     sim%kicks = sim%kicks + 1
     n = sim%n_disks()
-    due = disks_due(sim)
+    call list_disks_due(sim, due)
     allocate (moved(size(due)))
     n_moved = 0
     if (size(due) > 0) packing = present_packing(sim, size(due))
@@ -83,10 +83,10 @@ contains
     end associate
   end function is_due
 
-  !> Indices of the disks that are recycled at the present time, in the order of their ids.
-  pure function disks_due(sim) result(due)
+  !> Lists the disks that are recycled at the present time, in the order of their ids.
+  pure subroutine list_disks_due(sim, due)
     type(simulation_t), intent(in) :: sim
-    integer(int32), allocatable :: due(:)
+    integer(int32), allocatable, intent(out) :: due(:)
     integer(int32), allocatable :: index_of(:)               ! index of each disk that is due, by id; 0 for all other disks
     integer(int32) :: i, n
 
@@ -99,7 +99,7 @@ contains
     end do
     allocate (due(n))
     due = pack(index_of, index_of > 0)
-  end function disks_due
+  end subroutine list_disks_due
 
   !> All disks at their present positions, with room for more disks in the region to which disks move.
   function present_packing(sim, more) result(packing)

@@ -45,7 +45,7 @@ module cell_grid
     procedure :: take_out
     procedure :: predict_with_care                 ! type-bound, so that the compiler does not inline the procedure
     procedure :: read_ahead
-    procedure, private :: find_event_of_big        ! type-bound for the same reason
+    procedure, private :: find_event_of_big        ! as above
     procedure, private :: cross_with_care
     procedure, private :: follow_big
     procedure, private :: list
@@ -202,8 +202,7 @@ contains
     call self%lists%enter(i, self%cells, self%patch, sim%tag(i)%cell)
   end subroutine list
 
-  !> Marks a cell if disks in the cell may touch obstacles, big disks or periodic images, or if the cell contains big disks.
-  !> Predictions for disks in a marked cell need the general procedure.
+  !> Marks a cell whose disks need the general procedure: they may touch obstacles, big disks or periodic images, or are big.
   subroutine mark(self, cell)
     class(cell_grid_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -420,8 +419,7 @@ contains
     call self%lists%copy_list(near)
   end subroutine survey_list
 
-  !> Predicts the next events of two disks in unmarked cells. The crossings of faces and the candidates are first determined for
-  !> both disks, because these operations do not depend on the tests of candidates.
+  !> Predicts the next events of two disks in unmarked cells. The tests of candidates begin when both disks have their candidates.
   subroutine predict_two(self, box, disk, tag, now, known, pair)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -525,29 +523,26 @@ contains
     sim%tag(i)%partner_counter = sim%disk(max(near%partner, 1))%collision_counter
   end subroutine predict_with_care
 
-  !> Finds the earliest event of a big disk: a collision with a side, an obstacle, another big disk or a small disk in the cells
-  !> along its boundary, or its departure from the margin around its reference position.
+  !> Finds the earliest event of a big disk: a collision, or its departure from the margin around its reference position.
   subroutine find_event_of_big(self, sim, known, near)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prediction_t), intent(inout) :: near
     real(real64) :: t_margin
-    integer(int32) :: number, image
+    integer(int32) :: image
 
-    associate (i => near%disk)
-      number = self%reach%number_of(i)
+    associate (i => near%disk, big => self%reach%big(self%reach%number_of(near%disk)))
       call next_side(sim%box, sim%disk(i), near%time, near%partner)
-      call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%last_partner, self%reach%big(number)%obstacles, near%time, near%partner)
-      t_margin = sim%now + time_to_circle(sim%position(i) - self%reach%big(number)%centre, sim%velocity(i), &
-        sim%box%gravity, self%reach%margin, inside=.true.)
+      call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%last_partner, big%obstacles, near%time, near%partner)
+      t_margin = sim%now + time_to_circle(sim%position(i) - big%centre, sim%velocity(i), sim%box%gravity, self%reach%margin, .true.)
+      if (t_margin < near%time) near%partner = looks_again
+      near%time = min(near%time, t_margin)
+      do image = 1, self%images%count()
+        call scan_disks(sim, self%reach%big%disk, self%images%image(self%images%around(image)), known, near)
+      end do
+      call scan_rim(self%cells, sim, big%rim, self%images, known, near)
     end associate
-    if (t_margin < near%time) near%partner = looks_again
-    near%time = min(near%time, t_margin)
-    do image = 1, self%images%count()
-      call scan_disks(sim, self%reach%big%disk, self%images%image(self%images%around(image)), known, near)
-    end do
-    call scan_rim(self%cells, sim, self%reach%big(number)%rim, self%images, known, near)
   end subroutine find_event_of_big
 
   !> Finds the earliest event of a small disk.

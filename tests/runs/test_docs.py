@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from check_docstrings import members_of
-from check_examples import examples_of
 from ricochet import Run, packages
 from synthetic_run import ROOT, write_run
 from whole_runs import differences, environment, ran
@@ -272,39 +271,6 @@ def test_the_script_of_a_recipe_works(tmp_path):
     assert (tmp_path / "fastest.png").exists()
 
 
-def carried_out(page, heading):
-    """Execute the Python example below a heading of a page; return the variables of the example."""
-    (code,) = examples_of(f"{heading}\n{section(page, heading)}")
-    variables: dict = {}
-    exec(code, variables)
-    return variables
-
-
-def test_two_disks_meet_again_only_after_collisions_with_others():
-    found = carried_out("output", "### How soon the same disks collide again")
-    between, met = found["between"], found["met"]
-    assert min(between) == 1 and between.total() + len(met) == 20000
-    assert sum(found["collisions"].values()) == 2 * 20000
-    assert 0.3 < sum(between[k] for k in range(5)) / 20000 < 0.5
-
-
-def test_a_simulation_stops_when_the_tracer_reaches_the_side():
-    found = carried_out("output", "### A stop at a chosen event")
-    times = found["times"]
-    assert len(set(times)) == 20 and max(times) < 1000
-    assert min(times) > (1 - 0.03) / 10  # the distance at ten times the thermal velocity
-
-
-def test_a_thermostat_at_collisions_sets_the_temperature_and_conserves_momentum():
-    found = carried_out("output", "### A thermostat that acts at collisions")
-    box, kt = found["box"], []
-    for _ in range(60):
-        box.advance_by(collisions=50, on_event=found["redraw"])
-        kt.append(box.observable("all/temperature") / (1 - 1 / box.n_disks))
-    assert np.mean(kt) == pytest.approx(1, abs=0.08)  # five standard errors
-    assert box.observable("momentum") == pytest.approx(np.zeros(2), abs=1e-11)
-
-
 def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path):
     lines = section("output", "## Reading it").splitlines()
     code = "\n".join(line[4:] for line in lines if line.startswith("    "))
@@ -382,17 +348,6 @@ def test_the_code_that_the_page_on_output_shows_finds_what_disks_carry(program, 
     code += "assert temperature.shape == (8,)\n"
     said = ran(sys.executable, "-c", code, cwd=tmp_path, env=own)
     assert said.returncode == 0 and "mean=" in said.stdout, said.stderr
-
-
-def test_the_code_that_the_page_on_laws_shows_finds_the_exponent_of_the_stadium(tmp_path):
-    """The exponent of 20000 collisions differs by a few per cent from the published 0.43."""
-    page = section("laws", "## Laws").partition("**Billiards.**")[2].partition("**Diffusion.**")[0]
-    code = "".join(line[4:] for line in page.splitlines(True) if line.startswith("    "))
-    (tmp_path / "input").symlink_to(ROOT / "input")
-    own = environment(PYTHONPATH=ROOT / "post")
-    said = ran(sys.executable, "-c", code, cwd=tmp_path, env=own)
-    assert said.returncode == 0, said.stderr
-    assert abs(float(said.stdout.split()[-1]) - 0.43) < 0.02
 
 
 def test_there_is_one_version(program):

@@ -101,9 +101,9 @@ conditions. A number in parentheses is the standard error of the last digit.
 - **P15-13, Maxwell's demon.** The threshold, here a floor velocity of 0.73, is derived for many
   dilute grains. The 120 disks of the case distribute evenly from about 0.65 on. 600 disks with a
   fifth of the diameter are still separated at this velocity.
-- **P15-20, effusion.** The rate of the reference holds for an opening that is much narrower than the
-  mean free path and than the chamber. It is 1.9(6) % higher for an opening of 0.05 of the chamber,
-  and 5.4(6) % higher if the opening is 0.2 mean free paths wide besides.
+- **P15-20, effusion.** The rate of the reference holds for an opening that is much narrower than
+  the mean free path and than the chamber. It is 1.9(6) % higher for an opening of 0.05 of the
+  chamber, and 5.4(6) % higher if the opening is 0.2 mean free paths wide besides.
 - **P15-21, discharge of a hopper.** The tolerance is that of the literature, k between 1 and 2. The
   values of k and of the exponent were each fitted with the other one fixed, because they are
   strongly correlated. Smooth grains do not obey the law: 2000 of them have an exponent of 1.29(3)

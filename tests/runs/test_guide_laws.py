@@ -1,0 +1,50 @@
+"""Laws that the results of the Python examples of the guides must fulfil."""
+
+import re
+
+import numpy as np
+import pytest
+
+from synthetic_run import ROOT
+
+
+def carried_out(guide, heading):
+    """Execute the Python example below a heading of a guide; return its variables."""
+    text = (ROOT / "docs" / "guides" / f"{guide}.md").read_text()
+    after = text.partition(f"\n{heading}\n")[2]
+    variables: dict = {}
+    exec(re.search(r"```python\n(.*?)```", after, re.S)[1], variables)
+    return variables
+
+
+def test_two_disks_meet_again_only_after_collisions_with_others():
+    found = carried_out("functions-of-events", "## How soon the same disks collide again")
+    between, met = found["between"], found["met"]
+    assert min(between) == 1 and between.total() + len(met) == 20000
+    assert sum(found["collisions"].values()) == 2 * 20000
+    assert 0.3 < sum(between[k] for k in range(5)) / 20000 < 0.5
+
+
+def test_a_simulation_stops_when_the_tracer_reaches_the_side():
+    found = carried_out("functions-of-events", "## A stop at a chosen event")
+    times = found["times"]
+    assert len(set(times)) == 20 and max(times) < 1000
+    assert min(times) > (1 - 0.03) / 10  # the distance at ten times the thermal velocity
+
+
+def test_a_thermostat_at_collisions_sets_the_temperature_and_conserves_momentum():
+    found = carried_out("functions-of-events", "## A thermostat that acts at collisions")
+    box, kt = found["box"], []
+    for _ in range(60):
+        box.advance_by(collisions=50, on_event=found["redraw"])
+        kt.append(box.observable("all/temperature") / (1 - 1 / box.n_disks))
+    assert np.mean(kt) == pytest.approx(1, abs=0.08)  # five standard errors
+    assert box.observable("momentum") == pytest.approx(np.zeros(2), abs=1e-11)
+
+
+def test_the_event_log_of_a_stadium_contains_its_lyapunov_exponent(monkeypatch):
+    """The exponent of 20000 collisions differs by a few per cent from the published 0.43."""
+    monkeypatch.chdir(ROOT)
+    found = carried_out("billiards", "## Stadium and mushroom")
+    log = found["log"]
+    assert abs(found["growth"] / (log.time[-1] - log.time[0]) - 0.43) < 0.02
