@@ -1,6 +1,6 @@
 """Draw how a melting crystal reaches equilibrium: event chains against event-driven dynamics.
 
-    python tests/relaxation_time.py [docs/guides/event_chains.png]
+    python tests/relaxation_time.py [docs/explanation/event_chains.png]
 
 All runs start from the same lattice of 256 disks at packing 0.702, where the equilibrium is a
 liquid with large ordered patches.  The figure shows the global bond-orientational order, averaged
@@ -64,7 +64,7 @@ def measure(folder: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def main() -> None:
-    shown = ROOT / "docs" / "guides" / "event_chains.png"
+    shown = ROOT / "docs" / "explanation" / "event_chains.png"
     target = Path(sys.argv[1] if len(sys.argv) > 1 else shown)
     with tempfile.TemporaryDirectory() as folder:
         chains, dynamics = measure(Path(folder))

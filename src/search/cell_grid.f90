@@ -54,8 +54,7 @@ module cell_grid
 
 contains
 
-  !> Chooses the cells, inserts the disks, and lists the obstacles and big disks that reach into each cell. The lists of obstacles
-  !> are kept if the cells have not changed, which saves time for few disks among many obstacles.
+  !> Chooses the cells, and lists the disks and obstacles in each cell. If the cells are as before, the obstacles remain listed.
   subroutine build(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

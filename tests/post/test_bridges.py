@@ -336,9 +336,9 @@ def test_what_cannot_be_exchanged_is_answered_in_one_line(simulated, tmp_path, m
 
 
 def examples(heading: str) -> list[str]:
-    """Return the Python examples below a heading of the page on output."""
-    page = (ROOT / "docs" / "reference" / "output.md").read_text()
-    return examples_of(page.partition(f"\n### {heading}\n")[2].partition("\n#")[0])
+    """Return the Python examples below a heading of the guide to other programs."""
+    page = (ROOT / "docs" / "guides" / "other-programs.md").read_text()
+    return examples_of(page.partition(f"\n## {heading}\n")[2].partition("\n#")[0])
 
 
 @pytest.fixture

@@ -227,6 +227,7 @@ if os.fork() == 0:  # what a thread steps that the child does not have is closed
         os._exit(0 if "closed" in str(error) else 1)
     os._exit(0)
 assert os.waitstatus_to_exitcode(os.wait()[1]) == 0
+gas = Simulation({GAS!r}, {ENDLESS})
 other = threading.Thread(target=gas.advance, kwargs={{"events": 10**6}})
 other.start()
 gas.advance(events=10**6)  # two threads, one simulation

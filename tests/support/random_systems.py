@@ -492,7 +492,7 @@ class Draw:
         if not (self.driven or self.sheared or self.worked):
             words += self.maybe(0.3, f"energy_fraction = {rng.uniform(0.05, 0.95)!r}")
             if self.loses and not (self.bouncing or self.steps):
-                words += self.maybe(0.5, " at_rest = .true.")
+                words += self.maybe(0.9, " at_rest = .true.")
         if self.chance(0.3) or self.steps or self.driven or self.drifts or self.disks < 4:
             words += f" time = {rng.uniform(0.01, 1) * min(self.edges) / self.speed!r}"
         return words + " /"
