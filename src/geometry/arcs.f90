@@ -7,9 +7,8 @@
 !> window. Rounding errors can therefore hide a contact only where a face meets an end, and the contact with the end is then found.
 module arcs
   use free_flight, only: flight, later_time_to_circle, time_to_circle
-  use images, only: images_t
   use kinds, only: never, pi, real64
-  use shapes, only: from_nearest_outline, magnitude, shape_t, spare
+  use shapes, only: magnitude, shape_t, spare
   implicit none
   private
   public :: arc_t, new_arc
@@ -26,7 +25,6 @@ module arcs
     logical :: is_large = .false.               !! .true. if the arc is more than half of the circle
     logical :: is_closed = .false.              !! .true. if the arc is the whole circle
   contains
-    procedure :: from_nearest
     procedure :: direction
     procedure :: is_concave_at
     procedure :: contact_time
@@ -121,17 +119,6 @@ contains
     point = self%centre + self%radius*self%end_direction(:, k)
   end function end_point
 
-  !> Vector to the point x from the middle of the nearest periodic image of the arc.
-  pure function from_nearest(self, x, images, heading) result(d)
-    class(arc_t), intent(in) :: self
-    real(real64), intent(in) :: x(2)
-    type(images_t), intent(in) :: images
-    real(real64), intent(in), optional :: heading(2)
-    real(real64) :: d(2)
-
-    d = from_nearest_outline(self, x, images, heading)
-  end function from_nearest
-
   !> Tangential velocity of the surface at a point of contact, if the surface moves counter-clockwise along the arc with unit speed.
   !> The result is the unit tangent vector of the circle at the nearest point of the arc, without its component along the normal of
   !> the surface. At the rounded ends of the arc the surface therefore moves more slowly than along the arc.
@@ -202,9 +189,9 @@ contains
       t = never
     end function time_to_face
 
-    !> Whether a disk on a straight path moves away from a point, or at a right angle to the vector from the point, up to rounding
-    !> errors. The disk then does not collide with a circle around the point, even if the disk touches the circle. Without this
-    !> rule, rounding errors after a collision could cause a second collision with the same face or end.
+    !> Whether the distance of a disk on a straight path from a point does not decrease, within rounding errors. The disk then does
+    !> not collide with a circle around the point, even if the disk touches the circle. Without this rule, rounding errors after a
+    !> collision could cause a second collision with the same face or end.
     pure function grazes(from) result(yes)
       real(real64), intent(in) :: from(2)       !! vector from the point to the centre of the disk [length]
       logical :: yes

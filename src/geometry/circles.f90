@@ -1,7 +1,8 @@
 !> Circular obstacles. The disks are either outside the circle or inside the circle.
 module circles
   use free_flight, only: time_to_circle
-  use kinds, only: pi, real64
+  use images, only: images_t
+  use kinds, only: never, pi, real64
   use shapes, only: magnitude, shape_t, spare
   implicit none
   private
@@ -10,6 +11,7 @@ module circles
   type, extends(shape_t) :: circle_t
     real(real64) :: radius = 0.0_real64         !! [length]
   contains
+    procedure :: from_nearest
     procedure :: contact_time
     procedure :: gap
     procedure :: normal
@@ -37,6 +39,28 @@ contains
     circle%circumradius = radius
     circle%area = pi*radius**2
   end function new_circle
+
+  !> Vector to the point x from the middle of the nearest periodic image of the circle. Circles that enclose disks have no
+  !> images. If x is at equal distances from two images, a disk at x may touch both images. To choose between two equally distant
+  !> images, the vector `heading` is used: along the axis of the period, the components of the result and of `heading` have the same
+  !> sign.
+  pure function from_nearest(self, x, images, heading) result(d)
+    class(circle_t), intent(in) :: self
+    real(real64), intent(in) :: x(2)            !! [length]
+    type(images_t), intent(in) :: images        !! images of the box
+    real(real64), intent(in), optional :: heading(2)
+    real(real64) :: d(2)
+    integer :: axis
+
+    d = x - self%middle
+    if (.not. self%encloses) d = d + images%shift(images%nearest_image(d))
+    if (self%encloses .or. .not. present(heading)) return
+    do axis = 1, 2
+      if (.not. (images%period(axis) < never .and. d(axis)*heading(axis) < 0)) cycle
+      if (abs(d(axis)) > 0.5_real64*images%period(axis) - spare**2*(images%period(axis) + abs(x(axis)))) &
+        d(axis) = d(axis) - sign(images%period(axis), d(axis))
+    end do
+  end function from_nearest
 
   !> Distance between the centre of the circle and the centre of a disk that touches the circle.
   pure function distance_at_contact(self, radius) result(rho)

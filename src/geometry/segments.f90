@@ -6,9 +6,8 @@
 !> contact only where a straight side meets a half circle; the contact with the half circle is then found.
 module segments
   use free_flight, only: flight, time_to_circle, time_to_line
-  use images, only: images_t
   use kinds, only: never, real64
-  use shapes, only: from_nearest_outline, magnitude, shape_t, spare
+  use shapes, only: magnitude, shape_t, spare
   implicit none
   private
   public :: segment_t, new_segment
@@ -18,7 +17,6 @@ module segments
     real(real64) :: along(2) = [1.0_real64, 0.0_real64]   !! unit vector along the wall
     real(real64) :: length = 0.0_real64         !! half the length of the wall [length]
   contains
-    procedure :: from_nearest
     procedure :: direction
     procedure :: contact_time
     procedure :: gap
@@ -55,18 +53,6 @@ contains
 
     along = self%along - dot_product(self%along, normal)*normal
   end function direction
-
-  !> Vector to the point x from the middle of the nearest periodic image of the wall. The nearest image of a long wall is not always
-  !> the image whose middle is nearest to x.
-  pure function from_nearest(self, x, images, heading) result(d)
-    class(segment_t), intent(in) :: self
-    real(real64), intent(in) :: x(2)
-    type(images_t), intent(in) :: images
-    real(real64), intent(in), optional :: heading(2)
-    real(real64) :: d(2)
-
-    d = from_nearest_outline(self, x, images, heading)
-  end function from_nearest
 
   !> Time until a disk touches the wall.
   pure function contact_time(self, d, v, g, radius, within) result(s)

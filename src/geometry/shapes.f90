@@ -2,10 +2,10 @@
 !> observables use only this interface, and therefore do not depend on whether an obstacle is a circle or a straight wall.
 module shapes
   use images, only: images_t
-  use kinds, only: never, real64
+  use kinds, only: real64
   implicit none
   private
-  public :: shape_t, from_nearest_outline, magnitude, spare
+  public :: shape_t, magnitude, spare
 
   !> Relative safety margin, larger than all rounding errors. If rounding errors make the result of a test uncertain, a test with
   !> this margin returns the safe result.
@@ -105,54 +105,34 @@ contains
     magnitude = sqrt(v(1)*v(1) + v(2)*v(2))
   end function magnitude
 
-  !> Vector to the point x from the middle of the nearest periodic image of the obstacle. Obstacles that enclose disks have no
-  !> images. If x is at equal distances from two images, a disk at x may touch both images. To choose between two equally distant
-  !> images, the vector `heading` is used: along the axis of the period, the components of the result and of `heading` have the same
-  !> sign.
+  !> Vector to the point x from the middle of the nearest periodic image of the obstacle. The nearest image of a long wall is not
+  !> always the image whose middle is nearest to x. The distances of x from the outlines of all images are therefore compared. If x
+  !> is at equal distances from two images, a disk at x may touch both images. To choose between two equally distant images, the
+  !> vector `heading` is used: the angle between `heading` and the normal of the chosen image is the smallest.
   pure function from_nearest(self, x, images, heading) result(d)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
     type(images_t), intent(in) :: images        !! images of the box
     real(real64), intent(in), optional :: heading(2)
-    real(real64) :: d(2)
-    integer :: axis
-
-    d = x - self%middle
-    if (.not. self%encloses) d = d + images%shift(images%nearest_image(d))
-    if (self%encloses .or. .not. present(heading)) return
-    do axis = 1, 2
-      if (.not. (images%period(axis) < never .and. d(axis)*heading(axis) < 0)) cycle
-      if (abs(d(axis)) > 0.5_real64*images%period(axis) - spare**2*(images%period(axis) + abs(x(axis)))) &
-        d(axis) = d(axis) - sign(images%period(axis), d(axis))
-    end do
-  end function from_nearest
-
-  !> Like `from_nearest`, for an outline whose nearest image is not always the image whose middle is nearest to x. The distances of
-  !> x from the outlines of all images are compared.
-  pure function from_nearest_outline(shape, x, images, heading) result(d)
-    class(shape_t), intent(in) :: shape
-    real(real64), intent(in) :: x(2)            !! [length]
-    type(images_t), intent(in) :: images
-    real(real64), intent(in), optional :: heading(2)
     real(real64) :: d(2), nearest(2), candidate(2), touching
     integer :: k
 
-    nearest = x - shape%middle
+    nearest = x - self%middle
     nearest = nearest + images%shift(images%nearest_image(nearest))
     d = nearest
     do k = 1, images%count()
       candidate = nearest + images%shift(images%around(k))
-      if (shape%gap(candidate, 0.0_real64) < shape%gap(d, 0.0_real64)) d = candidate
+      if (self%gap(candidate, 0.0_real64) < self%gap(d, 0.0_real64)) d = candidate
     end do
     if (.not. present(heading)) return
-    touching = shape%gap(d, 0.0_real64)
-    touching = touching + spare**2*(touching + shape%circumradius + maxval(abs(x)))
+    touching = self%gap(d, 0.0_real64)
+    touching = touching + spare**2*(touching + self%circumradius + maxval(abs(x)))
     do k = 1, images%count()
       candidate = nearest + images%shift(images%around(k))
-      if (shape%gap(candidate, 0.0_real64) > touching) cycle
-      if (dot_product(heading, shape%normal(candidate, heading)) > dot_product(heading, shape%normal(d, heading))) d = candidate
+      if (self%gap(candidate, 0.0_real64) > touching) cycle
+      if (dot_product(heading, self%normal(candidate, heading)) > dot_product(heading, self%normal(d, heading))) d = candidate
     end do
-  end function from_nearest_outline
+  end function from_nearest
 
   !> Unit tangent vector at the point of contact with a disk. The tangent vector points counter-clockwise around the middle of the
   !> obstacle.
