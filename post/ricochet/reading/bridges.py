@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 import numpy as np
 
 from .arrays import Index, chosen
-from .files import RunError, destination
+from .files import RunError, destination, optional_package
 from .nature import Refused
 from .reader import Run
 
@@ -125,15 +125,6 @@ def refuse_sheared(run: Run, kind: str) -> None:
 # --- GSD ---
 
 
-def gsd_package(user: str) -> Any:
-    """Import the module `gsd.hoomd`, or raise an ImportError with the command that installs it."""
-    try:
-        import gsd.hoomd
-    except ImportError:
-        raise ImportError(f"{user} needs a package: pip install gsd") from None
-    return gsd.hoomd
-
-
 def write_gsd(
     run: Run, path: str | Path, frames: Index | None = None, precision: str = "double"
 ) -> Path:
@@ -174,7 +165,7 @@ def write_gsd(
     >>> path is None or bool(ricochet.bridges.read_gsd(path).time == run.time[-1])
     True
     """
-    package, path = gsd_package("write_gsd"), destination(Path(path))
+    package, path = optional_package("gsd.hoomd", "write_gsd"), destination(Path(path))
     refuse_sheared(run, "GSD")
     if precision not in ("double", "single"):
         raise ValueError(f"precision: {precision!r} is neither 'double' nor 'single'")
@@ -215,8 +206,8 @@ def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
 
     If the file was not written by `write_gsd`, the axes are periodic, the origin is at the centre
     of the box, and the time is the step of the frame.  Other programs often write positions in
-    single precision.  Disks that touch may then overlap by rounding errors, and the program refuses
-    a start with overlaps; radii that are multiplied by 1 - 1e-6 do not overlap.
+    single precision.  Rounding errors of these positions can make touching disks overlap, and the
+    program refuses such a start.  Multiply the radii by 1 - 1e-6 to prevent overlaps.
 
     Parameters
     ----------
@@ -244,7 +235,7 @@ def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
     >>> bool(np.all(disks["radius"] == run.radius))
     True
     """
-    package, path = gsd_package("read_gsd"), Path(path)
+    package, path = optional_package("gsd.hoomd", "read_gsd"), Path(path)
     try:
         with package.open(str(path), "r") as file:
             count = len(file)

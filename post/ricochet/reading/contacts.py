@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import scipy
 
-from .files import RunError
+from .files import RunError, optional_package
 from .reader import Run
 
 if TYPE_CHECKING:
@@ -90,10 +90,7 @@ class ContactNetwork(NamedTuple):
         >>> table is None or bool(np.all(table.contacts > 0))
         True
         """
-        try:
-            import pandas
-        except ImportError:
-            raise ImportError("to_dataframe needs a package: pip install pandas") from None
+        pandas = optional_package("pandas", "to_dataframe")
         columns = {name: getattr(self, name) for name in ("i", "j", "contacts", "impulse", "force")}
         columns |= {"momentum_x": self.momentum[:, 0], "momentum_y": self.momentum[:, 1]}
         return pandas.DataFrame(columns)

@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
+from importlib import import_module
 from multiprocessing.util import Finalize
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,15 @@ class Unsound(Exception):
 
     The function `open_file` adds the path of the file to the error message.
     """
+
+
+def optional_package(module: str, user: str) -> Any:
+    """Import a module that `user` needs, or raise an ImportError with the command to install it."""
+    try:
+        return import_module(module)
+    except ImportError:
+        package = module.partition(".")[0]
+        raise ImportError(f"{user} needs a package: pip install {package}") from None
 
 
 @contextmanager

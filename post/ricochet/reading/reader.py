@@ -26,7 +26,7 @@ import numpy as np
 
 from .arrays import Index, as_index
 from .box import BoxResults, obstacles_of, walls_of
-from .files import RunError, Unsound, open_file, tree
+from .files import RunError, Unsound, open_file, optional_package, tree
 from .frames import DISKS, Frames, NoSuchFrame, Series
 from .layout import committed, rows
 from .nature import TRAITS, allow
@@ -277,10 +277,7 @@ class Run(BoxResults):
         >>> dict(run.to_xarray().sizes)["disk"] if has_xarray else 64
         64
         """
-        try:
-            import xarray
-        except ImportError:
-            raise ImportError("to_xarray needs a package: pip install xarray") from None
+        xarray = optional_package("xarray", "to_xarray")
 
         dimensions = ("time", "disk", "component")
         frames: dict[str, Frames | None]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .files import RunError, Unsound, open_file
+from .files import RunError, Unsound, open_file, optional_package
 from .frames import Frames, Series
 from .layout import committed, rows, series_in, series_of
 from .nature import Nature, nature_of
@@ -142,10 +142,7 @@ class Results:
         >>> table.index.name, "all/kinetic_energy" in table.columns
         ('time', True)
         """
-        try:
-            import pandas
-        except ImportError:
-            raise ImportError("to_dataframe needs a package: pip install pandas") from None
+        pandas = optional_package("pandas", "to_dataframe")
 
         columns: dict[str, np.ndarray] = {}
         with open_file(self.path) as file:
