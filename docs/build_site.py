@@ -139,8 +139,8 @@ class Stage:
     def contents(self, page: str, text: str) -> str:
         """Return a hidden table of contents: the links of an index page to pages of its folder.
 
-        The folder of a page that is no README has the name of the page.  If a page has a section
-        "All pages", only the links of this section count.
+        A README belongs to its own folder, and any other page to the folder of its name.  If a
+        page has a section "All pages", only the links of this section count.
         """
         here = posixpath.dirname(page)
         folder = here if page.endswith("README.md") else page.removesuffix(".md")
@@ -219,13 +219,20 @@ class Stage:
                 entries="\n".join(entries),
             )
             self.write(f"reference/python/{name}.md", text)
-        lines = "\n".join(names)
-        self.write(
-            "reference/python/index.md",
+        self.write_index(
+            "python",
             "# Python modules\n\nThis reference lists the public functions and classes of the "
             "package `ricochet`, for those who\nanalyse runs in Python. A module can be imported "
-            "without the name of its folder, as in\n`from ricochet import structure`.\n\n"
-            f"```{{toctree}}\n:maxdepth: 1\n\n{lines}\n```\n",
+            "without the name of its folder, as in\n`from ricochet import structure`.",
+            names,
+        )
+
+    def write_index(self, folder: str, text: str, names: list[str]) -> None:
+        """Write the first page of a folder of the reference, with links to its pages."""
+        contents = "\n".join(names)
+        self.write(
+            f"reference/{folder}/index.md",
+            f"{text}\n\n```{{toctree}}\n:maxdepth: 1\n\n{contents}\n```\n",
         )
 
     def write_script_pages(self) -> None:
@@ -244,12 +251,11 @@ class Stage:
             self.pages[f"docs/reference/scripts/{path.stem}.md"] = f"reference/scripts/{path.stem}"
             page = self.relinked(f"docs/reference/scripts/{path.stem}.md", text)
             self.write(f"reference/scripts/{path.stem}.md", page)
-        lines = "\n".join(names)
-        self.write(
-            "reference/scripts/index.md",
+        self.write_index(
+            "scripts",
             "# Options of each script\n\nThese pages are generated from the parsers of the scripts "
-            "in `post/`; `--help` prints the same\ntext.\n\n"
-            f"```{{toctree}}\n:maxdepth: 1\n\n{lines}\n```\n",
+            "in `post/`; `--help` prints the same\ntext.",
+            names,
         )
 
     def figures_of_scripts(self) -> dict[str, list[str]]:
