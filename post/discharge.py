@@ -96,7 +96,7 @@ def table(runs: list[Run], after: float) -> tuple[list[dict], list[str]]:
 
 
 def columns(rows: list[dict]) -> np.ndarray:
-    """Return D / d, the rates and their errors (3, M); an unknown error is NaN."""
+    """Return the rows D / d, rate and error of the rate (3, M); an unknown error is NaN."""
     return np.array([[row[name] for row in rows] for name in ("D_over_d", "W", "W_error")], float)
 
 

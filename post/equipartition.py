@@ -83,7 +83,7 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
 
 
 def over_runs(of: Callable[[np.ndarray], float], both: list[np.ndarray]) -> Estimate:
-    """Return a function of the mean energies (2, W) of R runs, with its error by the jackknife.
+    """Return the value of a function of the mean energies (2, W) of R runs, with a jackknife error.
 
     `both` contains the energies (R, W) of the two species.  The result is NaN if the function is
     NaN for the mean energies of all runs, or for the mean energies of all runs except one.

@@ -47,8 +47,8 @@ goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line
 # has failed, its log file states the reason.
 has_data() { [[ -e $folder/$1.h5 || -e $folder/$1.h5.part && $(last_words "$1") =~ $goes_on ]]; }
 
-# If a finished output file is older than the input file, or if a run is extending it, the file is not the result of the present
-# settings.
+# A finished output file is not the result of the present settings if it is older than the input file, or if a run is extending the
+# output file.
 is_done() { [[ -e $folder/$1.h5 && ! -e $folder/$1.h5.part && ! $folder/input.nml -nt $folder/$1.h5 ]]; }
 
 # may_continue NAME OVERRIDES: returns success if the program can continue the member run NAME with these settings.

@@ -185,7 +185,7 @@ def command_line(
     the default name of the output file.  Duplicate runs are ignored unless `repeated` is true.
     Unfinished runs are ignored, except in a script that sets the parser default `paired` to true.
     If `csv` is true, the script has the option --csv.  Each further keyword argument names one of
-    the `OPTIONS` and specifies its default.  An option with the default None has no default.
+    the `OPTIONS` and specifies its default.  None means that the option has no default.
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)

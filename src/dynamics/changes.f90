@@ -120,9 +120,9 @@ contains
   end subroutine change_positions
 
   !> Advances all disks to the present time with the previous forces. After this advance the clocks of all disks are equal. The
-  !> procedure also erases the last partner of each disk. After a change, as after a kick, a disk may collide with its last partner
-  !> again immediately. Without the erasure of the last partner, a new collision with this partner would be mistaken for a rounding
-  !> error of the previous collision.
+  !> procedure also erases the last partner of each disk. After a change of its velocity a disk can collide again with its last
+  !> partner immediately. Without the erasure of the last partner, a new collision with this partner would be mistaken for a
+  !> rounding error of the previous collision.
   subroutine advance_all(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i

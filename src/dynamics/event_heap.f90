@@ -39,8 +39,8 @@ contains
   end function precedes
 
   !> Nonzero if a and b are different events at the same time, so that `precedes` has to determine their order. The caller ensures
-  !> that event a is not earlier than event b. Two simultaneous events are usually one collision that both disks store; the two
-  !> stored events of one collision need no order.
+  !> that event a is not earlier than event b. Two events at the same time are usually copies of one collision, which both disks
+  !> store; such copies need no order.
   elemental function need_order(a, b) result(bits)
     type(event_t), intent(in) :: a, b
     integer(int32) :: bits

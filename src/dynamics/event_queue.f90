@@ -195,7 +195,7 @@ contains
   end subroutine insert_into_heap
 
   !> Inserts an event into a sorted list of n events. The comparison of the times nearly always suffices to order two events. Two
-  !> simultaneous events are usually one collision that both disks store; the two stored events of one collision need no order.
+  !> events at the same time are usually copies of one collision, which both disks store; such copies need no order.
   pure subroutine insert(list, n, event, tag)
     type(event_t), intent(inout) :: list(0:*)
     integer(int32), intent(in) :: n

@@ -21,7 +21,7 @@ contains
 
   !> Moves the disks that are due at the present time, in the order of their ids, and lists the moved disks. If no trial finds a
   !> free position for a disk, the disk stays where it is. A position is free if no other disk, obstacle or side is in the way. The
-  !> old positions of disks that move at the same time are not free.
+  !> position that a disk leaves becomes free only after this procedure.
   subroutine recycle_disks(sim, moved)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable, intent(out) :: moved(:)     !! indices of the moved disks
@@ -88,16 +88,12 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), allocatable, intent(out) :: due(:)
     integer(int32), allocatable :: index_of(:)               ! index of each disk that is due, by id; 0 for all other disks
-    integer(int32) :: i, n
+    integer(int32) :: i
 
     allocate (index_of(sim%n_disks()), source=0_int32)
-    n = 0
     do i = 1, sim%n_disks()
-      if (.not. is_due(sim, i)) cycle
-      index_of(sim%tag(i)%id) = i
-      n = n + 1
+      if (is_due(sim, i)) index_of(sim%tag(i)%id) = i
     end do
-    allocate (due(n))
     due = pack(index_of, index_of > 0)
   end subroutine list_disks_due
 

@@ -158,7 +158,7 @@ contains
       do iy = low(2), high(2)
         row = bins(1)*modulo(iy, bins(2))
         call add_run(row + from, row + min(to, bins(1)))
-        call add_run(row + 1, row + to - bins(1))           ! the rest of the range, which continues at the first column
+        call add_run(row + 1, row + to - bins(1))           ! the part of the range beyond the periodic side
       end do
     end do
     call sort_pairs(self%i(first_pair:self%n), self%partner(first_pair:self%n), size(x, 1, kind=int32))

@@ -185,8 +185,8 @@ contains
     end function most_windows_now
 
     !> Makes windows longer after a call in which all windows were valid. The length of windows is constant within a call. Otherwise
-    !> windows could become so long within a single call that its last window is invalid. If this happened in each call, all windows
-    !> would be discarded, and the run would make no progress.
+    !> the windows could become so long during one call that the last window of the call is invalid. If this happened in each call,
+    !> all windows would be discarded, and the run would make no progress.
     subroutine lengthen_windows(windows)
       integer, intent(in) :: windows               !! number of windows in the last call
 

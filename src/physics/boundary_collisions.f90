@@ -73,7 +73,7 @@ contains
   end subroutine end_bouncing
 
   !> Applies the momentum transfer between a disk and a piston. On entry the disk has the velocity after a rebound from a piston of
-  !> infinite mass. The procedure reduces the impulse of the rebound to its value for the finite mass of the piston. On return u
+  !> infinite mass. The procedure reduces this impulse to the value for the finite mass of the piston. On return u
   !> contains the mean of the velocities of the piston before and after the collision, from which the work of the piston is
   !> calculated.
   pure subroutine move_piston(sim, i, code, normal, before, u, t)

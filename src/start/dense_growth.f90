@@ -106,8 +106,8 @@ contains
         //written(wanted)//"; "//advice)
     end subroutine fail_to_grow
 
-    !> Starts the growth with disks at the given positions, with random velocities. All disks have the same relative size, the
-    !> largest at which no disks overlap.
+    !> Starts the growth with disks at the given positions, with random velocities. The radii of all disks are reduced by
+    !> the same factor: the largest factor at which no disks overlap.
     subroutine start_at_positions()
       real(real64) :: scale
       integer :: k

@@ -73,7 +73,7 @@ contains
 
   contains
 
-    !> Reports a requested column of frames if the run lacks a property that the column requires.
+    !> Reports a problem if a requested column of the frames requires a property that the run does not have.
     subroutine need(column, there, what)
       character(len=*), intent(in) :: column, what
       logical, intent(in) :: there                            !! .true. if the run has the property that the column requires
