@@ -422,7 +422,8 @@ setInterval(() => { if (shownBoxes().length > 1) overlayAll(); }, 1000);
 
 // The newest film determines the time that all films show. The next time is requested from all
 // worker processes, and the films show this time as soon as the slowest worker has reached it.
-// While a film replays stored frames, the requested times are the times of these frames.
+// While a film replays stored frames, the requested times are times of these frames. Times at which
+// another film lacks a frame are left out, because that film would show an earlier time.
 const clock = { next: null, shown: 0 };  // the time requested; when the films were last drawn [ms]
 function conducts(source) {
   if (!isComparing()) return false;
@@ -440,9 +441,11 @@ function conducts(source) {
 
 function request(all, passed) {
   const film = filmOf(current()), { moment } = film.inside(), { pace, speed } = film.choices(), perSecond = pace * 10 ** speed;
-  const target = moment.time + passed * perSecond, kept = all.find(one => one.inside().past.at(-1)?.time > moment.time), repeated = kept?.frameBefore(target);
+  const target = moment.time + passed * perSecond, last = one => one.inside().past.at(-1)?.time ?? -Infinity;
+  const longest = all.reduce((one, other) => last(other) > last(one) ? other : one), isStored = last(longest) > moment.time;
+  const repeated = isStored && longest.frameBetween(moment.time, target, time => all.every(one => one.canShow(time)));
   const isDue = repeated <= Math.max(target, moment.time + (performance.now() - clock.shown) / 1000 * perSecond);
-  clock.next = !kept ? target : isDue ? repeated : null;
+  clock.next = !isStored ? target : isDue ? repeated : null;
   if (clock.next !== null) for (const one of all) one.reach(clock.next);
 }
 

@@ -79,7 +79,7 @@ const hear = {
     if (!playing && state.playing && stream.live && past.length && !parent.isComparing()) play(false);
   },
   problems({ change }) { if (!change) starts(false); },  // a refused change belongs to the previous run
-  gone: () => starts(false),
+  gone() { starts(false); stream.ended = true; },
 };
 
 function open({ facts, blocks, run }) {
@@ -133,11 +133,11 @@ function take(buffer) {
     show(frame.time, true);
     parent.went(window, frame.time);
   }
-  if (!state.playing || parent.isComparing()) drawn();
+  if (!state.playing) drawn();
 }
 
-// The page confirms each frame after drawing it. The worker process waits for confirmations, and is at most two frames ahead of the
-// page.
+// The page confirms the received frames whenever it draws a picture, and at once while the film is paused. The worker process waits
+// for confirmations, and is at most two frames ahead of the page.
 function drawn() { for (; stream.fresh > 0; stream.fresh--) send({ do: 'got' }); }
 
 const fromWorker = {
@@ -174,13 +174,12 @@ const fromWorker = {
     return true;
   },
   newest(next) {
+    const { fresh } = stream;
+    drawn();
     if (parent.conducts(window)) return;  // compared runs show the same time
     if (stream.live) {
-      if (!stream.fresh) return;
-      show(last());
-      drawn();
+      if (fresh) show(last());
     } else {
-      drawn();
       if (next < last()) { show(next); return; }
       show(last());
       stream.live = true;
@@ -219,11 +218,18 @@ function join(time) {
   reach(time);
 }
 
-// Returns the time of the last frame up to a given time or, if that frame is not later than the frame shown, the time of the frame
-// after the frame shown. The result is null if there is no such frame.
-function frameBefore(time) {
-  const k = Math.max(frameAt(time), frameAt(moment.time) + 1);
-  return past[k]?.time ?? null;
+// Returns whether the film has a frame at a given time, or can still compute one.
+function canShow(time) { return !(past.at(-1)?.time >= time) || past[frameAt(time)].time === time; }
+
+// Returns the time of the last frame between two times whose time satisfies a condition or, if there is no such frame, the time of
+// the first later frame that satisfies the condition. The result is null if no frame after the first time satisfies the condition.
+function frameBetween(from, to, condition) {
+  let found = null;
+  for (const { time } of past.slice(frameAt(from) + 1)) {
+    if (time > to && found !== null) break;
+    if (condition(time)) found = time;
+  }
+  return found;
 }
 
 function overlay(list) {

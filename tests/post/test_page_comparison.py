@@ -88,6 +88,35 @@ def test_a_run_beside_a_kept_run_starts_whatever_is_changed_meanwhile(opened, ca
     wait_for(lambda: inside(opened, "moment.time") > reached)
 
 
+def test_a_run_that_waits_for_the_page_goes_on_beside_another_run(opened):
+    """A worker that is two frames ahead when its run is kept continues in the comparison."""
+    opened.run("waiting = filmOf(current()); drawn = waiting.drawn; waiting.drawn = () => {}")
+    wait_for(lambda: inside(opened, "stream.fresh") == 2)
+    opened.run("waiting.drawn = drawn; keep()")
+    moving(opened, 1)
+    last = "return films().map(one => one.inside().past.at(-1).time)"
+    reached = max(opened.run(last))
+    wait_for(lambda: min(opened.run(last)) > reached)
+
+
+def test_compared_runs_replay_the_times_that_all_of_them_have(opened):
+    """A film that lacks frames of another film never shows an earlier time than the other film."""
+    opened.press("k")
+    moving(opened, 1)
+    wait_for(lambda: inside(opened, "past.length") > 60)
+    # Every second frame of the second run is removed, as when a film needs too much memory.
+    thin = """const { past } = filmOf(current()).inside();
+        for (let k = past.length - 2; k > 0; k -= 2) past.splice(k, 1);
+        keep();
+        return past.at(-1).time"""
+    stored = opened.run(thin)
+    moving(opened, 2)
+    times = [0]
+    while max(times) <= stored:
+        times = opened.run(TIMES)
+        assert min(times) == max(times)
+
+
 #: Two texts for the first slider of each input of the lesson.
 LESSON = {
     "crater": ("50", "30"),
