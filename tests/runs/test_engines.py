@@ -12,8 +12,10 @@ import socket
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from ricochet import read_run
 from synthetic_run import ROOT
 from whole_runs import PATIENCE, differences, environment, frames_in, ran, wait_for
 
@@ -246,6 +248,26 @@ def test_slurm_runs_all_members(ensemble, cluster, tmp_path):
     wait_for(lambda: not cluster("squeue", "--noheader").strip())
     last = ensemble(*arguments)
     assert last.returncode == 0 and "4 of 4 members finished" in last.stderr
+
+
+def test_slurm_extends_finished_members_with_the_same_bits(ensemble, cluster, tmp_path):
+    """A sweep with a later end submits its finished members again, and each of them goes on."""
+    later = ("--set", "stop.collisions_per_disk=4")
+    arguments = ("--engine", "slurm", "-j", 2, "--seeds", "1-2", *SMALL)
+    ensemble(*arguments)
+    folder = tmp_path / "members"
+    wait_for(lambda: len(list(folder.glob("seed_?.h5"))) == 2)
+    wait_for(lambda: not cluster("squeue", "--noheader").strip())
+    told = ensemble(*arguments, *later)
+    assert told.returncode == 75 and "submitted" in told.stderr, told.stderr
+    wait_for(lambda: not cluster("squeue", "--noheader").strip())
+    told = ensemble(*arguments, *later)
+    assert told.returncode == 0 and "2 of 2 members finished" in told.stderr, told.stderr
+    assert ensemble("-d", "whole", "--seeds", "1-2", *SMALL, *later).returncode == 0
+    for name in ("seed_1", "seed_2"):
+        runs = [read_run(tmp_path / place / f"{name}.h5") for place in ("whole", "members")]
+        assert np.array_equal(*(one.position[-1] for one in runs))
+        assert np.array_equal(*(one.velocity[-1] for one in runs))
 
 
 def test_slurm_is_not_given_the_same_work_twice_and_keeps_the_limit(ensemble, cluster, tmp_path):
