@@ -153,7 +153,7 @@ function drawGround() {
 }
 
 // Draws an obstacle. If the obstacle is smaller than a pixel, a square of the same area is drawn, because squares are drawn much
-// faster.
+// faster. Circles are drawn clockwise, and the positive direction of a sliding circle is counter-clockwise.
 function drawObstacle([x, y, radius, inside, from, to], k) {
   const size = radius * view.unit, half = 0.886 * size;
   if (to !== undefined) { drawArc([x, y, size, from, to], k); return; }
@@ -162,7 +162,7 @@ function drawObstacle([x, y, radius, inside, from, to], k) {
     ground.fillRect(0, 0, page.width, page.height);
   }
   ground.fillStyle = inside ? ink.stage : size < 1 ? ink.wall : ink.obstacle;
-  ground.lineWidth = drawLike(film.laws.obstacle[k], -radius) ? 4.5 * page.dots : page.dots;
+  ground.lineWidth = drawLike(film.laws.obstacle[k], -1) ? 4.5 * page.dots : page.dots;
   copies([x - radius, x + radius], [y - radius, y + radius], (dx, dy) => {
     if (size < 1) { ground.fillRect(across(x + dx) - half, up(y + dy) - half, 2 * half, 2 * half); return; }
     ground.beginPath();
