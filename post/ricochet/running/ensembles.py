@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import h5py
 import numpy as np
 
-from ..reading.files import RunError, open_file, plain
+from ..reading.files import RunError, open_file, optional_package, plain
 from ..reading.layout import committed
 from .inputs import read_input
 from .program import STOPPED, ProgramError, find_program, flat, tied, value_text
@@ -100,7 +100,7 @@ def sweep(
     >>> list(ricochet.sweep(small, linked, folder / "linked")["collisions"])
     [10, 20]
     """
-    pandas_module()  # a missing package is reported before the runs
+    optional_package("pandas", "a table of members")  # reported before the runs
     folder = Path(folder)
     text = read_input(system, folder / "input")
     members = [
@@ -441,16 +441,7 @@ def ensemble(folder: str | Path) -> "pandas.DataFrame":
     >>> ricochet.ensemble(folder / "sweep").equals(table)
     True
     """
-    return pandas_module().DataFrame(gathered(Path(folder)))
-
-
-def pandas_module() -> Any:
-    """Return the module pandas, or raise an error that explains how to install pandas."""
-    try:
-        import pandas
-    except ImportError:
-        raise ImportError("tables of members need a package: pip install pandas") from None
-    return pandas
+    return optional_package("pandas", "a table of members").DataFrame(gathered(Path(folder)))
 
 
 def gathered(folder: Path) -> list[dict[str, Any]]:
