@@ -11,6 +11,7 @@ quantities of each disk (such as the orientation), the box, and the time.  Numbe
 full precision.
 """
 
+import math
 from pathlib import Path
 
 from ricochet import Run, RunError
@@ -39,13 +40,15 @@ def rows(run: Run, frame: int) -> list[list[str]]:
 def xyz_frame(run: Run, frame: int) -> str:
     """Return a frame in extended XYZ format.
 
-    The origin of the positions is the lower left corner of the box.
+    The origin of the positions is the lower left corner of the box. The second vector of the
+    lattice leads to the image above the box, which is displaced along x in a sheared box.
     """
     (width, height), (x0, y0) = run.edges, run.lower
+    tilt = math.remainder(run.shear_rate * height * run.time[frame], width)
     pbc = " ".join("T" if p else "F" for p in (*run.periodic, False))
     properties = ":".join([PROPERTIES, *(f"{name}:R:1" for name in run.disk_data), "id:I:1"])
     head = (
-        f'Lattice="{width} 0 0 0 {height} 0 0 0 1" Origin="{x0} {y0} 0" pbc="{pbc}" '
+        f'Lattice="{width} 0 0 {tilt} {height} 0 0 0 1" Origin="{x0} {y0} 0" pbc="{pbc}" '
         f"Time={run.time[frame]} Properties={properties}"
     )
     lines = [

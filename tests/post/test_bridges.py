@@ -54,6 +54,23 @@ def test_ovito_opens_the_export_as_a_system_in_two_dimensions(run):
         ]
 
 
+def test_ovito_sees_the_displaced_images_of_a_sheared_box(simulated):
+    """Neighbours in the tilted lattice have the distance at which disks collide, or are farther."""
+    words = ("box.shear_rate=1", "box.boundary=periodic,periodic", "stop.collisions_per_disk=3")
+    run = simulated(ROOT / "input/lab.nml", "stop.events=", *words)
+    pipeline = reader("ovito.io").import_file(str(exported(run, "run.xyz")))
+    images = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+    for frame in range(run.n_frames):
+        cell = np.array(pipeline.compute(frame).cell[:2, :2])
+        slide = cell[0, 1] - run.shear_rate * run.edges[1] * run.time[frame]
+        assert slide / run.edges[0] == pytest.approx(round(slide / run.edges[0]), abs=1e-9)
+        place = run.position[frame]
+        gaps = [place[:, None] - place + cell @ image for image in images]
+        apart = np.linalg.norm(gaps, axis=-1)
+        apart[images.index((0, 0))][np.diag_indices(run.n_disks)] = np.inf
+        assert apart.min() > (run.radius.min() * 2) * (1 - 1e-9)
+
+
 def test_mdanalysis_reads_positions_velocities_times_and_species(run):
     reader("MDAnalysis")
     universe = mdanalysis_universe(run)
