@@ -345,7 +345,7 @@ def test_what_cannot_be_exchanged_is_answered_in_one_line(simulated, tmp_path, m
     assert "LAMMPS dump files are written of rectangular boxes only" in capsys.readouterr().err
     assert run_script("export", sheared.path, "-o", tmp_path / "a.pdb") == 2
     assert "must end in .xyz, .csv, .gsd or .lammpstrj" in capsys.readouterr().err
-    monkeypatch.setitem(sys.modules, "gsd", None)  # as if it were not installed
+    monkeypatch.setitem(sys.modules, "gsd.hoomd", None)  # as if it were not installed
     assert run_script("export", sheared.path, "-o", tmp_path / "a.gsd") == 2
     assert "a.gsd: write_gsd needs a package: pip install gsd\n" in capsys.readouterr().err
     with pytest.raises(ImportError, match="read_gsd needs a package: pip install gsd"):
