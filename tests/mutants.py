@@ -36,7 +36,7 @@ SCRATCH = ROOT / "build" / "mutants"
 UNIT_BUILD = "DEBUG=1 OPT='-O1 -Wno-maybe-uninitialized' BUILD=build/tests"
 UNIT_TESTS = ("make -j{jobs} {unit_build}/unit_tests", "make checked")
 PROGRAM = "make -j{jobs} {unit_build}/four_disks && make -j{jobs} all library"
-PYTEST = ".venv/bin/python -m pytest -q -x -n {jobs} --dist worksteal -p no:randomly "
+PYTEST = ".venv/bin/python -m pytest -q -x -n {jobs} --dist load --maxschedchunk 8 -p no:randomly "
 MUTANT = re.compile(r"^([\w-]+): .*\n--- (.*)\n((?:.*\n)+?)(?=\n[\w-]+: |\Z)", re.MULTILINE)
 FAILURE = re.compile(r"^(?:Failure in: |FAILED |ERROR |unit tests: )(.*?)(?: - .*)?$", re.MULTILINE)
 
