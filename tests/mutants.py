@@ -33,7 +33,9 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRATCH = ROOT / "build" / "mutants"
-UNIT_BUILD = "DEBUG=1 OPT='-O1 -Wno-maybe-uninitialized' BUILD=build/tests"
+#: Variables of `make checked`. With any others it would compile everything again.
+UNIT_BUILD = re.findall(r"^unit_build := (.*)", (ROOT / "Makefile").read_text(), re.MULTILINE)[0]
+UNIT_BUILD = UNIT_BUILD.replace("$(BUILD)", "build")
 UNIT_TESTS = ("make -j{jobs} {unit_build}/unit_tests", "make checked")
 PROGRAM = "make -j{jobs} {unit_build}/four_disks && make -j{jobs} all library"
 PYTEST = ".venv/bin/python -m pytest -q -x -n {jobs} --dist load --maxschedchunk 8 -p no:randomly "
