@@ -73,22 +73,22 @@ module boundary_variables
     variable_t("obstacle", "radius", "real", 1, "example", "0.2", &
       "Radius of the circular obstacle.", positive, "length", otherwise="none; needed, unless file is given"), &
     variable_t("obstacle", "side", "text", 1, "default", "'outside'", &
-      "Side of the circle on which the disks are. An arc (from_angle, to_angle) has no such side, because disks bounce off " &
-      //"both of its faces.", choices="outside inside"), &
+      "Side of the circle on which the disks are. The variable cannot be given for an arc (from_angle, to_angle), because " &
+      //"disks bounce off both faces of an arc.", choices="outside inside"), &
     variable_t("obstacle", "from_angle", "real", 1, "optional", "0", &
       "Angle at which an arc begins, counter-clockwise from the +x direction. With from_angle and to_angle the obstacle is an " &
       //"arc of the circle instead of the whole circle. Disks bounce off both faces of the arc and off its two end points. " &
-      //"The two angles are given together, and without side.", first_angle, "degrees", excludes="side", &
-      otherwise="none; the obstacle is a whole circle"), &
+      //"The variables from_angle and to_angle must be given together, and cannot be combined with side.", first_angle, &
+      "degrees", excludes="side", otherwise="none; the obstacle is a whole circle"), &
     variable_t("obstacle", "to_angle", "real", 1, "optional", "180", &
       "Angle at which an arc ends. The arc extends counter-clockwise from from_angle to to_angle. The angle to_angle is " &
-      //"larger than from_angle by up to 360 degrees. A gap of any width between the two ends is an opening.", last_angle, &
-      "degrees", excludes="side", otherwise="none; the obstacle is a whole circle"), &
+      //"larger than from_angle by up to 360 degrees. Disks can pass through the gap between the two ends of the arc " &
+      //"if the gap is wide enough.", last_angle, "degrees", excludes="side", otherwise="none; the obstacle is a whole circle"), &
     variable_t("obstacle", "file", "text", 1, "optional", "'scatterers.txt'", &
       "File that describes many circles and replaces centre and radius. A text file contains a line of column names (x y " &
       //"radius) and one line for each circle. An HDF5 file (.h5) contains the datasets centre and radius. A file may " &
       //"describe up to 1000000 circles. All circles of the file are one obstacle with one collision rule and one set of " &
-      //"observables. With from_angle and to_angle, the file describes arcs that all have these angles. The path is " &
+      //"observables. If from_angle and to_angle are given, the file describes arcs between these two angles. The path is " &
       //"relative to the folder in which the program is started.", excludes="centre radius", &
       otherwise="none; the group describes one circle")]
 

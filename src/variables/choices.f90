@@ -83,10 +83,10 @@ module choices
       //"angular velocities."), &
     choice_t("restitution_law", "constant", "Coefficients of restitution do not depend on the impact speed."), &
     choice_t("restitution_law", "power", "Below reference_speed, 1 - e is proportional to g**(1/5), where e is the " &
-      //"coefficient of restitution."), &
+      //"coefficient of restitution and g is the impact speed."), &
     choice_t("restitution_law", "viscoelastic", "Viscoelastic bodies: below reference_speed, the coefficient of restitution " &
-      //"is e = 1 - y + 3/5 y**2, where y is proportional to g**(1/5). The coefficients of restitution in the input must be " &
-      //"at least 7/12."), &
+      //"is e = 1 - y + 3/5 y**2, where y is proportional to g**(1/5) and g is the impact speed. The coefficients " &
+      //"of restitution in the input must be at least 7/12."), &
     choice_t("kind", "none", "No driving."), &
     choice_t("kind", "noise", "White-noise driving: a kick adds a Gaussian random number to each velocity component, which " &
       //"heats the disks."), &

@@ -55,13 +55,13 @@ module disk_variables
       "Rectangle in which the disks start: xlo, xhi, ylo, yhi. At the start each disk lies completely inside the rectangle; " &
       //"later the disks may leave the rectangle.", unit="length", otherwise="the whole box"), &
     variable_t("species", "placement", "text", 1, "default", "'random'", &
-      "Method that generates the initial positions. If placement is not given, but grid, position or file is given, this " &
-      //"variable determines the method.", &
+      "Method that generates the initial positions. If placement is not given, the method follows from grid, position or " &
+      //"file if one of these variables is given.", &
       choices="random grid lattice dense explicit file grown relaxed"), &
     variable_t("species", "relaxation_sweeps", "integer", 1, "fallback", "1000", &
       "Number of sweeps of event-chain Monte Carlo that equilibrate the start with placement = 'relaxed'. A sweep consists of " &
-      //"as many event chains as the run has disks, and an event chain moves about as many disks as the square root of their " &
-      //"number. The value applies to all species of the run and may be given with any of them.", &
+      //"as many event chains as the run has disks, and an event chain moves about as many disks as the square root of the " &
+      //"number of disks. The value applies to all species of the run and may be given in the group of any species.", &
       number_of_sweeps, goes_with="placement relaxed"), &
     variable_t("species", "grid", "integer", 2, "required", "10, 10", &
       "Numbers of columns and of rows of the rectangular grid. The product of the two numbers is the number of disks.", &
@@ -79,9 +79,9 @@ module disk_variables
     variable_t("species", "position", "real", 0, "required", "0.2, 0.5, 0.8, 0.5", &
       "Positions of the disks: x1, y1, x2, y2, ..., one pair for each disk.", unit="length", goes_with="placement explicit"), &
     variable_t("species", "velocities", "text", 1, "default", "'rest'", &
-      "Method that generates the initial velocities. If velocities is not given, but velocity, speed, temperature or file is " &
-      //"given, this variable determines the method. In a periodic box without obstacles and gravity, generated velocities " &
-      //"have zero total momentum.", &
+      "Method that generates the initial velocities. If velocities is not given, the method follows from velocity, speed, " &
+      //"temperature or file if one of these variables is given. In a periodic box without obstacles and gravity, generated " &
+      //"velocities have zero total momentum.", &
       choices="rest equal_speed uniform maxwell explicit file"), &
     variable_t("species", "speed", "real", 1, "fallback", "1", &
       "Speed of the disks at the start. With velocities = 'uniform' the value is the upper limit of |vx| and of |vy|.", &
@@ -120,9 +120,9 @@ module disk_variables
       "Dependence of the coefficients of restitution of disks and boundaries on the impact speed g, which is the normal " &
       //"component of the relative velocity.", choices=restitution_laws, may_change=in_motion), &
     variable_t("contact", "reference_speed", "real", 1, "required", "1", &
-      "Impact speed g0 above which the coefficients of restitution have the values in the input. Slower collisions dissipate " &
-      //"a smaller fraction of the energy. Choose g0 above the impact speeds that occur.", positive, "length/time", &
-      goes_with="restitution_law power viscoelastic", may_change=in_motion), &
+      "Reference value g0 of the impact speed. At impact speeds above g0 the coefficients of restitution have the values in " &
+      //"the input; at lower impact speeds the coefficients are closer to 1. Choose g0 above the impact speeds that occur.", &
+      positive, "length/time", goes_with="restitution_law power viscoelastic", may_change=in_motion), &
     variable_t("contact", "wall_rule", "text", 1, "default", "'velocity'", &
       "Collision rule of all sides and obstacles without a separate rule (rule in &side, &obstacle or &wall), except thermal " &
       //"boundaries.", choices=wall_rules, may_change=in_motion), &
@@ -183,8 +183,8 @@ module disk_variables
       goes_with="kind andersen brownian active recycle", may_change=in_motion, &
       otherwise="none; must be given where it applies, or velocity instead if kind is 'recycle'"), &
     variable_t("drive", "velocity", "real", 2, "required", "0, -1", &
-      "Velocity of recycled disks. With this variable recycled disks do not rotate. Either temperature or velocity must be " &
-      //"given.", &
+      "Velocity of each disk after it has been recycled. If velocity is given, recycled disks do not rotate. Either " &
+      //"temperature or velocity must be given.", &
       unit="length/time", goes_with="kind recycle", excludes="temperature", may_change=in_motion, &
       otherwise="none; velocity or temperature must be given where it applies"), &
     variable_t("drive", "from_region", "real", 4, "required", "0, 1, 0, 0.1", &

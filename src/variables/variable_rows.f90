@@ -45,10 +45,10 @@ module variable_rows
   type, public :: variable_t
     character(len=8) :: group
     character(len=name_length) :: name
-    character(len=8) :: kind                 !! type of the values: "integer", "real", "logical" or "text"
+    character(len=8) :: kind                 !! type of the values, 'integer', 'real', 'logical' or 'text'
     integer :: size                          !! required number of values; 0 if any number of values is allowed
-    character(len=8) :: status               !! see the table at the end of this file
-    character(len=24) :: value  !! default or example, as written in an input file; see the table at the end of this file
+    character(len=8) :: status               !! see the end of this file
+    character(len=24) :: value  !! default or example, as written in an input file; see the end of this file
     character(len=help_length) :: help       !! help text in full sentences; the first sentence names the quantity
     type(range_t) :: range = anything        !! range of numbers
     character(len=16) :: unit = ""
@@ -64,11 +64,11 @@ module variable_rows
     character(len=100) :: otherwise = ""     !! description of the default if the default is not a constant
   end type variable_t
 
-  ! status     value                           line in the reference file
-  ! default    the default                     as it is
-  ! fallback   the default where one applies   as a comment
-  ! example    an example, no default          as it is, because something must be given
-  ! required   an example, no default          as a comment; must be given with the choice that it goes with
-  ! optional   an example, no default          as a comment
+  ! The status of a variable determines its line in the reference file and the content of the component `value`.
+  ! A variable with the status "default" has a default value, which its line contains.
+  ! A variable with the status "fallback" has a default value where the variable applies, and its line is a comment.
+  ! A variable with the status "example" has no default value; its line contains an example, because a value must be given.
+  ! A variable with the status "required" must be given with the choice with which it applies; its line is an example as a comment.
+  ! A variable with the status "optional" has no default value and need not be given; its line is an example as a comment.
 
 end module variable_rows

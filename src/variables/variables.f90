@@ -1,4 +1,4 @@
-!> The table of all input variables. Several parts of the program use this table: the reading and checking of inputs,
+!> The table of all input variables. Several parts of the program use the table of variables: the reading and checking of inputs,
 !> `--print-defaults`, `--explain`, and the group `/parameters` of the output file. The reference page of the documentation is
 !> generated from the table.
 module variables
@@ -21,8 +21,8 @@ module variables
 
 contains
 
-  !> Says when the value of a variable may differ from its value at the start of a run. The full name of the variable may contain
-  !> the name of a group, as in `side.left.velocity`.
+  !> Returns on which occasions the value of a variable may be changed after the start of a run. The full name of the variable may
+  !> contain the name of a group, as in `side.left.velocity`.
   pure function change_of(name) result(when)
     character(len=*), intent(in) :: name
     character(len=len(never)) :: when
@@ -81,8 +81,8 @@ contains
     end do
   end function full_names
 
-  !> Whether two variables of a group must not be given together. The result is also .true. if the two variables set intervals for
-  !> the same kind of samples.
+  !> Whether two variables of a group must not be given together. Two variables that set intervals for the same kind of samples also
+  !> exclude each other.
   pure function excludes(one, other) result(yes)
     integer, intent(in) :: one, other        !! rows
     logical :: yes
