@@ -1,6 +1,6 @@
-!> Recycles disks: at regular times, each disk whose centre is in one region moves to a random position in another region. A hopper
-!> that is refilled, or a gas that leaves through an opening, thereby reaches a steady state. The random numbers depend only on the
-!> seed, the disk and the number of the kick, as in `kicks`.
+!> Recycles disks: at regular times, each disk whose centre is in one region moves to a random position in another region. With
+!> recycling, a discharging hopper or a gas that escapes through an opening reaches a steady state. The random numbers of a move
+!> depend only on the seed, the id of the disk and the number of the kick, as in the module `kicks`.
 module recycling
   use kinds, only: int32, int64, never, real64
   use box_sides, only: centre_range
@@ -14,14 +14,14 @@ module recycling
   private
   public :: are_waiting, recycle_disks
 
-  !> Number of random positions that are tried for a disk at one time.
+  !> Largest number of random positions that are tried for one disk in one kick.
   integer, parameter :: most_trials = 100
 
 contains
 
-  !> Moves the disks that are due at the present time, in the order of their ids, and lists the moved disks. If no trial finds a
-  !> free position for a disk, the disk stays where it is. A position is free if no other disk, obstacle or side is in the way. The
-  !> position that a disk leaves becomes free only after this procedure.
+  !> Moves each disk whose centre is in `from_region` to a free position in `to_region`, in the order of the ids, and lists the
+  !> moved disks. A position is free if a disk at this position overlaps no other disk, no obstacle and no side. If no free position
+  !> is found for a disk, the disk is not moved. The former position of a moved disk counts as occupied until the procedure returns.
   subroutine recycle_disks(sim, moved)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable, intent(out) :: moved(:)     !! indices of the moved disks
@@ -87,7 +87,7 @@ contains
   pure subroutine list_disks_due(sim, due)
     type(simulation_t), intent(in) :: sim
     integer(int32), allocatable, intent(out) :: due(:)
-    integer(int32), allocatable :: index_of(:)               ! index of each disk that is due, by id; 0 for all other disks
+    integer(int32), allocatable :: index_of(:)               ! index of each disk to be recycled, by id; 0 for all other disks
     integer(int32) :: i
 
     allocate (index_of(sim%n_disks()), source=0_int32)
@@ -97,10 +97,10 @@ contains
     due = pack(index_of, index_of > 0)
   end subroutine list_disks_due
 
-  !> All disks at their present positions, with room for more disks in the region to which disks move.
+  !> A packing of all disks at their present positions, with space for the disks that will be moved.
   function present_packing(sim, more) result(packing)
     type(simulation_t), intent(in) :: sim
-    integer, intent(in) :: more                              !! number of disks that may be added
+    integer, intent(in) :: more                              !! largest number of disks that will be moved
     type(packing_t) :: packing
     real(real64), allocatable :: x(:, :)                     ! (2,n) present positions [length]
     integer(int32) :: i
@@ -119,19 +119,19 @@ contains
     end do
   end function present_packing
 
-  !> Draws random positions until one is free for a disk, and returns this position.
+  !> Draws random positions in `to_region` until a position is free for a disk with the given radius.
   pure subroutine find_position(sim, packing, radius, stream, x, free)
     type(simulation_t), intent(in) :: sim
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: radius                       !! [length]
     type(random_stream_t), intent(inout) :: stream
     real(real64), intent(out) :: x(2)                        !! [length]
-    logical, intent(out) :: free                             !! .false. if no trial has found a free position
+    logical, intent(out) :: free                             !! .false. if none of the tried positions is free
     real(real64) :: lower(2), upper(2), u(2)
     integer(int32) :: blocker
     integer :: trial
 
-    ! If a moving side leaves no room for the disk, `upper` is not above `lower` along this axis.
+    ! A moving side may leave no space for the disk in the region; along the axis of the side, `upper` then equals `lower`.
     call centre_range(sim%drive%to_region, sim%box, radius, lower, upper, sim%now)
     free = .false.
     x = lower
@@ -146,9 +146,10 @@ contains
     end do
   end subroutine find_position
 
-  !> Moves disk i to a position, where the disk starts a new trajectory: it has no last collision partner, no last contact, and no
-  !> crossed periods. The change of its kinetic, rotational and potential energy is added to the sum `drive_energy`. The velocity is
-  !> the given velocity, without rotation, or is drawn from the Maxwell distribution.
+  !> Moves disk i to a new position, at which a new trajectory starts. The procedure erases the last collision partner of the disk,
+  !> the time of its last contact and its number of crossed periods. The change of its kinetic, rotational and potential energy is
+  !> added to the sum `drive_energy`. The disk receives the given velocity and no rotation, or a velocity and a rotation drawn from
+  !> the Maxwell distribution.
   subroutine move_disk(sim, i, x, stream)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

@@ -1,10 +1,12 @@
 !> Arcs of circles, impenetrable from both sides. Disks also collide with the ends of an arc.
 !>
-!> The centre of a disk that touches an arc from outside is on a circle whose radius is the sum of the radii of arc and disk. From
-!> inside, the radius of this circle is the difference of the two radii; a disk that is larger than the arc touches only the ends
-!> from inside. A contact with one of the two circles counts only if its direction is in the window of angles of the arc. The centre
-!> of a disk that touches an end of the arc is on a circle around this end. The four circles meet without kinks at the edges of the
-!> window. Rounding errors can therefore hide a contact only where a face meets an end, and the contact with the end is then found.
+!> The centre of a disk that touches an arc from outside is on a circle whose radius is the sum of the radii of arc and disk. The
+!> centre of a disk that touches an arc from inside is on a circle whose radius is the radius of the arc minus the radius of the
+!> disk. A disk with a larger radius than the arc can touch only the ends of the arc from inside. A disk whose centre is on one of
+!> the two circles touches the arc only if its centre is between the first and the last angle of the arc. The centre of a disk that
+!> touches an end of the arc is on a circle around the end of the arc. Where the circle of a face (the outer or inner side of the
+!> arc) meets the circle of an end, the two circles have a common tangent. If rounding errors hide a contact with a face near an end
+!> of the arc, the contact with the end is therefore found instead.
 module arcs
   use free_flight, only: flight, later_time_to_circle, time_to_circle
   use kinds, only: never, pi, real64
@@ -20,7 +22,7 @@ module arcs
   type, extends(shape_t) :: arc_t
     real(real64) :: centre(2) = 0.0_real64      !! vector from the middle of the arc to the centre of its circle [length]
     real(real64) :: radius = 0.0_real64         !! [length]
-    !> Unit vectors from the centre of the circle to the first and to the last point of the arc, counter-clockwise: (component,end)
+    !> (component,end) unit vectors from the centre of the circle to the first and to the last point of the arc, counter-clockwise
     real(real64) :: end_direction(2, 2) = 0.0_real64
     logical :: is_large = .false.               !! .true. if the arc is more than half of the circle
     logical :: is_closed = .false.              !! .true. if the arc is the whole circle
@@ -57,7 +59,7 @@ contains
     arc%is_convex = .false.
     low = radius*minval(arc%end_direction, dim=2)
     high = radius*maxval(arc%end_direction, dim=2)
-    do k = 0, 3                                 ! the points that are farthest to the right, to the top, to the left, to the bottom
+    do k = 0, 3  ! the points of the circle that are farthest to the right, to the top, to the left and to the bottom
       point = unit_vector(90.0_real64*k)
       if (.not. arc%is_in_window(point)) cycle
       low = min(low, radius*point)
@@ -68,7 +70,7 @@ contains
     arc%extent = 0.5_real64*(high - low)
     offset = magnitude(arc%centre)
     arc%circumradius = maxval([(magnitude(arc%end_point(k)), k=1, 2)])
-    if (arc%is_in_window(arc%centre)) arc%circumradius = radius + offset   ! the point of the circle farthest from the middle
+    if (arc%is_in_window(arc%centre)) arc%circumradius = radius + offset   ! the arc contains the farthest point of the circle
   end function new_arc
 
   !> Unit vector in the direction of an angle. For a multiple of 90 degrees the result is exact.
@@ -91,12 +93,12 @@ contains
     end select
   end function unit_vector
 
-  !> Whether the direction of a vector from the centre of the circle is in the window of angles of the arc.
+  !> Whether the direction of a vector from the centre of the circle is between the first and the last angle of the arc.
   pure function is_in_window(self, c) result(yes)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: c(2)            !! [length]
     logical :: yes
-    ! positive if the vector is less than half a turn after the first end, or before the last end
+    ! positive if the vector is less than half a turn after the first end of the arc, or before its last end
     real(real64) :: after_first, before_last
 
     associate (first => self%end_direction(:, 1), last => self%end_direction(:, 2))
@@ -121,7 +123,7 @@ contains
 
   !> Tangential velocity of the surface at a point of contact, if the surface moves counter-clockwise along the arc with unit speed.
   !> The result is the unit tangent vector of the circle at the nearest point of the arc, without its component along the normal of
-  !> the surface. At the rounded ends of the arc the surface therefore moves more slowly than along the arc.
+  !> the surface. At the ends of the arc the surface therefore moves more slowly than between the ends.
   pure function direction(self, d, normal) result(along)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2), normal(2)
@@ -166,9 +168,10 @@ contains
 
   contains
 
-    !> Time until the centre of the disk reaches the outer or the inner face of the arc. A point at which the path crosses the
-    !> circle of the face is a contact if the point is in the window of angles, and on the same side of the arc as the face: a disk
-    !> on the other side of the arc is beyond the circle of the face without touching the face.
+    !> Time until the disk touches the outer or the inner face of the arc. At a contact with a face, the centre of the disk is on a
+    !> circle of the radius `rho`. A point at which the path of the centre crosses the circle is a contact only if the point is
+    !> between the first and the last angle of the arc, and on the same side of the arc as the face. A disk on the other side of the
+    !> arc can cross the circle without touching the face.
     pure function time_to_face(rho, inside) result(t)
       real(real64), intent(in) :: rho           !! radius of the circle [length]
       logical, intent(in) :: inside             !! .true. for the inner face
@@ -189,9 +192,10 @@ contains
       t = never
     end function time_to_face
 
-    !> Whether the distance of a disk on a straight path from a point does not decrease, within rounding errors. The disk then does
-    !> not collide with a circle around the point, even if the disk touches the circle. Without this rule, rounding errors after a
-    !> collision could cause a second collision with the same face or end.
+    !> Whether a disk on a straight path moves away from a point, or moves perpendicular to the direction of the point within
+    !> rounding errors. A disk that moves away from the centre of a circle does not collide with the circle from outside, even if
+    !> the disk touches the circle. Without this test, rounding errors after a collision could cause a second collision with the
+    !> same face or end of the arc.
     pure function grazes(from) result(yes)
       real(real64), intent(in) :: from(2)       !! vector from the point to the centre of the disk [length]
       logical :: yes
@@ -213,8 +217,8 @@ contains
     end if
   end function gap
 
-  !> Unit vector from the point of contact on the arc to the centre of a disk that touches the arc. A disk in the opening of an arc
-  !> can touch both ends.
+  !> Unit vector from the point of contact on the arc to the centre of a disk that touches the arc. A disk in the opening between
+  !> the two ends of an arc can touch both ends at the same time.
   pure function normal(self, d, heading) result(direction)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -241,7 +245,7 @@ contains
   end function normal
 
   !> Whether a disk whose centre is in a rectangle can touch the arc. The test uses the bounding rectangle of the arc, and the ring
-  !> in which the centre of a disk is when the disk touches the circle of the arc.
+  !> that contains the centres of all disks that touch the full circle.
   pure function reaches(self, d, half, radius) result(yes)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -255,9 +259,10 @@ contains
       magnitude(abs(c) + half) >= self%radius - radius - slack
   end function reaches
 
-  !> Whether the arc excludes the centres of disks from a whole rectangle. The distance from the arc changes by no more than half
-  !> the diagonal between the middle and any other point of the rectangle. For a large rectangle the result may be .false. although
-  !> the arc excludes the centres of disks from the whole rectangle.
+  !> Whether the arc excludes the centres of disks from a whole rectangle. The distances of two points from the arc differ by at
+  !> most the distance between the two points, and the largest distance between the middle of a rectangle and its other points is
+  !> half the diagonal. For a large rectangle the result may be .false. although the arc excludes the centres of disks from the
+  !> whole rectangle.
   pure function covers(self, d, half, radius) result(yes)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius

@@ -1,4 +1,4 @@
-!> Circular obstacles. The disks are either outside the circle or inside the circle.
+!> Circular obstacles. The disks are either outside of a circular obstacle or inside the circle.
 module circles
   use free_flight, only: time_to_circle
   use images, only: images_t
@@ -40,10 +40,9 @@ contains
     circle%area = pi*radius**2
   end function new_circle
 
-  !> Vector to the point x from the middle of the nearest periodic image of the circle. Circles that enclose disks have no
-  !> images. If x is at equal distances from two images, a disk at x may touch both images. To choose between two equally distant
-  !> images, the vector `heading` is used: along the axis of the period, the components of the result and of `heading` have the same
-  !> sign.
+  !> Vector to the point x from the middle of the nearest periodic image of the circle. Circles that enclose disks have no images.
+  !> If x is at equal distances from two images, a disk at x may touch both images. Between two equally distant images, the function
+  !> chooses the image for which the result and the vector `heading` have the same sign along the axis of the period.
   pure function from_nearest(self, x, images, heading) result(d)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
@@ -91,8 +90,8 @@ contains
     if (self%encloses) length = -length
   end function gap
 
-  !> Unit vector from the point of contact on the circle to the centre of a disk that touches the circle. A disk touches a circle at
-  !> one point, so that `heading` is not needed.
+  !> Unit vector from the point of contact on the circle to the centre of a disk that touches the circle. The argument `heading` is
+  !> not used, because a disk touches a circle only at one point.
   pure function normal(self, d, heading) result(direction)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2)

@@ -10,8 +10,8 @@ module free_flight
   !> Speeds below this value are treated as zero, because contact times would overflow. [length/time]
   real(real64), parameter :: slowest = 1/never
 
-  !> Relative safety margin, larger than all rounding errors, of tests that exclude contacts. With the margin, a test never excludes
-  !> a contact that occurs, but may fail to exclude a contact that does not occur.
+  !> Relative safety margin, larger than all rounding errors, of tests that exclude contacts. With the margin, a test accepts every
+  !> contact that occurs, and possibly some contacts that do not occur.
   real(real64), parameter :: spare = 1.0e-6_real64
   !> Largest number of times that a time interval is halved to find a lower bound of the distance in each part of the interval.
   integer, parameter :: most_halvings = 3
@@ -100,17 +100,17 @@ contains
     end if
   end function time_to_circle
 
-  !> Whether an accelerated point certainly does not enter a circle around the origin during a given time. The point may start on
-  !> the circle. The squared distance of the point from the origin minus the squared radius is a quartic polynomial in time. In a
-  !> time interval, the value of a polynomial is never smaller than the smallest of its Bernstein coefficients. The Bernstein
-  !> coefficients converge to the values of the polynomial when the interval is halved repeatedly.
+  !> Whether an accelerated point certainly does not enter a circle around the origin during a given time. The point may be on the
+  !> circle at the start. The squared distance of the point from the origin minus the squared radius is a quartic polynomial in
+  !> time. In a time interval, the value of a polynomial is never smaller than the smallest of its Bernstein coefficients. The
+  !> Bernstein coefficients converge to the values of the polynomial when the interval is halved repeatedly.
   pure function misses_circle(d, v, g, rho, within) result(yes)
     real(real64), intent(in) :: d(2), v(2), g(2), rho, within
     logical :: yes
     real(real64) :: c(0:4), step(4), slack
 
     yes = .false.
-    if (within > sqrt(never)) return                   ! the length of the path might overflow
+    if (within > sqrt(never)) return                   ! the length of the path might exceed the largest real number
     step(1) = 0.5_real64*within*(d(1)*v(1) + d(2)*v(2))
     step(2) = within**2*((v(1)*v(1) + v(2)*v(2)) + (d(1)*g(1) + d(2)*g(2)))/6
     step(3) = 0.25_real64*within**3*(v(1)*g(1) + v(2)*g(2))
@@ -146,7 +146,7 @@ contains
   end function misses_circle
 
   !> Like `time_to_circle`, but the given number of earlier contacts is skipped. The point passes through the circle at each skipped
-  !> contact. Without acceleration, the path reaches the circle only once from inside or from outside.
+  !> contact. A straight path crosses a circle at most once inwards and once outwards.
   pure function later_time_to_circle(d, v, g, rho, inside, skipped) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside

@@ -12,17 +12,17 @@ module images
 
   !> A periodic image of the box: its displacement and velocity relative to the box itself.
   type :: image_t
-    real(real64) :: shift(2) = 0.0_real64       !! displacement of the image at the epoch [length]
+    real(real64) :: shift(2) = 0.0_real64       !! displacement of the image at the time origin [length]
     real(real64) :: velocity = 0.0_real64       !! velocity of the image along x [length/time]
   end type image_t
 
-  !> All periodic images of the box. Each image is identified by two indices, one along each axis: (0, 0) is the box itself, and (0,
-  !> 1) is the image above the box. The indices are whole numbers stored as reals, because two disks may be any number of periods
-  !> apart.
+  !> All periodic images of the box. Each image is identified by two indices, one along each axis. The image (0, 0) is the box
+  !> itself, and the image (0, 1) is above the box. The indices of an image are whole numbers stored as reals, because two disks may
+  !> be any number of periods apart.
   type :: images_t
     real(real64) :: period(2) = never           !! edges of the box; set to `never` along an axis with walls [length]
     real(real64) :: velocity = 0.0_real64       !! velocity of the image above the box [length/time]
-    real(real64) :: offset = 0.0_real64  !! displacement, at the epoch, of the image above the box, modulo the period [length]
+    real(real64) :: offset = 0.0_real64  !! displacement, at the time origin, of the image above the box, modulo the period [length]
     real(real64) :: removed_periods = 0.0_real64  !! number of periods that were subtracted from `offset`
   contains
     procedure :: count => count_around
@@ -38,9 +38,9 @@ module images
 
 contains
 
-  !> Creates the images of a box. The procedures of the type measure times from `epoch`. At the time t of the run, the image above
-  !> the box is displaced along x by velocity*t. The displacement is reduced modulo the period without rounding errors, so that the
-  !> precision does not decrease at late times.
+  !> Creates the images of a box. The procedures of the type `images_t` measure times from the time origin `epoch`. At the time t of
+  !> the run, the image above the box is displaced along x by velocity*t. The displacement is reduced modulo the period without
+  !> rounding errors, so that the precision does not decrease at late times.
   pure function moving_images(period, velocity, epoch) result(images)
     real(real64), intent(in) :: period(2)       !! [length]
     real(real64), intent(in) :: velocity        !! [length/time]
@@ -144,7 +144,7 @@ contains
       number(1) = -anint((dx(1) + self%displacement(number(2), now))/self%period(1))
   end function nearest_image
 
-  !> Displacement, at the epoch, of the image with the given indices.
+  !> Displacement, at the time origin, of the image with the given indices.
   pure function shift(self, number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: number(2)

@@ -2,8 +2,8 @@
 !>
 !> A disk touches a wall when the centre of the disk reaches the stadium around the wall. The stadium consists of two straight
 !> sides, parallel to the wall at a distance equal to the radius of the disk, and of two half circles around the ends of the wall.
-!> The stadium is convex, and the centre of a disk can therefore reach a straight side only from outside. Rounding errors can hide a
-!> contact only where a straight side meets a half circle; the contact with the half circle is then found.
+!> The stadium is convex, and the centre of a disk can therefore reach a straight side only from outside. If rounding errors hide a
+!> contact with a straight side near an end of the wall, the contact with the half circle around the end is found instead.
 module segments
   use free_flight, only: flight, time_to_circle, time_to_line
   use kinds, only: never, real64
@@ -43,8 +43,8 @@ contains
   end function new_segment
 
   !> Tangential velocity of the surface at a point of contact, if the surface moves along the wall with unit speed. The result is
-  !> the unit vector along the wall without its component along the normal of the surface. At the rounded ends of the wall the
-  !> surface therefore moves more slowly than along the wall.
+  !> the unit vector along the wall without its component along the normal of the surface. At the ends of the wall the surface
+  !> therefore moves more slowly than between the ends.
   pure function direction(self, d, normal) result(along)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -114,8 +114,8 @@ contains
   end function gap
 
   !> Unit vector from the point of contact on the wall to the centre of a disk that touches the wall. Between the ends of the wall
-  !> the result is exactly the normal of the wall, without rounding errors even for very small disks. A disk touches a wall at one
-  !> point, so that `heading` is not needed.
+  !> the result is exactly the normal of the wall, without rounding errors even for very small disks. The argument `heading` is not
+  !> used, because a disk touches a straight wall only at one point.
   pure function normal(self, d, heading) result(direction)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -172,7 +172,7 @@ contains
 
   contains
 
-    !> Whether an end is outside the box.
+    !> Whether an end of the wall is outside the box.
     pure function outside(point) result(yes)
       real(real64), intent(in) :: point(2)
       logical :: yes

@@ -1,5 +1,6 @@
 !> Interface of fixed obstacles of all shapes. The neighbour search, the placement of disks, time-stepped dynamics and the
-!> observables use only this interface, and therefore do not depend on whether an obstacle is a circle or a straight wall.
+!> observables use only the interface `shape_t`, and therefore do not depend on whether an obstacle is a circle, an arc or a
+!> straight wall.
 module shapes
   use images, only: images_t
   use kinds, only: real64
@@ -7,8 +8,8 @@ module shapes
   private
   public :: shape_t, magnitude, spare
 
-  !> Relative safety margin, larger than all rounding errors. If rounding errors make the result of a test uncertain, a test with
-  !> this margin returns the safe result.
+  !> Relative safety margin, larger than all rounding errors. If rounding errors make the result of a test uncertain, the margin
+  !> ensures that the test returns the result with which no contact is missed.
   real(real64), parameter :: spare = 1.0e-6_real64
 
   !> The outline of an obstacle. All points are relative to the middle of the obstacle.
@@ -56,8 +57,7 @@ module shapes
     end function gap
 
     !> Unit vector from the point of contact on the outline to the centre of a disk that touches the outline. If the disk touches
-    !> the outline at several points, the vector `heading` selects the point: the angle between the result and `heading` is the
-    !> smallest.
+    !> the outline at several points, the function chooses the point whose normal has the smallest angle to the vector `heading`.
     pure function normal(self, d, heading) result(direction)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -105,10 +105,10 @@ contains
     magnitude = sqrt(v(1)*v(1) + v(2)*v(2))
   end function magnitude
 
-  !> Vector to the point x from the middle of the nearest periodic image of the obstacle. The nearest image of a long wall is not
-  !> always the image whose middle is nearest to x. The distances of x from the outlines of all images are therefore compared. If x
-  !> is at equal distances from two images, a disk at x may touch both images. To choose between two equally distant images, the
-  !> vector `heading` is used: the angle between `heading` and the normal of the chosen image is the smallest.
+  !> Vector to the point x from the middle of the nearest periodic image of the obstacle. The distances of x from the outlines of
+  !> all images are compared, because the nearest image of a long wall is not always the image whose middle is nearest to x. If x is
+  !> at equal distances from two images, a disk at x may touch both images. Between two equally distant images, the function chooses
+  !> the image whose normal has the smallest angle to the vector `heading`.
   pure function from_nearest(self, x, images, heading) result(d)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]

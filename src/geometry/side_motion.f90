@@ -12,7 +12,8 @@ module side_motion
   private
   public :: motions, side_motion_t, side_state_t
 
-  !> Kinds of motion, with the names that the input uses. The number of a kind is its position in this list.
+  !> Kinds of motion of a side, with the names that the input uses. Elsewhere in the program a kind of motion is represented by its
+  !> position in the list `motions`.
   character(len=*), parameter :: motions = "still sine parabolic sawtooth constant_velocity piston"
   integer, parameter, public :: still = 1, sine = 2, parabolic = 3, sawtooth = 4, constant_velocity = 5, piston = 6
   !> Angle below which differences of sines are calculated by a power series, to avoid cancellation [radian]

@@ -1,5 +1,5 @@
 !> Positions of the sides of the box, and the times at which disks reach the sides. The time at which a disk reaches a side is a
-!> pure function of the state of the disk. All times, like the clocks of disks, are relative to the time origin `box%epoch`.
+!> pure function of the state of the disk. All times, including the clocks of disks, are relative to the time origin `box%epoch`.
 module box_sides
   use box_geometry, only: box_t
   use disks, only: disk_t
@@ -32,8 +32,8 @@ contains
     upper = box%upper - inwards([2, 4])
   end subroutine bounds
 
-  !> Whether the region extends over the whole period of the box, for each axis. Disks may extend beyond the region along an axis
-  !> for which the result is .true.
+  !> Whether the region extends over the whole period of the box along each axis; .false. along an axis that is not periodic. Disks
+  !> may extend beyond the region along an axis for which the result is .true.
   pure function spans(region, box) result(yes)
     real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box
@@ -63,9 +63,9 @@ contains
   end subroutine centre_range
 
   !> Time when the boundary of a disk touches a wall, or its centre reaches a periodic side. A gap that is negative because of
-  !> rounding is set to zero: a disk at a wall that still moves outwards is then reflected immediately and cannot leave the box. At
-  !> a moving side, a gap smaller than the rounding error is also set to zero. A series of ever shorter bounces between a disk and a
-  !> moving side would otherwise be infinite.
+  !> rounding is set to zero, so that a disk that moves outwards at a wall is reflected immediately and cannot leave the box. At a
+  !> moving side, a gap smaller than the rounding error is also set to zero, because a series of ever shorter bounces between a disk
+  !> and a moving side would otherwise be infinite.
   pure function side_time(box, disk, side) result(t)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk

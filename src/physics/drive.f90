@@ -18,7 +18,8 @@ module drive
     real(real64) :: strength = 0.0_real64
     logical :: keep_momentum = .false.  !! whether white noise conserves the total momentum; .false. for other kinds of driving
     real(real64) :: fraction = 1.0_real64            !! mean fraction of the disks that a kick of 'andersen' affects
-    real(real64) :: temperature = 0.0_real64         !! kT of drawn velocities; 0 if velocities are not drawn [energy]
+    !> KT of the distribution from which velocities are drawn; 0 if velocities are not drawn [energy]
+    real(real64) :: temperature = 0.0_real64
     real(real64) :: speed = 0.0_real64               !! self-propulsion speed of active disks [length/time]
     real(real64) :: rotational_diffusion = 0.0_real64   !! rotational diffusion coefficient of active disks [1/time]
     integer :: species = 0                           !! index of the only driven species; 0: all species are driven
@@ -53,7 +54,7 @@ contains
     yes = self%is_on() .and. (self%species == 0 .or. self%species == species)
   end function acts_on
 
-  !> Whether the driving moves disks to other positions, and not only changes their velocities.
+  !> Whether kicks also move disks to other positions, which is the case only for recycling.
   pure function moves_disks(self) result(yes)
     class(drive_t), intent(in) :: self
     logical :: yes

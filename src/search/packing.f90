@@ -1,6 +1,6 @@
-!> A packing: a set of placed disks, with a test whether another disk fits between them, and a search for the first disk that a
-!> moving disk touches. Each species has its own grid of cells. The disks of one species have similar radii. The cost of a search
-!> therefore does not depend on the radii of other species.
+!> A packing is a set of placed disks. The module can test whether another disk fits between the placed disks, and can find the
+!> first disk that a moving disk touches. Each species has its own grid of cells. The disks of one species have similar radii. The
+!> cost of a search therefore does not depend on the radii of other species.
 module packing
   use images, only: images_t
   use kinds, only: int32, real64
@@ -170,7 +170,7 @@ contains
     associate (me => self%disk(k), box => self%box)
       p = me%x
       p(axis) = p(axis) + distance
-      if (box%periodic(axis)) then                  ! the limits at the ends allow for rounding errors
+      if (box%periodic(axis)) then                  ! rounding errors must not move the disk out of the box
         if (p(axis) >= box%upper(axis)) p(axis) = max(p(axis) - (box%upper(axis) - box%lower(axis)), box%lower(axis))
         if (p(axis) < box%lower(axis)) p(axis) = min(p(axis) + (box%upper(axis) - box%lower(axis)), box%upper(axis))
       end if
@@ -202,7 +202,7 @@ contains
   end subroutine find_contact
 
   !> Like `find_contact`, but searches only the disks of species s. The procedure searches lines of cells perpendicular to the
-  !> motion, one after another, until the next line is too far ahead of disk k.
+  !> motion, one line after another, until disk k cannot reach the next line before the contact that was found.
   pure subroutine search_ahead(packing, s, k, way, distance, partner)
     type(packing_t), intent(in) :: packing
     integer, intent(in) :: s
@@ -393,13 +393,13 @@ contains
     end do
   end function blocker_in
 
-  !> Lists all disks whose boundary is within the distance `reach` of a point. The list may also contain more distant disks in the
-  !> cells that were searched.
+  !> Lists all disks whose boundary is within the distance `reach` of a point. The list may also contain more distant disks, because
+  !> all disks in the searched cells are listed.
   subroutine list_neighbours(self, p, reach, list, n)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: p(2), reach         !! [length]
     integer(int32), allocatable, intent(inout) :: list(:)   !! enlarged if necessary
-    integer(int32), intent(out) :: n                !! number of valid elements of the list
+    integer(int32), intent(out) :: n                !! number of disks in the list
     integer :: s, kx, ky, first(2), last(2)
 
     n = 0
@@ -481,7 +481,8 @@ contains
     c = 1 + int(min(column_row, layer%n - 1.0_real64))
   end function cell
 
-  !> Index range of those periodic images of a point that can be within the distance rho of a disk in the box.
+  !> First and last index, along each axis, of the periodic images of a point that can be within the distance rho of a disk in the
+  !> box.
   pure subroutine range_images(box, p, rho, first, last)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: p(2), rho

@@ -1,6 +1,6 @@
-!> Lists the disks that a piston may touch in the near future. A piston can reach every disk in the course of time. Before the
-!> piston has moved by the width of a cell, the piston can touch only disks in a strip of adjacent columns or rows of cells
-!> (`cell_faces: find_strips`). Only the disks in its strip are tested against a piston.
+!> Lists the disks that a piston may touch in the near future. In the course of time, a piston can reach every disk in the box.
+!> Before the piston has moved by the width of a cell, the piston can touch only disks in a strip of adjacent columns or rows of
+!> cells (`cell_faces: find_strips`). Contacts with a piston are therefore predicted only for the disks in the strip of the piston.
 module piston_strips
   use kinds, only: int16, int32, real64
   use cell_grid, only: cell_grid_t
@@ -50,7 +50,7 @@ contains
     disks = disks(:n)
   contains
 
-    !> Adds disk i to the list.
+    !> Adds disk i to the list of disks that the piston may touch.
     subroutine add(i)
       integer(int32), intent(in) :: i
 

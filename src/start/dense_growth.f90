@@ -1,8 +1,8 @@
 !> Dense random packings by Lubachevsky-Stillinger compression (Lubachevsky and Stillinger, 1990, doi:10.1007/BF01025983): the disks
-!> start small, move as an elastic gas, and grow to their full size. In the original algorithm the disks grow continuously. In this
-!> module the disks grow in steps between short runs at constant size, so that the ordinary event-driven dynamics can be used. In
-!> each step every disk grows into the gap between the disk and its neighbours. If initial positions are given, the disks start at
-!> these positions with the largest size for which they do not overlap.
+!> start small, move as an elastic gas, and grow to their full size. In the original algorithm the disks grow continuously. In the
+!> module `dense_growth` the disks grow in steps between short runs at constant size, so that the ordinary event-driven dynamics can
+!> be used. In each step every disk grows into the gap between the disk and its neighbours. If initial positions are given, the
+!> disks start at these positions with the largest size for which they do not overlap.
 module dense_growth
   use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t, obstacle_gap
@@ -135,7 +135,7 @@ contains
       wanted = 0
       do k = 1, size(species)
         associate (own => full(disks_before(species, k) + 1:disks_before(species, k + 1)))
-          ! If all radii are equal, every term of this sum is 1, and the sum is free of rounding errors.
+          ! If all radii are equal, every term of the sum is 1, and the sum is free of rounding errors.
           wanted = wanted + own(1)**2*sum((own/own(1))**2)
         end associate
       end do
@@ -247,8 +247,8 @@ contains
     end subroutine grow
   end subroutine grow_disks
 
-  !> Distance from a point to the nearest side or obstacle. Obstacles that are farther away than the largest radius of a disk may be
-  !> ignored.
+  !> Distance from a point to the nearest side or obstacle. Obstacles at distances larger than the largest radius of a disk may be
+  !> ignored, because such obstacles do not limit the growth of a disk.
   pure function wall_distance(packing, x) result(distance)
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: x(2)                    !! [length]

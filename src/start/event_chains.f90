@@ -1,21 +1,24 @@
 !> Equilibration of a dense packing by event-chain Monte Carlo (Bernard, Krauth and Wilson, 2009, doi:10.1103/PhysRevE.80.056704).
-!> In a chain one disk moves along an axis until it touches another disk; then the other disk moves on in the same direction, and so
-!> on, until the displacements add up to the length of the chain. Chains along x and along y alternate.
+!> In an event chain, one disk moves along an axis until it touches a second disk. The second disk then moves in the same direction
+!> until it touches a third disk, and so on, until the sum of all displacements equals the length of the chain. Chains along x and
+!> along y alternate.
 !>
-!> Along a periodic axis all chains move to the right or upwards. The state of a chain consists of the positions of all disks and of
-!> the moving disk. Each state has exactly one predecessor, and the motion preserves volume. Chains whose first disk is drawn
-!> uniformly from all disks and whose length does not depend on the positions therefore keep the uniform distribution of all
-!> packings (global balance), although no chain moves backwards.
+!> Along a periodic axis all chains move to the right or upwards. The state of a chain consists of the positions of all disks and
+!> the index of the moving disk. Each state of a chain has exactly one predecessor, and the motion preserves the volume of a set of
+!> states. The uniform distribution of all packings is therefore stationary (global balance), although no chain moves backwards. The
+!> uniform distribution is stationary only if the first disk of each chain is drawn uniformly from all disks, and if the length of
+!> the chain does not depend on the positions.
 !>
-!> Along an axis with sides, a disk that reaches a side reverses its direction and continues (Li et al., 2022,
-!> doi:10.1063/5.0126437, straight event chains in a box with walls). The state of the chain then includes the direction, and each
-!> state still has exactly one predecessor: a disk that moves away from a side that it touches has just been reflected there. The
-!> argument requires that both directions are equally probable at the start of a chain, so the first direction is drawn. A chain
-!> that is reversed at its end leads back to its start; these chains also satisfy detailed balance.
+!> Along an axis with sides, a disk that reaches a side reverses its direction and continues (straight event chains in a box with
+!> walls; Li et al., 2022, doi:10.1063/5.0126437). The state of a chain along an axis with sides includes the direction of the
+!> chain. Each state has exactly one predecessor even with reflections, because a disk that touches a side and moves away from the
+!> side has just been reflected. The first direction of a chain between two sides is drawn at random, because the uniform
+!> distribution is stationary only if both directions are equally probable. If a chain between two sides is reversed at its end, the
+!> chain leads back to its start. Chains between sides therefore also satisfy detailed balance.
 !>
 !> If the radii differ, a swap is attempted after each chain: two disks, drawn uniformly from all disks, exchange their positions
-!> unless the larger disk would overlap another disk or a side (Grigera and Parisi, 2001, doi:10.1103/PhysRevE.63.045102). The pair
-!> is drawn independently of the positions, so swaps satisfy detailed balance.
+!> unless the larger disk would overlap another disk or a side (Grigera and Parisi, 2001, doi:10.1103/PhysRevE.63.045102). Swaps
+!> satisfy detailed balance, because the two disks are drawn independently of the positions.
 module event_chains
   use kinds, only: int32, int64, pi, real64
   use box_geometry, only: box_t
@@ -29,7 +32,8 @@ module event_chains
   real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! packing fraction of the triangular lattice
   integer, parameter :: stream_number = 8         !! number that identifies the random streams of this module
   integer, parameter :: chains_per_look = 1024    !! number of chains between two updates of the status line
-  !> A chain ends as jammed if as many disks as usually move in a complete chain cover less than this fraction of its length.
+  !> Fraction of the length of a chain that `usual_steps` successive moves must cover. A chain that moves more slowly is considered
+  !> jammed and ends.
   real(real64), parameter :: jammed = 1.0e-3_real64
 
 contains
@@ -82,7 +86,7 @@ contains
     end do
   end subroutine relax
 
-  !> Fills a packing with disks. The radii of the disks in one layer of the packing differ by less than a factor of two.
+  !> Fills a packing with disks. The disks are divided into layers, and the radii in one layer differ by less than a factor of two.
   subroutine fill(packing, box, radius, x)
     type(packing_t), intent(out) :: packing
     type(box_t), intent(in) :: box
@@ -105,10 +109,11 @@ contains
     end do
   end subroutine fill
 
-  !> Estimate of the mean displacement of a disk in a chain. In equilibrium the displacements and the jumps to the next disk, which
-  !> are pi/4 diameters long on average, are related to the pressure (Michel, Kapfer and Krauth, 2014, doi:10.1063/1.4863991): the
-  !> ratio of jumps to displacements is Z - 1. The estimate uses the larger value of Z - 1 of scaled particle theory and of the free
-  !> volume of a crystal.
+  !> Estimate of the mean displacement of a disk in a chain. In equilibrium the pressure determines the ratio of two mean lengths:
+  !> the distance between the centres of two successive disks of a chain along its direction, and the displacement of a disk
+  !> (Michel, Kapfer and Krauth, 2014, doi:10.1063/1.4863991). The ratio of the mean distance to the mean displacement is Z - 1,
+  !> where Z is the compressibility factor, and the mean distance is pi/4 diameters. For Z - 1 the function uses the larger of two
+  !> estimates, from scaled particle theory and from the free volume of a crystal.
   pure function mean_step(box, radius) result(step)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: radius(:)
@@ -127,7 +132,8 @@ contains
     integer, intent(in) :: axis                   !! 1 for x, 2 for y
     integer, intent(in) :: first_sense            !! 1 to start to the right or upwards, -1 to start in the opposite direction
     real(real64), intent(in) :: length            !! sum of all displacements [length]
-    !> Number of moved disks between two tests for a jam: at closest packing no disk can move, and the chain would not end.
+    !> Number of moves between two tests for a jam. The test is needed because no disk can move at closest packing, where a chain
+    !> would never end.
     integer, intent(in) :: usual_steps
     real(real64) :: left, left_before, distance   ! [length]
     integer(int32) :: k, partner
@@ -152,7 +158,8 @@ contains
       else
         sense = -sense
         bounces = bounces + 1
-        ! A disk that moves between two sides without touching another disk repeats its motion.
+        ! A disk that moves between two sides without touching another disk repeats its motion; whole periods of the motion are
+        ! skipped.
         if (bounces == 2) left = modulo(left, max(2*room(packing, k, axis, sense), tiny(left)))
       end if
       step = step + 1
@@ -175,7 +182,7 @@ contains
       else
         distance = me%x(axis) - me%radius - box%lower(axis)
       end if
-      distance = max(distance, 0.0_real64)        ! rounding errors may have moved the disk beyond the side
+      distance = max(distance, 0.0_real64)        ! rounding errors may have moved the disk slightly beyond the side
     end associate
   end function room
 

@@ -28,7 +28,8 @@ contains
     class(status_line_t), intent(inout) :: line             !! status line that shows the progress of the placement
     type(simulation_t), intent(out) :: sim
     type(error_t), allocatable, intent(out) :: error
-    !> .true. to leave out the placement of species with placement = 'relaxed', which only tests of the input do
+    !> .true. to leave out the placement of species with placement = 'relaxed', because a test of the input (--check) needs no
+    !> positions
     logical, intent(in), optional :: unrelaxed
     type(problem_list_t) :: problems
     logical :: without_placement

@@ -25,7 +25,8 @@ module input_fit
   real(real64), parameter, public :: rounding = 1.0e-12_real64        !! relative tolerance for disks that touch
   real(real64), parameter :: random_limit = 0.547_real64      !! packing fraction at which random sequential insertion saturates
   real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! packing fraction of the triangular lattice
-  !> Ratio of two radii above which different sizes allow no denser packing than equal sizes (Blind, 1969, see `densest_packing`)
+  !> Ratio of the smallest to the largest radius above which disks of different sizes cannot be packed more densely than disks of
+  !> equal size (Blind, 1969, see `densest_packing`)
   real(real64), parameter :: nearly_equal = 0.743_real64
 
 contains
@@ -58,7 +59,8 @@ contains
     complete = .true.
   end subroutine complete_settings
 
-  !> Reports columns of frames that the disks of this run do not have. A starting file can determine whether the disks rotate.
+  !> Reports requested columns of the frames that the run does not have, such as orientations of disks that do not rotate. The
+  !> columns are checked after the starting files have been read, because a starting file can determine whether the disks rotate.
   subroutine check_columns(settings, group, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: group                        !! the group `output`
@@ -112,13 +114,13 @@ contains
     end associate
   end subroutine check_fit
 
-  !> Checks the regions between which disks are recycled: they must be apart and in the box, and the region to which disks move must
-  !> be wide enough for a disk and clear of obstacles.
+  !> Checks the two regions of recycling. Both regions must lie in the box, and they must not overlap each other. The region to
+  !> which disks move must be wide enough for a disk and must not overlap an obstacle.
   subroutine check_recycling(settings, group, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: group                        !! the group `drive`
     type(problem_list_t), intent(inout) :: problems
-    real(real64), parameter :: nearly = 1 - 1.0e-4_real64     ! a region may touch an obstacle
+    real(real64), parameter :: nearly = 1 - 1.0e-4_real64     ! factor below 1, because a region may touch an obstacle
     real(real64) :: beyond(2, 2), radius, middle(2), half(2)
     integer :: before, k
 
@@ -138,7 +140,7 @@ contains
       if (any(half <= radius .and. .not. spans(to, box))) call group%complain("to_region", &
         "a disk of diameter "//written(2*radius)//" needs more room; the region is "//written(2*half(1))//" x " &
         //written(2*half(2)), problems)
-      half = max(half - merge(0.0_real64, radius, spans(to, box)), 0.0_real64)       ! the rectangle of the centres
+      half = max(half - merge(0.0_real64, radius, spans(to, box)), 0.0_real64)       ! the rectangle for the centres of disks
       do k = 1, box%n_obstacles()
         if (.not. is_in_the_way(box, k, middle, nearly*half, nearly*radius)) cycle
         call group%complain("to_region", 'it overlaps obstacle "'//box%surface(box%obstacle(k)%surface)%name//'"', problems)
@@ -185,8 +187,9 @@ contains
     end associate
   end function is_in_the_way
 
-  !> Reports species that are to be compressed beyond the packing fraction that is proven to be the largest. All species of the same
-  !> region count, because all their disks lie in the region. Radii in files are not read here, and such regions are not checked.
+  !> Reports species with placement 'dense', 'grown' or 'relaxed' whose packing fraction would exceed a proven upper bound. The
+  !> packing fraction of a region includes the disks of all species that have the same region. Regions with disks whose radii come
+  !> from a file are not checked.
   subroutine check_compressed(species, seed, groups, problems)
     type(species_settings_t), intent(in) :: species(:)
     integer(int64), intent(in) :: seed                        !! seed of the run
@@ -220,10 +223,11 @@ contains
   end subroutine check_compressed
 
   !> Upper bound of the packing fraction of disks in the plane. The bound also holds for a rectangle with sides and for a periodic
-  !> box, because copies of a rectangle fill the plane. For nearly equal disks it is the packing fraction of the triangular lattice
-  !> (Blind, Journal für die reine und angewandte Mathematik 236, 145, 1969). For other ratios of the smallest to the largest
-  !> radius it is the packing fraction within the triangle of the centres of a largest and two smallest disks that touch each other
-  !> (Florian, Rendiconti del Circolo Matematico di Palermo 9, 300, 1960). Fernique (2021, arXiv:2107.14079) reviews both bounds.
+  !> box, because copies of a rectangle fill the plane. For disks of nearly equal radii the bound is the packing fraction of the
+  !> triangular lattice (Blind, Journal für die reine und angewandte Mathematik 236, 145, 1969). For other radii the bound is the
+  !> packing fraction inside the triangle whose corners are the centres of one largest disk and two smallest disks that touch each
+  !> other (Florian, Rendiconti del Circolo Matematico di Palermo 9, 300, 1960). Fernique (2021, arXiv:2107.14079) reviews the
+  !> bounds of Blind and Florian.
   pure function densest_packing(ratio) result(most)
     real(real64), intent(in) :: ratio                         !! smallest radius divided by largest radius
     real(real64) :: most

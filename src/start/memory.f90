@@ -17,14 +17,14 @@ module memory
   !> script `runs/memory.sh` measures the contributions with an accuracy of 5 %. For time-stepped dynamics the contributions are
   !> upper bounds, because the length of the Verlet lists depends on the time step.
   integer(int64), parameter :: per_process = 10000000, per_obstacle = 580
-  !> `record`: state and next event of a disk; `cell`: a cell of the neighbour search
+  !> Memory of the state and the next event of a disk (`record`), and of a cell of the neighbour search (`cell`)
   real(real64), parameter :: record = 103, cell = 32
-  !> `extra`: image indices, contact time and rotation of a disk; `own_size`: individual mass of a disk
+  !> Memory of the image indices, contact time and rotation of a disk (`extra`), and of an individual mass (`own_size`)
   real(real64), parameter :: extra = 40, own_size = 8
   real(real64), parameter :: sampled = 8.8_real64            !! memory for each value of a disk in a frame
   real(real64), parameter :: listed = 264                    !! neighbour list of a disk
-  !> `kicked`: random numbers of the driving; `placed_anew`: test for free positions of recycled disks; `stepped`: Verlet lists of
-  !> time-stepped dynamics.
+  !> Memory per disk of the random numbers of the driving (`kicked`), of the test for free positions of recycled disks
+  !> (`placed_anew`), and of the Verlet lists of time-stepped dynamics (`stepped`)
   real(real64), parameter :: kicked = 16, placed_anew = 70, stepped = 100
   !> Additional memory per disk if the box is divided into domains: the first number applies to a box with walls, the second number
   !> to a periodic box.
@@ -97,8 +97,9 @@ contains
     bytes = int(settings%n_disks()*max(running, starting), int64) + per_process + settings%box%n_obstacles()*per_obstacle
   end function peak
 
-  !> Memory in bytes per disk during the placement of disks, without optional data such as individual masses. For
-  !> 'relaxed' disks it is that of the compression, which needs more than the event chains; a start on a lattice needs less.
+  !> Memory in bytes per disk during the placement of disks, without optional data such as individual masses. For disks with
+  !> placement 'relaxed' the result is the memory of the compression, because the event chains and a start on a lattice need less
+  !> memory.
   pure function starting_bytes(settings) result(bytes)
     type(settings_t), intent(in) :: settings
     real(real64) :: bytes
@@ -182,7 +183,8 @@ contains
   function free_memory(root) result(bytes)
     character(len=*), intent(in) :: root                  !! root folder of the file system; empty except in tests
     integer(int64) :: bytes
-    character(len=:), allocatable :: groups, line         ! a line `number:controllers:group`; version 2 omits the controllers
+    ! A line of the form `number:controllers:group`; in version 2 of control groups the controllers are empty
+    character(len=:), allocatable :: groups, line
     character(len=:), allocatable :: folder, unread
     integer :: top, at, colon
 

@@ -3,8 +3,9 @@
 !> Species whose positions are fixed (placement 'explicit', 'file', 'grid' or 'lattice') are placed first, in the order of the
 !> input. Species with placement 'random' are placed next, the species with the largest disks first. Species with placement 'dense'
 !> or 'grown' are placed last. All 'dense' and 'grown' species with the same region are compressed together, and disks that were
-!> placed earlier are fixed obstacles during the compression. If one species has placement 'relaxed', all species have it: their
-!> disks are placed together, by compression or on a lattice, and equilibrated by event chains.
+!> placed earlier are fixed obstacles during the compression. If one species has placement 'relaxed', all species must have this
+!> placement. The disks of all 'relaxed' species are placed together, by compression or on a lattice, and equilibrated by event
+!> chains.
 module placement
   use images, only: images_t
   use kinds, only: int32, int64, pi, real64
@@ -40,12 +41,12 @@ module placement
   integer(int32), parameter :: many_trials = 500000
   !> If an attempt has placed n disks, a new attempt is estimated to place at most nearly*n + few disks.
   integer(int32), parameter :: few = 5
-  real(real64), parameter :: nearly = 1.25_real64  !! factor in the estimate that is explained at `few`
-  !> 'dense' reaches at least this multiple of the packing fraction that 'random' reaches
+  real(real64), parameter :: nearly = 1.25_real64  !! factor of n in the estimate nearly*n + few
+  !> Smallest ratio of the packing fractions that the placements 'dense' and 'random' can reach
   real(real64), parameter :: denser = 1.5_real64
-  !> Packing fraction above which 'relaxed' starts equal disks on a lattice if the lattice fits. Above this value the fluid is not
-  !> stable (Engel et al., 2013, doi:10.1103/PhysRevE.87.042134), and a compressed fluid would become a polycrystal, which event
-  !> chains equilibrate only slowly.
+  !> Packing fraction of freezing. Above the packing fraction of freezing the fluid is not stable (Engel et al., 2013,
+  !> doi:10.1103/PhysRevE.87.042134). At higher packing fractions, disks of equal radii with placement 'relaxed' start on a lattice
+  !> if the lattice fits into the box. A compressed fluid would become a polycrystal, which event chains equilibrate only slowly.
   real(real64), parameter :: freezing = 0.70_real64
   integer, parameter :: most_reports = 5                    !! largest number of problems of one kind reported for one species
 
@@ -219,8 +220,8 @@ contains
       associate (me => species(s))
         call stream%seed(seed, [s, stream_number])
         call centre_range(me%region, packing%box, me%radius, lower, upper)
-        ! The number of disks that fit varies between attempts. For a species with few disks, the number of placed disks varies more
-        ! in relation to its mean; more attempts are therefore made.
+        ! The number of disks that fit varies between attempts. Small species are given more attempts, because the number of placed
+        ! disks varies more in relation to its mean if the species has few disks.
         do trial = 1, merge(1, max(1, many_trials/me%count), me%polydispersity > 0)
           call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
           call insert_at_random(packing, int(s, int32), 1 + disks_before(species, s), radius, stream, line, placed)
@@ -237,8 +238,9 @@ contains
     end subroutine place_at_random
 
     !> Places all 'dense', 'grown' or 'relaxed' species of one region by compression, in a box with the shape of the region. The
-    !> compression of 'grown' species starts at positions that are read from a file. Equal 'relaxed' disks start on a lattice above
-    !> the packing fraction of freezing. 'relaxed' disks are then equilibrated.
+    !> compression of 'grown' species starts at positions that are read from a file. 'relaxed' disks of equal radii start on a
+    !> lattice instead if their packing fraction is above the packing fraction of freezing. After the compression or the start on a
+    !> lattice, 'relaxed' disks are equilibrated by event chains.
     subroutine place_densely(members)
       integer, intent(in) :: members(:)                     !! indices of the species
       ! A copy of the packing, to which the small disks at the start of the compression are added.
@@ -288,8 +290,9 @@ contains
       end do
     end subroutine place_densely
 
-    !> Places all disks on one lattice, in random order, if the disks have equal radii, their packing fraction is above that of
-    !> freezing, and the lattice fits. Otherwise the array of positions remains unchanged.
+    !> Places all disks on one lattice, in random order, under three conditions. The disks must have equal radii, their packing
+    !> fraction must be above the packing fraction of freezing, and the lattice must fit into the box. If a condition is not met,
+    !> the array of positions remains unchanged.
     subroutine place_on_lattice(full, places)
       real(real64), intent(in) :: full(:)                   !! (n) radii of all disks [length]
       real(real64), allocatable, intent(inout) :: places(:, :)         !! (2,n) [length]
@@ -308,8 +311,8 @@ contains
     end subroutine place_on_lattice
   end subroutine place_disks
 
-  !> Creates the box for a compression: the region, without any part that lies beyond a displaced side. If disks that were placed
-  !> earlier, or their periodic images, extend into the box, they become obstacles in the box.
+  !> Creates the box for a compression: the region, without any part that lies beyond a displaced side. Disks that were placed
+  !> earlier, and their periodic images, become obstacles if they extend into the new box.
   function growth_box(packing, region) result(box)
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: region(4)
@@ -324,7 +327,7 @@ contains
     box%upper = min(region([2, 4]), box%upper)
     box%periodic = spans(region, packing%box)
     images = packing%box%images()
-    do pass = 1, 2                                          ! the first pass counts the obstacles, the second pass creates them
+    do pass = 1, 2  ! the first pass counts the obstacles, the second pass creates the obstacles
       n = packing%box%n_obstacles()
       do k = 1, size(packing%disk)
         if (packing%disk(k)%species == 0) cycle

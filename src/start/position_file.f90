@@ -69,9 +69,9 @@ contains
 
   contains
 
-    !> Reads a line of the file. The first line may contain the names of the columns; if the first line contains numbers, the
-    !> columns have the names x y or x y vx vy. Every line of numbers describes a disk, which is added to the table if it belongs to
-    !> the requested species.
+    !> Reads a line of the file. The first line may contain the names of the columns. If the first line contains numbers instead,
+    !> the columns have the names x y or x y vx vy. Every line of numbers describes a disk, which is added to the table if it
+    !> belongs to the requested species.
     subroutine read_line()
       real(real64) :: value(size(column_names))
       integer :: k, its_species

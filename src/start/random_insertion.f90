@@ -1,11 +1,11 @@
 !> Random sequential insertion: each disk is inserted at a point that is uniformly distributed among all points where the disk fits
 !> between the previous disks. The region is divided into voxels (small rectangles). A voxel is eliminated if a single disk excludes
 !> the centre of a new disk from the whole voxel, and points are drawn only from the remaining voxels. All voxels are halved along
-!> both axes when attempts fail too often. Attempts in eliminated voxels would always fail; the method therefore generates the same
-!> distribution as simple insertion, but can reach saturation (Zhang and Torquato, 2013, doi:10.1103/PhysRevE.88.053312). If the
-!> disks have different radii, the largest disks are inserted first, and no voxels are eliminated, because a voxel without space for
-!> one disk may have space for a smaller disk. The insertion of disks with different radii ends when many attempts to insert a disk
-!> have failed.
+!> both axes when attempts fail too often. Because attempts in eliminated voxels would always fail, the method generates the same
+!> distribution as simple insertion, but the method can reach saturation (Zhang and Torquato, 2013, doi:10.1103/PhysRevE.88.053312).
+!> If the disks have different radii, the largest disks are inserted first, and no voxels are eliminated, because a voxel without
+!> space for one disk may have space for a smaller disk. The insertion of disks with different radii ends when many attempts to
+!> insert a disk have failed.
 module random_insertion
   use kinds, only: int32, real64
   use memory_hints, only: prefetch
@@ -190,7 +190,7 @@ contains
 
     n = voxels%n
     if (maxval(voxels%column_row(:, :n)) >= ishft(huge(n), -1)) then
-      voxels%n = 0                                  ! the columns and rows of smaller voxels would have numbers that exceed 32 bits
+      voxels%n = 0                                  ! the numbers of columns and rows of smaller voxels would exceed 32 bits
       return
     end if
     call move_alloc(voxels%column_row, parent)

@@ -79,10 +79,10 @@ contains
 
       distance = -1
       do rows = 1, n
-        ! Alternate rows are shifted; a periodic lattice must therefore have an even number of rows.
+        ! A periodic lattice must have an even number of rows, because alternate rows are shifted.
         if (periodic(2) .and. modulo(rows, 2) == 1 .and. rows > 1) cycle
         call measure_lattice(1 + (n - 1)/rows, rows, its_step, its_distance)
-        if (rows > 2 .and. 2*its_step(2) <= distance) exit                 ! with more rows, the distance could only be smaller
+        if (rows > 2 .and. 2*its_step(2) <= distance) exit  ! with more rows, the distance between neighbours could only be smaller
         if (its_distance <= distance) cycle
         distance = its_distance
         columns = 1 + (n - 1)/rows

@@ -83,8 +83,8 @@ contains
   end subroutine refuse
 
   !> Completes the table of disks with values from the input. The procedure reports each quantity that is missing in both the file
-  !> and the input. A quantity is also reported if both a text file and the input contain the quantity. If the output file of a run
-  !> and the input contain the same quantity, the value in the input is used, and no error is reported.
+  !> and the input. The procedure also reports each quantity that both a text file and the input contain. If the output file of a
+  !> run and the input contain the same quantity, the value in the input is used, and no error is reported.
   subroutine join(me)
     type(species_settings_t), intent(inout) :: me
     logical :: wanted(radius_row:mass_row)

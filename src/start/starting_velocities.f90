@@ -60,8 +60,8 @@ contains
     end subroutine find_disks
 
     !> Draws the velocities of one species. If the total momentum must be zero, velocities of equal speed are drawn as opposite
-    !> pairs, with three velocities at angles of 120 degrees if the number of disks is odd. In this way the total momentum is zero
-    !> although all disks have the same speed. For 'uniform' and 'maxwell', `remove_drift` sets the total momentum to zero.
+    !> pairs, with three velocities at angles of 120 degrees if the number of disks is odd. The total momentum of opposite pairs is
+    !> zero although all disks have the same speed. For 'uniform' and 'maxwell', `remove_drift` sets the total momentum to zero.
     subroutine draw_velocities()
       associate (species => settings%species(s), disk => sim%disk)
         select case (species%velocities)
