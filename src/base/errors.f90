@@ -7,12 +7,12 @@ module errors
   public :: error_t, fail
   public :: exit_finished, exit_usage, exit_files, exit_broken, exit_stopped
 
-  integer, parameter :: exit_finished = 0   !! the run reached its stop rule
-  integer, parameter :: exit_usage = 2      !! wrong usage, invalid input, or a checkpoint that belongs to another run
-  integer, parameter :: exit_files = 3      !! a file cannot be read or written, the disk is full, or the file is in use
-  !> The simulation broke off: events no longer advance the time, disks overlap, or a number is NaN.
+  integer, parameter :: exit_finished = 0   !! exit status of a run that reached its stop rule
+  integer, parameter :: exit_usage = 2      !! exit status after wrong usage, invalid input, or a checkpoint of another run
+  integer, parameter :: exit_files = 3      !! exit status if a file cannot be read or written or is in use
+  !> Exit status of a simulation that broke off because events no longer advance the time, disks overlap, or a number is NaN.
   integer, parameter :: exit_broken = 4
-  integer, parameter :: exit_stopped = 75   !! stopped by a signal or by the wall-clock limit; a checkpoint was written
+  integer, parameter :: exit_stopped = 75   !! exit status of a run that a signal or the wall-clock limit stopped, with a checkpoint
 
   !> A failure: its message and the exit status of the program.
   type :: error_t
@@ -22,8 +22,8 @@ module errors
 
 contains
 
-  !> Allocates `error` with an exit status and a message. The message may contain names from the input. Control characters in the
-  !> message are therefore replaced, so that the message remains one legible line.
+  !> Allocates `error` with an exit status and a message. Control characters in the message are replaced, so that the message
+  !> remains one legible line even if a name from the input contains control characters.
   pure subroutine fail(error, code, message)
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in) :: code                !! one of the `exit_` constants

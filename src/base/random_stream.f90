@@ -11,7 +11,7 @@ module random_stream
   public :: key_of_draws, random_stream_t
 
   !> Codes of the purposes for which random numbers are drawn during a run. Random numbers for the initial state are drawn from
-  !> separate streams.
+  !> other streams than random numbers during a run.
   integer, parameter, public :: thermal_walls = 3, kicks = 4, orientations = 5, recycled_disks = 6
 
   real(real64), parameter :: unit_53 = 2.0_real64**(-53)
@@ -60,7 +60,7 @@ contains
     call self%seed_disk(key_of_draws(number, purpose), id, count)
   end subroutine seed_draw
 
-  !> The part of the key of a draw that is the same for all disks.
+  !> Part of the key of a random stream that does not depend on the disk, for calls of `seed_disk`.
   pure function key_of_draws(number, purpose) result(key)
     integer(int64), intent(in) :: number        !! seed from the input
     integer, intent(in) :: purpose              !! as in `seed_draw`
@@ -71,8 +71,8 @@ contains
     call draw_seed(state, key)
   end function key_of_draws
 
-  !> Starts a random stream in the same way as `seed_draw`, for callers that have already calculated the part of the key that is the
-  !> same for all disks.
+  !> Starts a random stream in the same way as `seed_draw`, for callers that have already calculated the part of the key that does
+  !> not depend on the disk.
   pure subroutine seed_disk(self, key, id, count)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(in) :: key           !! from `key_of_draws`
@@ -182,7 +182,7 @@ contains
     real(real64), intent(out) :: point(2), s
     integer(int64) :: state(4), word(2)
 
-    state = stream%word                         ! a local copy, which the compiler can keep in registers
+    state = stream%word                         ! local copy of the state, which the compiler can keep in registers
     do
       call step(state, word(1))
       call step(state, word(2))

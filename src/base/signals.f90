@@ -29,7 +29,8 @@ module signals
       integer(c_int) :: requests
     end function checkpoint_requests
 
-    !> From this call on, a stop signal is only recorded. `stop_requested` returns whether a signal has been recorded.
+    !> After a call of `record_signals`, a stop signal is only recorded, and does not end the program. The function `stop_requested`
+    !> returns whether a signal has been recorded.
     subroutine record_signals() bind(C, name="system_record_signals")
     end subroutine record_signals
 
@@ -42,9 +43,9 @@ module signals
 
 contains
 
-  !> From this call on, a stop signal ends the program immediately, with the given message and exit status. If a stop signal was
-  !> recorded before this call, the call ends the program. The procedure is called before parts of the program that can be
-  !> interrupted without a loss of data.
+  !> After a call of `end_at_signals`, a stop signal ends the program immediately, with the given message and exit status. If a stop
+  !> signal has already been recorded, the procedure itself ends the program. The procedure is called before parts of the program
+  !> that can be interrupted without a loss of data.
   subroutine end_at_signals(message, code)
     character(len=*), intent(in) :: message
     integer, intent(in) :: code                        !! exit status

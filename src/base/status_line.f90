@@ -9,8 +9,8 @@ module status_line
   public :: status_line_t
 
   real(real64), parameter :: terminal_pause = 0.2_real64, file_pause = 30.0_real64   !! time between two updates of the line [s]
-  character(len=*), parameter :: erase_rest = achar(27)//"[K", &   !! erases the rest of the line on the terminal
-    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"          !! disable and enable the wrapping of long lines
+  character(len=*), parameter :: erase_rest = achar(27)//"[K", &   !! control sequence that erases the rest of a line
+    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"          !! control sequences for the wrapping of long lines
 
   type :: status_line_t
     logical, private :: quiet = .true.

@@ -70,7 +70,7 @@ module system
       logical(c_bool) :: yes
     end function talks_to_terminal
 
-    ! The file system_calls.c describes the functions of the following interfaces.
+    ! The functions of the following interfaces are described in the file system_calls.c.
     function cores_of_process() result(n) bind(C, name="system_cores")
       import :: c_int
       integer(c_int) :: n
@@ -176,7 +176,7 @@ contains
   end function host_name
 
   !> Renames a file. A file that already has the new name is replaced atomically. `moved` is .true. after a renaming even if the
-  !> folder cannot be synchronised with the disk; only a crash of the operating system could then undo the renaming.
+  !> folder cannot be synchronised with the disk; only a crash of the operating system could undo such a renaming.
   subroutine move_file(from, to, moved)
     character(len=*), intent(in) :: from, to
     logical, intent(out) :: moved
@@ -237,8 +237,8 @@ contains
     kind = trim(kinds_of_files(c_what_is(path//c_null_char)))
   end function what_is
 
-  !> Inode, size and modification time of a file. The three numbers together identify the file and its contents, and all three are 0
-  !> if the file does not exist. A copy of a file has a different inode.
+  !> Inode, size and modification time of a file, which together identify the file and its contents. All three numbers are 0 if the
+  !> file does not exist. A copy of a file has a different inode.
   function identity_of(path) result(identity)
     character(len=*), intent(in) :: path
     integer(int64) :: identity(3)
@@ -273,7 +273,7 @@ contains
     character(len=:), allocatable :: failure
     integer(int64) :: n
 
-    allocate (character(len=max(file_size(path), 8192_int64)) :: text)  ! the size of files in /proc is reported as 0
+    allocate (character(len=max(file_size(path), 8192_int64)) :: text)  ! files in /proc have the size 0
     call read_bytes(path, text, n)
     text = text(:max(n, 0_int64))
     problem = ""

@@ -30,17 +30,17 @@ module team
       type(barrier_t), intent(inout) :: barrier
     end subroutine join
 
-    !> Registers the arrival of the calling thread at the barrier. The result is .true. for the last thread to arrive, which does
-    !> not wait: it performs the serial step and then calls `release`. All other threads wait until the last thread has called
-    !> `release`.
+    !> Registers the arrival of the calling thread at the barrier. The result is .true. for the last thread that arrives. The last
+    !> thread does not wait, performs the serial step, and then calls `release`. All other threads wait in `arrive` until the last
+    !> thread has called `release`.
     function is_last_at(barrier) result(yes) bind(C, name="barrier_arrive")
       import :: barrier_t, c_bool
       type(barrier_t), intent(inout) :: barrier
       logical(c_bool) :: yes
     end function is_last_at
 
-    !> Releases the threads that wait at the barrier. All data that the calling thread has written before are then visible to the
-    !> released threads.
+    !> Releases the threads that wait at the barrier. The released threads can read all data that the calling thread has written
+    !> before the call.
     subroutine release(barrier) bind(C, name="barrier_release")
       import :: barrier_t
       type(barrier_t), intent(inout) :: barrier

@@ -149,7 +149,7 @@ contains
 
     last = min(len(text), longest)
     do while (last > longest - 4 .and. last < len(text))
-      if (iand(iachar(text(last + 1:last + 1)), 192) /= 128) exit   ! do not split a UTF-8 character
+      if (iand(iachar(text(last + 1:last + 1)), 192) /= 128) exit   ! a UTF-8 character must not be split
       last = last - 1
     end do
     quoted = legible(text(:last))
@@ -209,7 +209,7 @@ contains
   pure function suggestion(word, known, listed) result(advice)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
-    character(len=*), intent(in), optional :: listed(:)  !! words to list if no known word is similar; default: `known`
+    character(len=*), intent(in), optional :: listed(:)  !! words that are listed if no known word is similar; `known` if absent
     character(len=:), allocatable :: advice
 
     advice = nearest_word(word, known)
@@ -247,8 +247,8 @@ contains
     end do
   end function nearest_word
 
-  !> Number of insertions, deletions, substitutions and swaps of adjacent letters that turn `a` into `b`
-  !> (optimal string alignment; Damerau, 1964, doi:10.1145/363958.363994).
+  !> Number of insertions, deletions, substitutions and swaps of adjacent letters that turn `a` into `b` (optimal string alignment,
+  !> Damerau, 1964, doi:10.1145/363958.363994).
   pure function edit_distance(a, b) result(distance)
     character(len=*), intent(in) :: a, b
     integer :: distance

@@ -1,8 +1,9 @@
 !> Calendar: the part of the event queue that contains events of later times. Time is divided into windows of equal length. Each of
-!> the next windows has a bucket: an array that occupies one cache line. Later times are divided into spans of many windows, and
-!> each span has an unordered list of events. A new entry is appended at the end of a bucket or a list, so that few cache lines are
-!> accessed. No procedure searches a bucket or a list for the entry of a particular disk, or removes a single entry. All lists share
-!> one array, which is divided into chunks. The chunks of a list are reused after the span of the list has been processed.
+!> the next windows has a bucket: an array that occupies one cache line. The time after the windows with buckets is divided into
+!> spans of many windows, and each span has an unordered list of events. A new entry is appended at the end of a bucket or of a
+!> list, so that few cache lines are accessed. No procedure searches a bucket or a list for the entry of a particular disk, or
+!> removes a single entry. All lists share one array, which is divided into chunks. The chunks of a list are reused after the span
+!> of the list has been processed.
 module calendar
   use kinds, only: int32, real64
   use disks, only: tag_t
@@ -11,8 +12,8 @@ module calendar
   public :: bucket_capacity, bucket_t, calendar_t, events_per_window, filed_t, most_coming, stages, window_none
 
   integer(int32), parameter :: bucket_capacity = 15
-  !> Intended mean number of events in a window. With fewer events per window, more windows are processed that contain no event.
-  !> With more events per window, buckets are full more often, and events that do not fit into a full bucket are stored in the heap.
+  !> Intended mean number of events in a window. With fewer events per window, the program would process more empty windows. With
+  !> more events per window, more events would have to be stored in the heap, because a bucket has space for only a few events.
   real(real64), parameter :: events_per_window = 4.0_real64
   integer(int32), parameter :: few_disks = 5000    !! number of disks up to which nearly all events fit into buckets
   !> For each stage of prefetching, the number of windows between the current window and the last prefetched window.
@@ -68,10 +69,10 @@ module calendar
 
 contains
 
-  !> Empties the calendar, and chooses the numbers of buckets and spans. The numbers are chosen such that the windows of all buckets
-  !> and spans together contain at least 2n events on average, so that most events of n disks fit into the calendar. If there are
-  !> many disks, the number of buckets is limited, so that buckets and disks fit into the cache together. The program writes to the
-  !> smallest number of different cache lines if there are as many buckets as spans.
+  !> Empties the calendar, and chooses the numbers of buckets and spans. The numbers of buckets and spans are so large that all
+  !> windows together contain at least 2n events on average, so that most events of n disks fit into the calendar. If there are many
+  !> disks, the number of buckets is limited, so that buckets and disks fit into the cache together. The number of different cache
+  !> lines to which the program writes is smallest if there are as many buckets as spans.
   subroutine empty(self, n)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: n                !! number of disks
@@ -175,8 +176,9 @@ contains
     yes = iand(window, shiftl(1_int32, self%log_span) - 1) == 0
   end function span_begins
 
-  !> Moves the events of the next span into their buckets. Events of later spans, which the list can also contain, stay in the list
-  !> if the events are still valid. Disks whose events do not fit into a full bucket are returned in `surplus`.
+  !> Moves the events of the next span (a range of windows) into the buckets of their windows. Events of later spans can be in the
+  !> same list as the events of the next span, and stay in the list if they are still valid. Disks whose events do not fit into a
+  !> full bucket are returned in `surplus`.
   subroutine open_span(self, tag, n_surplus, surplus)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
@@ -213,8 +215,8 @@ contains
   end subroutine open_span
 
   !> Lists disks that probably have events in the next windows, for one stage of prefetching. Each stage of prefetching lists the
-  !> disks of a window exactly once. The first stage looks ahead by the largest number of windows, and later stages look ahead by
-  !> fewer windows. All stages except the first omit disks whose entries have become invalid.
+  !> disks of a window exactly once. The first stage of prefetching is the farthest ahead of the current window, and each later
+  !> stage is closer. All stages of prefetching except the first stage omit disks whose entries have become invalid.
   subroutine list_coming(self, tag, window, stage, n, disks)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)

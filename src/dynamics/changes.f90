@@ -35,7 +35,7 @@ contains
     other%system_t = system
     other%features%own_sizes = sim%features%own_sizes
     other%box%epoch = sim%box%epoch
-    do k = 1, n_sides                                        ! a piston starts with the position and velocity of the old side
+    do k = 1, n_sides                                        ! a new piston has the position and velocity of the old side
       if (other%box%surface(k)%motion%kind /= piston) cycle
       v = 0
       if (sim%box%surface(k)%motion%moves()) v = sim%box%side_velocity(k, sim%now)
@@ -110,7 +110,7 @@ contains
       if (any(sim%box%periodic)) image = sim%extra(i)%image
       old = sim%disk(i)%x
       v = sim%disk(i)%v
-      call wrap(sim, old, v, image)                          ! moves the old position by whole periods into the box
+      call wrap(sim, old, v, image)                          ! shifts the old position by whole periods into the box
       sim%disk(i)%x = x(:, sim%tag(i)%id)
       call wrap(sim, sim%disk(i)%x, v, image)
       if (any(sim%box%periodic)) sim%extra(i)%image = image
@@ -119,10 +119,10 @@ contains
     call book(sim, before)
   end subroutine change_positions
 
-  !> Advances all disks to the present time with the previous forces. After this advance the clocks of all disks are equal. The
-  !> procedure also erases the last partner of each disk. After a change of its velocity a disk can collide again with its last
-  !> partner immediately. Without the erasure of the last partner, a new collision with this partner would be mistaken for a
-  !> rounding error of the previous collision.
+  !> Advances all disks to the present time with the previous forces. When the procedure returns, the clocks of all disks are equal.
+  !> The procedure also erases the last collision partner of each disk. A disk whose velocity has been changed can collide with its
+  !> last partner again immediately. If the last partner were not erased, the new collision would be mistaken for a rounding error
+  !> of the previous collision.
   subroutine advance_all(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i

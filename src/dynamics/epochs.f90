@@ -1,5 +1,6 @@
 !> Divides a run into epochs. At the end of each epoch the time origin moves, and the state is tested for an inelastic collapse. The
-!> end of an epoch and the result of the test depend on the state alone, and not on the search, the queue or the number of threads.
+!> end of an epoch and the detection of a collapse depend only on the state of the simulation, and not on the search, the queue or
+!> the number of threads.
 module epochs
   use box_sides, only: separate_from_sides
   use kinds, only: int32, int64, never, pi, real64
@@ -15,10 +16,11 @@ module epochs
   !> Intended number of collisions per disk in an epoch. The time origin moves at the end of each epoch, so that times keep their
   !> precision.
   integer(int64), parameter :: epoch_length = 24
-  !> Number of significant bits in a shift of the time origin. The number is so small that sums of shifts have no rounding error.
+  !> Number of significant bits in a shift of the time origin. Shifts with so few significant bits can be added without rounding
+  !> errors.
   integer, parameter :: significant_bits = 20
-  !> A collapse is reported if the time does not advance during `collapse_length` events in total and during
-  !> `collapse_length_per_disk` events per disk.
+  !> An inelastic collapse is reported if the time does not advance during a long series of events. The series must have at least
+  !> `collapse_length` events, and at least `collapse_length_per_disk` events per disk.
   integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
   real(real64), parameter :: shortest = 2.0_real64**(-20)  !! shortest epoch in units of `negligible_time`
   real(real64), parameter :: last_time = 0.5_real64*never
@@ -79,9 +81,10 @@ contains
     sim%epoch_events = sim%tally%events
   end subroutine begin_epoch
 
-  !> Ends the epoch and moves the time origin to about the present time, so that times stay small and keep their precision. Because
-  !> all events have to be predicted again in any case, the disks are also sorted by cells. The next epoch ends at a fixed time and
-  !> not after a fixed number of events. Domains that run independently of each other therefore end the epoch at the same time.
+  !> Ends the epoch and moves the time origin to about the present time, so that times stay small and keep their precision. The
+  !> disks are sorted by cells at the same time, because all events have to be predicted again after a shift of the time origin. The
+  !> next epoch ends at a fixed time and not after a fixed number of events, so that domains that run independently of each other
+  !> end the epoch at the same time.
   subroutine move_epoch(sim)
     type(simulation_t), intent(inout) :: sim
     real(real64) :: shift, length
@@ -98,9 +101,9 @@ contains
     call begin_epoch(sim, length)
   end subroutine move_epoch
 
-  !> Ends the epoch because the disks, the forces or the contact laws have been changed. Disks can be much faster after a change of
-  !> the disks, forces or contact laws. The time origin therefore moves exactly to the present time, and the length of the next
-  !> epoch is determined when the evolution starts. In time-stepped dynamics, which has no epochs, the procedure does nothing.
+  !> Ends the epoch because the disks, the forces or the contact laws have been changed. The time origin moves exactly to the
+  !> present time. The length of the next epoch is determined when the evolution starts, because disks can be much faster after a
+  !> change of the disks, forces or contact laws. In time-stepped dynamics, which has no epochs, the procedure does nothing.
   subroutine restart_epoch(sim)
     type(simulation_t), intent(inout) :: sim
 
@@ -125,7 +128,7 @@ contains
     sim%last_advance = sim%last_advance - shift
     sim%box%epoch = sim%box%epoch + shift
     sim%box%side%clock = sim%box%side%clock - shift
-    if (.not. any(sim%box%surface(:n_sides)%motion%moves())) return      ! disks are moved away only from moving sides
+    if (.not. any(sim%box%surface(:n_sides)%motion%moves())) return      ! rounding affects only contacts with moving sides
     do i = 1, sim%n_disks()
       call separate_from_sides(sim%box, sim%disk(i), sim%now)
     end do
@@ -154,7 +157,7 @@ contains
     end associate
   end function are_crushed
 
-  !> Whether a long series of events has not advanced the time, as in an inelastic collapse.
+  !> Whether the time has not advanced during a long series of events, as in an inelastic collapse.
   pure function stands_still(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -164,9 +167,9 @@ contains
   end function stands_still
 
   !> Whether all disks are at rest. A disk that bounces inelastically on a surface at rest makes infinitely many bounces in a finite
-  !> time, because the durations of the bounces form a convergent series. With gravity a disk is considered at rest if its remaining
-  !> bounces would end within `negligible_time` and its last bounce occurred within that time. Without gravity a disk is at rest if
-  !> it does not move.
+  !> time, because the durations of the bounces form a convergent series. With gravity a disk is considered at rest if its last
+  !> bounce occurred less than `negligible_time` ago, and its remaining bounces would end within `negligible_time`. Without gravity
+  !> a disk is at rest if it does not move.
   pure function is_at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes

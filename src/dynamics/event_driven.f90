@@ -2,8 +2,8 @@
 !> When the stored event of a disk is due, the disks involved collide, and their next events are predicted.
 !>
 !> The event of a disk becomes stale when its partner collides with a third disk before the event. The queue is not searched for
-!> stale events. A stale event is recognised by the collision counter of the partner when the event is due. A stale event is not
-!> executed; instead the next event of the disk is predicted.
+!> stale events. A stale event is recognised by the collision counter of the partner when the event is due. Instead of the execution
+!> of a stale event, the next event of the disk is predicted.
 module event_driven
   use kinds, only: int32, int64, never, real64
   use box_sides, only: side_time
@@ -54,8 +54,8 @@ module event_driven
 
 contains
 
-  !> Sets up the search and the event queue for the state `sim`. The state can be new, restored from a checkpoint, or the state at
-  !> the start of an epoch.
+  !> Sets up the search and the event queue for the state `sim`. The state is the initial state, a state from a checkpoint, or the
+  !> state at the start of an epoch.
   subroutine start(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -119,8 +119,8 @@ contains
     end do
   end subroutine renew_all
 
-  !> Executes events until a limit is reached. After a stop request the procedure returns early. When the procedure has returned
-  !> early, some predictions may be missing, but the state of the simulation is complete.
+  !> Executes events until a limit is reached. After a stop request the procedure returns early. After an early return, some
+  !> predictions may be missing, but the state of the simulation is complete.
   subroutine advance(self, sim, limits, error, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -150,7 +150,7 @@ contains
       if (self%search%everyone .and. sim%tally%events > events) call self%predict_all(sim)
       if (event%time <= t_limit) cycle
       if (t_limit < limits%time .and. event%time > t_limit) then
-        iterations = iterations + 1                ! the last iteration executed no event
+        iterations = iterations + 1                ! an iteration without an event does not count
         self%iterations_left = iterations
         call follow_piston(self, sim)
         cycle
@@ -164,7 +164,7 @@ contains
         call fail(error, exit_broken, "a time became NaN: "//encounter_text(sim, event%disk, event%partner))
         return
       end if
-      self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! the images of a sheared box never stop
+      self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! the periodic images of a sheared box never stop
       if (limits%time < last_time) sim%now = max(sim%now, limits%time)
       self%arrived = .true.
       return
@@ -201,8 +201,8 @@ contains
   end subroutine advance
 
   !> Hot path: executes one event after another. The loop ends when the number of events reaches `last_count`, when the next event
-  !> is later than the time limit, or when all allowed iterations have been used. Rarely needed operations are in the caller and not
-  !> in this loop.
+  !> is later than the time limit, or when all allowed iterations have been used. Rarely needed operations are in the procedure that
+  !> calls `run_events`, and not in the loop itself.
   subroutine run_events(self, sim, t_limit, iterations, event, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -240,8 +240,8 @@ contains
     if (self%is_part) counts = self%histories%counts(sim%tag, i, code)
     if (code > 0) then
       if (sim%disk(code)%collision_counter == sim%tag(i)%partner_counter) then
-        ! The clocks of two disks are equal only if the disks are still in contact, or if both disks have collided at exactly this
-        ! time. Collisions of two disks with equal clocks are rare and need the general procedure.
+        ! The clocks of two disks are equal only if the disks are still in contact, or if both disks have collided at exactly the
+        ! present time. Collisions of two disks with equal clocks are rare and need the general procedure.
         if (self%general .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0) then
           call collide(sim, i, code, t, counts, log)
         else
@@ -272,8 +272,8 @@ contains
   end subroutine execute
 
   !> Updates predicted events after a collision has changed the motion of a piston. Events are predicted again for disks whose next
-  !> event was a collision with the piston, and for disks that now reach the piston before their next event. After this update the
-  !> event loop returns, because the piston may leave its strip of cells (see `piston_strips`) earlier than expected.
+  !> event was a collision with the piston, and for disks that now reach the piston before their next event. The event loop returns
+  !> after a collision with a piston, because the piston may leave its strip of cells (see `piston_strips`) earlier than expected.
   subroutine follow_side(self, sim, side)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -291,8 +291,8 @@ contains
     end associate
   end subroutine follow_side
 
-  !> Predicts the events of the disks in the old strip and in the new strip of a piston that leaves its strip. A strip consists of
-  !> the cells that a piston can reach soon: see `piston_strips`.
+  !> Predicts events again when a piston leaves its strip, which consists of the cells that the piston can reach soon (see
+  !> `piston_strips`). Predictions are made for the disks in the old strip and in the new strip.
   subroutine follow_piston(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -9,8 +9,8 @@ module event_heap
   private
   public :: event_heap_t, need_order, precedes
 
-  !> Number of children of a node. A heap with four children per node has half the depth of a binary heap, but a level needs as many
-  !> accesses to cache lines as a level of a binary heap.
+  !> Number of children of a node. A heap with four children per node has half as many levels as a binary heap, and each level needs
+  !> no more accesses to cache lines than a level of a binary heap.
   integer(int32), parameter :: arity = 4
 
   type :: event_heap_t
@@ -38,9 +38,9 @@ contains
     if (.not. (yes .or. a%time > b%time)) yes = wins(a, b, tag)
   end function precedes
 
-  !> Nonzero if a and b are different events at the same time, so that `precedes` has to determine their order. The caller ensures
-  !> that event a is not earlier than event b. Two events at the same time are usually copies of one collision, which both disks
-  !> store; such copies need no order.
+  !> Nonzero if a and b are different events at the same time, whose order `precedes` has to determine. The caller ensures that
+  !> event a is not earlier than event b. Two events at the same time are usually the two copies of one collision, which both disks
+  !> store, and the order of the two copies has no effect.
   elemental function need_order(a, b) result(bits)
     type(event_t), intent(in) :: a, b
     integer(int32) :: bits

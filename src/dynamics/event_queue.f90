@@ -25,7 +25,7 @@ module event_queue
     !> (0:n_near) sorted list of events, the latest first; element 0 is a sentinel that is never due.
     type(event_t) :: near(0:near_capacity)
     integer(int32) :: n_near = 0
-    !> Whether new events of the current window are added to the sorted list (.true.) or to the heap (.false.).
+    !> .true. if new events of the current window are added to the sorted list, .false. if they are added to the heap
     logical :: near_is_open = .false.
     logical :: windowed = .true.                   !! whether the calendar is used in addition to the heap
     integer(int32) :: window = 0                   !! index of the current window, counted from the time origin `box%epoch`
@@ -61,7 +61,7 @@ contains
     type(disk_t), intent(in) :: disk(:)
     type(tag_t), intent(inout) :: tag(:)
     real(real64), intent(in) :: now                !! time relative to the time origin `box%epoch` [time]
-    logical, intent(in) :: windowed                !! whether the calendar is used; if not, all events are in the heap
+    logical, intent(in) :: windowed                !! whether the calendar is used; without the calendar all events are in the heap
     integer(int32) :: i
 
     self%n_disks = size(disk, kind=int32)
@@ -75,7 +75,7 @@ contains
     self%near_is_open = self%windowed
     self%n_taken = 0
     self%filled_at = now
-    self%per_time = 0                              ! a single window of infinite length
+    self%per_time = 0                              ! without the calendar: a single window of infinite length
     if (self%windowed) then
       self%per_time = 1/self%width
       call self%calendar%empty(self%n_disks)
@@ -127,7 +127,7 @@ contains
     logical :: full
 
     number = disk(i)%event_time*self%per_time
-    if (.not. number >= self%next_window) then     ! also .true. if the event time is NaN, so that the error is detected immediately
+    if (.not. number >= self%next_window) then     ! NaN also fulfils the condition, so that the error is detected
       tag(i)%window = window_none
       call self%insert_near(disk, tag, i)
       return
@@ -145,8 +145,8 @@ contains
     end if
   end subroutine schedule
 
-  !> Removes the entry of a disk from the queue. The procedure only erases the window number in the tag of the disk. The entry
-  !> remains stored, but becomes invalid when the event of the disk changes.
+  !> Removes the entry of a disk from the queue. The procedure only erases the window number in the tag of the disk. The entry of
+  !> the disk remains stored, but becomes invalid when the event of the disk changes.
   pure subroutine remove_entry(self, tag)
     class(event_queue_t), intent(in) :: self
     type(tag_t), intent(inout) :: tag
@@ -195,7 +195,8 @@ contains
   end subroutine insert_into_heap
 
   !> Inserts an event into a sorted list of n events. The comparison of the times nearly always suffices to order two events. Two
-  !> events at the same time are usually copies of one collision, which both disks store; such copies need no order.
+  !> events at the same time are usually the two copies of one collision, which both disks store, and the order of the two copies
+  !> has no effect.
   pure subroutine insert(list, n, event, tag)
     type(event_t), intent(inout) :: list(0:*)
     integer(int32), intent(in) :: n
@@ -319,9 +320,9 @@ contains
     if (self%calendar%span_begins(self%window)) call self%open_next_span(disk, tag)
   end subroutine open_next_window
 
-  !> Moves the valid events in a bucket to a sorted list. If the stored event of a disk is not before the next window, the entry of
-  !> the disk in the bucket is invalid. The position of each event in the sorted list is found by counting the later events.
-  !> Counting is fast, because a bucket contains few events and no branch depends on their times.
+  !> Moves the valid events in a bucket to a sorted list. An entry in the bucket is invalid if the event that its disk stores is due
+  !> in a later window. The position of each event in the sorted list is found by counting the later events. Counting is fast,
+  !> because a bucket contains few events and no branch depends on their times.
   pure subroutine take_bucket(bucket, disk, tag, per_time, next_window, list, n)
     type(bucket_t), intent(inout) :: bucket
     type(disk_t), intent(in) :: disk(*)
@@ -361,8 +362,8 @@ contains
     end do
   end subroutine take_bucket
 
-  !> Moves the events that are due in the current window from the heap to the sorted list. If the list overflows, all its events are
-  !> moved back into the heap.
+  !> Moves the events that are due in the current window from the heap to the sorted list. If the sorted list overflows, all events
+  !> in the list are moved back into the heap.
   subroutine take_from_heap(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -379,7 +380,7 @@ contains
   end subroutine take_from_heap
 
   !> Moves the events of the next span into their buckets. If the width of the windows has proved far too small or too large, all
-  !> events are entered again with a new width.
+  !> events are entered into the queue again with a new width.
   subroutine open_next_span(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -399,8 +400,8 @@ contains
     end do
   contains
 
-    !> Whether all events should be entered again with another width of the windows: the present width has proved far too small or
-    !> too large, and enough windows have passed since the last call of `fill`.
+    !> Whether all events should be entered into the queue again, with another width of the windows. The condition is that the
+    !> present width has proved far too small or too large, and that enough windows have passed since the last call of `fill`.
     pure function ill_fitting() result(yes)
       logical :: yes
       real(real64) :: per_window

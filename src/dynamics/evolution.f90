@@ -9,8 +9,8 @@ module evolution
   private
   public :: evolution_t, limits_t
 
-  !> Limits of the dynamics. The dynamics returns to the caller when the first limit is reached. By default each limit has a value
-  !> that no simulation reaches.
+  !> Limits at which the dynamics stops and returns to its caller: the first limit that is reached determines the stop. By default
+  !> each limit has a value that no simulation reaches.
   type :: limits_t
     !> Limit of the simulated time, measured from the start of the run [time]. In calls of the procedures of `evolution_t` the limit
     !> is measured from the time origin `box%epoch`.
@@ -19,7 +19,8 @@ module evolution
     integer(int64) :: events = huge(0_int64)
     real(real64) :: dissipated = huge(0.0_real64)        !! dissipated energy [energy]
     logical :: at_rest = .false.                         !! whether the dynamics returns when all disks are at rest
-    !> Number of iterations of the event loop after which the dynamics returns, so that the caller can make other checks.
+    !> Number of iterations of the event loop after which the dynamics returns, so that the caller can check signals and the wall
+    !> clock.
     integer(int64) :: iterations = huge(0_int64)
     real(real64) :: sampled = 0.0_real64                 !! time of the latest sample; the run does not end before this time
   contains
@@ -33,7 +34,7 @@ module evolution
     logical :: arrived = .false.  !! whether `advance` has reached its time limit and executed all events up to this limit
     integer(int64) :: iterations_left = 0  !! number of allowed iterations that the last call of `advance` did not use
     integer(int64) :: serial_events = 0    !! number of events executed by the serial engine of a parallel run
-    !> Disk and partner of the last executed event; if the time limit was reached, of the first event after the limit.
+    !> Disk and partner of the last executed event or, if the time limit was reached, of the first event after the time limit.
     integer(int32) :: last_event(2) = 0
   contains
     procedure :: warning
@@ -44,8 +45,8 @@ module evolution
   end type evolution_t
 
   abstract interface
-    !> Prepares the dynamics to continue from the state `sim`, which is new or restored. All data of the dynamics that are not part
-    !> of the state are derived from the state.
+    !> Prepares the dynamics to continue from the state `sim`, which is the initial state or a state from a checkpoint. All data of
+    !> the dynamics that are not part of the state are derived from the state.
     subroutine start_evolution(self, sim)
       import :: evolution_t, simulation_t
       class(evolution_t), intent(inout) :: self
@@ -66,8 +67,8 @@ module evolution
 
 contains
 
-  !> Whether a limit other than the time limit is reached. The time limit is not tested here, because events at exactly the time
-  !> limit are still executed.
+  !> Whether a limit other than the time limit is reached. The function does not test the time limit, because events at exactly the
+  !> time limit are still executed.
   pure function reached(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally
@@ -78,7 +79,8 @@ contains
 
   !> Whether a quantity that can change in any collision, such as the dissipated energy, has reached its limit. A quantity with a
   !> limit must never decrease during a run. A parallel run, which advances by time windows, detects only at the end of a window
-  !> that a quantity has exceeded its limit. The run then repeats the window to find the collision at which the limit was reached.
+  !> that a quantity has exceeded its limit. A parallel run then repeats the window to find the collision at which the limit was
+  !> reached.
   pure function outgrown(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally
@@ -114,7 +116,7 @@ contains
     t = time
   end function pause_at
 
-  !> Continues after the caller has changed the state of some disks at the present time.
+  !> Prepares the dynamics to continue after the caller has changed the state of some disks at the present time.
   subroutine renew(self, sim, changed)
     class(evolution_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -28,10 +28,10 @@ module histories
     type(history_t), allocatable :: history(:)     !! (at least n_histories) histories of disks
     integer(int32), allocatable :: history_of(:)   !! (slots) index of the history of each disk; 0 for a disk without a history
     integer(int32) :: own_low(2) = 0, own_high(2) = 0      !! first and last column and row of the domain
-    integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! range of columns and rows outside of all other patches
+    integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! columns and rows that no other patch contains
     !> Range of columns and rows of the cells whose eight neighbours are all in the patch.
     integer(int32) :: safe_low(2) = 0, safe_high(2) = 0
-    !> (0:,0:) 1 for each cell that a disk of the domain has reached outside of the domain, and for the eight neighbours of the
+    !> (0:,0:) 1 for each cell outside of the domain that a disk of the domain has reached, and for the eight neighbours of such a
     !> cell; 0 for all other cells.
     integer(int8), allocatable :: reached(:, :)
     logical :: left_patch = .false.                !! whether a disk that the domain owns has reached the edge of the patch
@@ -60,8 +60,8 @@ contains
     self%left_patch = .false.
   end subroutine begin_window
 
-  !> Starts a new history of disk i if another domain can have a copy of a disk in the present cell. The present cell also
-  !> determines whether the domain owns disk i.
+  !> Starts a new history of disk i if another domain can have a copy of a disk in the present cell. The domain owns disk i if the
+  !> present cell of the disk is in the domain.
   subroutine begin_history(self, cell, i)
     class(histories_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -159,7 +159,7 @@ contains
 
     if (self%history_of(i) == 0) then
       if (within(cell, self%deep_low, self%deep_high)) return
-      call self%add_history(i)                     ! a disk in this cell can also be in the patches of other domains
+      call self%add_history(i)                     ! the cell is also in the patch of another domain
       self%history(self%history_of(i)) = history_t(0_int64, i, .true., cell, cell)
     end if
     associate (history => self%history(self%history_of(i)))
@@ -217,7 +217,7 @@ contains
     if (.not. yes) yes = self%history(self%history_of(i))%own
   end function is_own
 
-  !> Number of histories of copies.
+  !> Number of histories that belong to copies of disks.
   pure function n_copies(self) result(n)
     class(histories_t), intent(in) :: self
     integer(int32) :: n

@@ -1,6 +1,6 @@
 !> Applies kicks: changes of the velocities of disks at regular times. The random numbers of a kick depend only on the seed, the
-!> disk and the number of the kick. The random numbers therefore depend neither on the order of the disks nor on the history of the
-!> run.
+!> disk and the number of the kick. The random numbers of a kick therefore depend neither on the order of the disks nor on the
+!> history of the run.
 module kicks
   use kinds, only: int32, int64, pi, real64
   use disks, only: advance_disk
@@ -19,7 +19,7 @@ contains
   subroutine kick(sim, kicked)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable, intent(out) :: kicked(:)
-    real(real64), allocatable :: draws(:, :)     ! (2,n) random numbers of the affected disks, stored to restore the momentum
+    real(real64), allocatable :: draws(:, :)     ! (2,n) random numbers of the affected disks, needed to restore the momentum
     real(real64) :: z(2)
     integer(int64) :: key
     integer(int32) :: i, n
@@ -66,7 +66,7 @@ contains
   end subroutine kick
 
   !> Applies a kick to disk i. In a sheared box the random velocity is relative to the velocity profile. The procedure erases the
-  !> last partner of disk i, because the kick may cause an immediate collision of disk i with its last partner. A kick does not
+  !> last collision partner of disk i, because the kick may cause a new collision with the same partner immediately. A kick does not
   !> count as a collision.
   subroutine kick_disk(sim, i, key, is_hit, z)
     type(simulation_t), intent(inout) :: sim

@@ -1,10 +1,10 @@
 !> Determines when a run ends: when one of the stop rules in the input is met, or when rounding errors dominate the velocities of
 !> the disks.
 !>
-!> Inelastic disks in a periodic box cool without end. The run ends when rounding errors dominate the temperature. The test for a
-!> negligible temperature is made at the start of each epoch, so that the end of the run depends on the trajectory alone. The test
-!> compares the present kinetic energy with the kinetic energy at the time when the velocities were last set, because the magnitude
-!> of the rounding errors follows from that earlier energy.
+!> Inelastic disks in a periodic box cool without end. A run with such disks ends when rounding errors dominate the temperature. The
+!> test for a negligible temperature is made at the start of each epoch, so that the end of the run depends on the trajectory alone.
+!> The present kinetic energy is compared with the kinetic energy at the time when the velocities were last set, because the earlier
+!> energy determines the magnitude of the rounding errors.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use epochs, only: is_at_rest, stands_still
@@ -86,7 +86,8 @@ contains
   end function is_met
 
   !> Whether the disks are at rest and the input contains the stop rule `at_rest`. The function `rests` is needed in simulations
-  !> without gravity. Without gravity disks at rest have no events, so that the test for rest at the end of an epoch is never made.
+  !> without gravity, in which disks at rest have no events. Without events no epoch ends, and the test for rest at the end of an
+  !> epoch is never made.
   pure function rests(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -108,8 +109,8 @@ contains
   end function too_cold
 
   !> Whether a run is finished. A run is finished when a stop rule is met, when rounding errors dominate the velocities of the
-  !> disks, or, if the run has no time limit, when no event will occur any more. Failures are not tested here, because `timeline`
-  !> and the evolution report failures.
+  !> disks, or, if the run has no time limit, when no event will occur any more. The function does not test for failures, because
+  !> `timeline` and the evolution report failures.
   pure function is_over(self, sim, evolution) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -141,8 +142,8 @@ contains
     end do
   end function relative_energy
 
-  !> Completed fraction of the run, from 0 to 1. The result is the largest ratio of a present value to its limit among all stop
-  !> rules.
+  !> Completed fraction of the run, from 0 to 1. The result is the largest ratio of a present value to its limit, among all stop
+  !> rules of the run.
   pure function share(self, sim, elapsed) result(done)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

@@ -1,9 +1,9 @@
-!> Time-stepped dynamics. In each step of fixed length all disks first move in exact free flight. After the free flight each disk
+!> Time-stepped dynamics: in each step of fixed length, all disks first move in exact free flight. After the free flight each disk
 !> beyond a wall is reflected, and each pair of disks that overlap and approach each other collides once. A contact is detected up
 !> to one step late, and a contact that begins and ends within a step is not detected. The method serves for comparisons with
 !> event-driven dynamics.
 !>
-!> As in event-driven dynamics, the stored state of a disk changes only when this disk collides, so that rounding errors do not
+!> As in event-driven dynamics, the stored state of a disk changes only in collisions of the disk, so that rounding errors do not
 !> accumulate from step to step.
 module time_stepped
   use images, only: images_t
@@ -73,8 +73,8 @@ contains
     if (t < time) t = (steps_taken(time, self%dt) + 1)*self%dt
   end function pause_at
 
-  !> Continues after the velocities of disks have been changed. Only the test for rest is reset, because Verlet lists do not depend
-  !> on velocities.
+  !> Prepares the dynamics to continue after the velocities of disks have been changed. Only the test for rest is reset, because
+  !> Verlet lists do not depend on velocities.
   subroutine renew(self, sim, changed)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -83,8 +83,8 @@ contains
     self%idle = .false.
   end subroutine renew
 
-  !> Executes steps. The k-th step ends at the time k*dt. The end of a step does not depend on the times at which earlier calls
-  !> returned.
+  !> Executes steps. The k-th step ends at the time k*dt. The end of a step does not depend on the times at which earlier calls of
+  !> `advance` have returned.
   subroutine advance(self, sim, limits, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -138,9 +138,9 @@ contains
   end function at_rest
 
   !> Advances all disks to the time t and executes all collisions at this time. Collisions with sides come first, then collisions
-  !> with obstacles, then collisions of two disks. Within each of the three kinds, collisions are executed in ascending order of the
-  !> indices, so that the result does not depend on the search for pairs. If a stop is requested during a long search for pairs, the
-  !> procedure returns early, and the state is then still unchanged.
+  !> with obstacles, then collisions of two disks. Collisions of the same kind are executed in ascending order of the indices, so
+  !> that the result does not depend on the search for pairs. If a stop is requested during a long search for pairs, the procedure
+  !> returns early, and the state is then still unchanged.
   subroutine take_step(self, sim, t, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -275,7 +275,7 @@ contains
 
   !> A warning about the length of the step; empty if the length is suitable. For the estimate of the largest speed under gravity,
   !> v0 + sqrt(2 g L), the fastest disk is assumed to fall through the whole box of length L. A disk that dissipates energy in every
-  !> step of a lasting contact sinks by up to g dt**2/2 per step under gravity; the TC model prevents this.
+  !> step of a lasting contact sinks by up to g dt**2/2 per step under gravity; the TC model prevents the sinking.
   pure function warning(self, sim) result(text)
     class(time_stepped_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

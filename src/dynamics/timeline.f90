@@ -1,5 +1,6 @@
 !> Executes the actions that affect all disks at once, in a fixed order. At equal times collisions are executed first, then kicks,
-!> then the actions of the caller (samples, end of the run). The time origin moves between these actions, at the end of an epoch.
+!> then the actions of the caller (samples, end of the run). The time origin moves at the end of an epoch, when no other action is
+!> in progress.
 module timeline
   use encounters, only: encounter_text
   use box_geometry, only: wall_normal
@@ -89,12 +90,12 @@ contains
     sim%events_done = arrived .or. (sim%events_done .and. sim%tally%events == events .and. .not. sim%time() > before)
   contains
 
-    !> Advances the time to the next action, if no event will occur any more. If no further action is due either, the time becomes
-    !> the time of the last collision or sample.
+    !> Advances the time to the next action, if no event will occur any more. If no action is due any more, the time is set to the
+    !> time of the last collision or sample.
     subroutine wait()
       if (due < last_time) then
         sim%now = max(sim%now, until)
-      else                                           ! a stale event, or the end of the epoch, may have advanced the time
+      else                                           ! a stale event, or the end of an epoch, may have advanced the time
         sim%now = max(maxval(sim%disk%clock), limits%sampled - sim%box%epoch)
       end if
     end subroutine wait
@@ -116,9 +117,9 @@ contains
     end subroutine end_epoch
   end subroutine advance_once
 
-  !> Number of iterations that take about `pause_interval`. The number is increased only after a call that used all its iterations.
-  !> A call that reaches a limit early does not increase the number. Otherwise the number would become arbitrarily large in a run
-  !> with many samples, and signals would not be checked for hours after the last sample.
+  !> Number of iterations that take about `pause_interval`. The number of iterations is increased only after a call that used all
+  !> its iterations, and not after a call that reached a limit early. In a run with many samples, whose calls all return early, the
+  !> number would otherwise become arbitrarily large. After the last sample, signals would then not be checked for hours.
   pure function adapted_iterations(iterations, elapsed, cut_short) result(n)
     integer(int64), intent(in) :: iterations
     real(real64), intent(in) :: elapsed               !! wall-clock time of the iterations that were used [s]
@@ -137,7 +138,7 @@ contains
     real(real64) :: t                              !! time since the start of the run; set to `never` if there are no kicks
 
     t = evolution%pause_at(sim%drive%time_of(sim%kicks + 1))
-    if (evolution%idle .and. sim%drive%moves_disks()) then     ! disks at rest that are not recycled now never will be
+    if (evolution%idle .and. sim%drive%moves_disks()) then     ! no other disk will enter `from_region` any more
       if (.not. are_waiting(sim)) t = never
     end if
   end function next_kick

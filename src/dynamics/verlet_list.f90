@@ -48,8 +48,9 @@ contains
     if (self%known) self%from(i, :) = self%from(i, :) + dx
   end subroutine shift
 
-  !> Makes a new list, unless all disks have moved by less than half the skin since the last list was made. With `all_pairs` a new
-  !> list is made in every step, by a test of all pairs. After a stop request the procedure returns early, with an incomplete list.
+  !> Makes a new list, unless all disks have moved by less than half the skin since the last list was made. If `all_pairs` is
+  !> .true., a new list is made in every step, by a test of all pairs. After a stop request the procedure returns early, with an
+  !> incomplete list.
   subroutine update(self, sim, x, step, all_pairs)
     class(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -129,8 +130,8 @@ contains
 
   !> Adds the pairs of disks that are close to each other. The search for the partners of a disk is limited to smaller disks, and to
   !> disks of equal size with higher indices. The search for a small disk therefore covers only few bins, however large the largest
-  !> disk is. The grid of bins is treated as periodic along both axes. Near walls the periodicity of the grid has no effect, because
-  !> disks near opposite walls are too far apart to form a pair.
+  !> disk is. The grid of bins is treated as periodic along both axes. The periodicity of the grid does not connect disks at
+  !> opposite walls, because their true distance is too large for a pair.
   subroutine list_disks(self, sim, x, bins)
     type(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -152,13 +153,13 @@ contains
       centre = [x(i, 1), x(i, 2)]
       reach = (2*sim%disk(i)%radius + self%skin)*(1 + spare)
       low = bin_at(in_box(centre) - reach)
-      high = min(bin_at(in_box(centre) + reach), low + bins - 1)    ! no bin is searched twice
+      high = min(bin_at(in_box(centre) + reach), low + bins - 1)    ! the range contains no bin twice
       from = 1 + modulo(low(1), bins(1))
       to = from + high(1) - low(1)
       do iy = low(2), high(2)
         row = bins(1)*modulo(iy, bins(2))
         call add_run(row + from, row + min(to, bins(1)))
-        call add_run(row + 1, row + to - bins(1))           ! the part of the range beyond the periodic side
+        call add_run(row + 1, row + to - bins(1))           ! the part of the row beyond the periodic side
       end do
     end do
     call sort_pairs(self%i(first_pair:self%n), self%partner(first_pair:self%n), size(x, 1, kind=int32))
