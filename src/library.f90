@@ -40,7 +40,7 @@ module library
     type(simulation_t) :: sim
     class(evolution_t), allocatable :: evolution
     type(stop_rule_t) :: rule
-    integer(int64) :: iterations = 1                  !! number of loop iterations between two readings of the clock
+    integer(int64) :: iterations = 1                  !! number of iterations of the loop between two readings of the clock
     logical :: logged = .false.                       !! .true. if events are logged
     type(event_log_t) :: log                          !! the latest events; the oldest events are deleted when the log is too long
   end type session_t
@@ -67,11 +67,11 @@ contains
     code = answer(error, message, room)
   end function open_simulation
 
-  !> Starts the engine of a new simulation and returns the handle of the simulation. After an error the simulation is deallocated.
+  !> Starts the engine of a new simulation and returns the handle of the simulation. If an error occurs, the simulation is
+  !> deallocated.
   function begin(session, threads, error) result(handle)
     type(session_t), pointer, intent(inout) :: session
-    !> Number of threads. If the argument is 0, the number in the input is used or, if the input contains no number, a single
-    !> thread.
+    !> Number of threads; 0 for the number in the input, or for one thread if the input contains no number.
     integer(c_int), intent(in) :: threads
     type(error_t), allocatable, intent(in) :: error
     type(c_ptr) :: handle
@@ -259,8 +259,8 @@ contains
     type(session_t), intent(in) :: session
     type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
     character(len=10), parameter :: of_motion(4) = [character(len=10) :: "motion", "velocity", "start_time", "end_time"]
-    ! `at`: positions of the sides (axis, lower or upper) [length]; `x`: position of one side [length]; `start`: time when a motion
-    ! starts; `passed`: duration of the motion so far [time]
+    ! Positions of the sides (axis, lower or upper) and of one side [length], time when a motion starts and its duration so far
+    ! [time]
     real(real64) :: at(2, 2), x, start, passed
     integer :: g, k, old, side, inwards
     logical :: same

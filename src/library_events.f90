@@ -75,8 +75,8 @@ contains
     if (n > 0) records(:, :n) = session%log%record(:, session%log%n - n + 1:session%log%n)
   end function last_events
 
-  !> See ricochet.h. The function advances a copy of the simulation. Predictions for the present velocities would not be sufficient,
-  !> because other collisions or kicks may change the velocities first.
+  !> See ricochet.h. The function advances a copy of the simulation. A prediction from the present velocities would not be
+  !> sufficient, because other collisions or kicks may change the velocities before the predicted event.
   function next_events(handle, most, records) bind(C, name="ricochet_next_events") result(n)
     type(c_ptr), value :: handle
     integer(c_int), value :: most

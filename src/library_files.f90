@@ -37,7 +37,7 @@ contains
     call check_name(text_of(path), error)
     if (.not. allocated(error)) call input_from_text(session%input%text, session%input%path, session%input%overrides, input, &
       error, stepped=.true.)
-    if (session%sim%changes > 0) then                 ! the changed input does not describe the initial state
+    if (session%sim%changes > 0) then                 ! the initial state is unknown, because the changed input does not describe it
       first = session%sim
       input%changes = session%input%changes
     else if (.not. allocated(error)) then

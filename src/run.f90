@@ -29,7 +29,7 @@ module run
   public :: perform_run
 
   integer, parameter :: most_unwritten = 4096              !! capacity of the event log [events]
-  !> If the output needs more space than this limit, the program prints the size of the output at the start of the run. [bytes]
+  !> Size of an output above which the program prints the expected size at the start of the run. [bytes]
   integer(int64), parameter :: much = 250000000
 
   type :: run_t
@@ -178,7 +178,7 @@ contains
     call cpu_time(cpu(2))
     run%rate = (run%sim%tally%collisions - collisions)/max(cpu(2) - cpu(1), 1.0e-9_real64)
     run%serial_events = run%evolution%serial_events
-    deallocate (run%evolution)                             ! frees memory, which the completion of the output may need
+    deallocate (run%evolution)                             ! the completion of the output may need the memory
   end subroutine follow
 
   !> Wall time, rate and number of serial events of this part of the run, as the argument `cost` of `output: write_end`.
@@ -207,8 +207,8 @@ contains
     call run%line%start(run%sim, run%stop_rule, run%started)
     limits%time = run%sim%time()
     call run%output%tighten(limits)
-    ! If no further event can occur, the run ends with a last sample. The call of `advance_once` is needed if a run had been stopped
-    ! just after its last sample: the call detects that no further event can occur.
+    ! If no further event can occur, the run ends with a last sample. The call of `advance_once` is needed to detect that no further
+    ! event can occur, if a run had been stopped just after its last sample.
     if (run%sim%events_done .and. limits%sampled >= run%sim%time()) call advance_once(run%evolution, run%sim, limits, error)
     do while (.not. (run%stop_rule%is_over(run%sim, run%evolution) .or. allocated(error)))
       limits = run%stop_rule%limits
@@ -233,7 +233,7 @@ contains
         if (stopping .and. .not. allocated(error)) call fail(error, exit_stopped, "stopped at time "// &
           written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to continue")
         if (allocated(error)) exit
-        ! the interval until the next checkpoint starts now
+        ! the interval until the next checkpoint starts after the request
         next_checkpoint = seconds() + run%input%settings%output%checkpoint_every
       end if
       call run%line%report(run%sim, run%stop_rule)

@@ -1,5 +1,6 @@
 !> Sets up a run from an input file: reads and checks the input, creates the initial state, creates the objects that the input
-!> selects, and starts the threads. No other module depends on all kinds of neighbour search and dynamics.
+!> selects, and starts the threads. The module `run_setup` is the only module that depends on all kinds of neighbour search and
+!> dynamics.
 module run_setup
   use errors, only: error_t
   use event_driven, only: event_driven_t
@@ -43,7 +44,8 @@ contains
     if (.not. allocated(error)) call input_from_text(text, path, overrides, input, error, printed)
   end subroutine read_input
 
-  !> Like `read_input`, but for a text instead of a file; `path` is used only in messages. All problems are collected in one error.
+  !> Like `read_input`, but for a text instead of a file; the argument `path` is used only in messages. All problems are collected
+  !> in one error.
   subroutine input_from_text(text, path, overrides, input, error, printed, stepped)
     character(len=*), intent(in) :: text
     character(len=*), intent(in) :: path
@@ -71,7 +73,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     logical, intent(in), optional :: stepped                        !! see `resolve_settings`
 
-    if (complete) then                                    ! variables in unreadable parts must not be reported as missing
+    if (complete) then  ! variables in unreadable parts of the text must not be reported as missing
       call resolve_settings(input%groups, input%settings, problems, stepped)
       call complete_settings(input%settings, input%groups, problems, complete)
       if (complete) call check_fit(input%settings, input%groups, problems)

@@ -1,7 +1,7 @@
 !> An open HDF5 file, with procedures that create, open, rename, flush and close the file and that create groups and hard links.
 !>
 !> The first failure of a call is recorded, and all later calls have no effect. A procedure that writes a file therefore need not
-!> test the result of every call; `report` returns the recorded failure at the end.
+!> test the result of every call, because the procedure `report` returns the recorded failure at the end.
 module hdf5_handle
   use, intrinsic :: iso_c_binding, only: c_bool, c_int, c_int64_t
   use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, &
@@ -20,9 +20,9 @@ module hdf5_handle
   public :: hdf5_handle_t, hdf5_version
 
   integer(size_t), parameter :: sieve = 4096      !! size of the buffer that collects small writes [bytes]
-  !> HDF5 stores the links of a group in nodes that have space for 8 links. The addresses of these nodes are stored in nodes of a
-  !> second kind, which have space for twice `half_tree_node` addresses. Most groups have three links. With HDF5's default, which is
-  !> `half_tree_node` = 16, almost empty nodes would make up a quarter of the file of a small run.
+  !> HDF5 stores the links of a group in nodes that have space for 8 links. The addresses of the link nodes are stored in nodes of a
+  !> second kind, which have space for twice `half_tree_node` addresses. Most groups of an output file have three links. With the
+  !> default of HDF5, which is `half_tree_node` = 16, almost empty nodes would make up a quarter of the file of a small run.
   integer, parameter :: half_tree_node = 2
   !> Half of the number of links in a node; the value is the default of HDF5. The 7 links of the group `checkpoint` must fit into
   !> one node, because `hdf5_objects: remove_last` relies on the order of the last parts of a file.
@@ -32,7 +32,7 @@ module hdf5_handle
     character(len=:), allocatable :: path
     character(len=:), allocatable :: final_path   !! path of the completed file, used in messages
     character(len=:), allocatable :: failure      !! the first action that failed, as a phrase that can follow "cannot "
-    logical, private :: has_reason = .false.      !! the text `failure` includes the reason for the failure
+    logical, private :: has_reason = .false.      !! whether the text `failure` includes a reason
     integer(hid_t) :: id = -1
     integer(hid_t) :: links = -1                  !! HDF5 properties of links, which make HDF5 create missing groups of a path
     integer(hid_t) :: storage = -1                !! HDF5 properties of datasets, set by `prepare`
@@ -95,7 +95,7 @@ contains
     end if
   end subroutine check
 
-  !> Returns the recorded failure as an error; `error` is not allocated if there was no failure. The message names the file, the
+  !> Returns the recorded failure as an error, which is not allocated if there was no failure. The message names the file, the
   !> action, and the reason or the free space on the disk.
   subroutine report(self, error)
     class(hdf5_handle_t), intent(in) :: self
@@ -121,8 +121,8 @@ contains
 
   !> Initialises the HDF5 library. The library is initialised only once per process, because each initialisation leaks memory. The
   !> settings prevent HDF5 from printing errors and from installing an exit handler. The exit handler is not needed, because the
-  !> program closes all files before it exits, and it would crash if a file could not be closed on a full disk. External links are
-  !> disabled, because they could refer to devices or to files of other users.
+  !> program closes all files before it exits. The exit handler would crash if a file could not be closed on a full disk. External
+  !> links are disabled, because external links could refer to devices or to files of other users.
   subroutine start_library(status)
     integer, intent(out) :: status
     logical, save :: started = .false.
@@ -138,12 +138,12 @@ contains
     started = status >= 0
   end subroutine start_library
 
-  !> Sets the properties of a file. The file locks of HDF5 are disabled, because they would prevent other programs from reading the
-  !> file, and the lock of a reader could stop a run. The storage of a dataset is allocated when the dataset is created. Datasets
-  !> are not filled with a default value and have no time stamps, so that equal runs write equal bytes. Small datasets do not share
-  !> a block of storage, because HDF5 releases a shared block in two steps, between which the header of the file contains a wrong
-  !> length. No space is reserved for attributes of datasets, because the program writes none; the file of a small run is therefore
-  !> a tenth smaller.
+  !> Sets the properties of a file. The file locks of HDF5 are disabled. With file locks, other programs could not read the file
+  !> during a run, and the lock of a reader could stop a run. The storage of a dataset is allocated when the dataset is created.
+  !> Datasets are not filled with a default value and have no time stamps, so that equal runs write equal bytes. Small datasets do
+  !> not share a block of storage, because HDF5 releases a shared block in two steps, between which the header of the file contains
+  !> a wrong length. No space is reserved for attributes of datasets, because the program writes none; the file of a small run is
+  !> therefore a tenth smaller.
   subroutine prepare(self, access, status)
     class(hdf5_handle_t), intent(inout) :: self
     integer(hid_t), intent(out) :: access         !! HDF5 properties of the access to the file
@@ -226,7 +226,7 @@ contains
   end subroutine flush_file
 
   !> Closes the file if the file is open, and frees the HDF5 property lists, which exist even if the file could not be opened. After
-  !> this call, `report` still returns a recorded failure.
+  !> the file has been closed, `report` still returns a recorded failure.
   subroutine close_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     integer :: status
@@ -242,7 +242,7 @@ contains
     self%id = -1
   end subroutine close_file
 
-  !> Closes the file and deletes the file. After this call, `report` still returns a recorded failure.
+  !> Closes the file and deletes the file. After the file has been deleted, `report` still returns a recorded failure.
   subroutine discard(self)
     class(hdf5_handle_t), intent(inout) :: self
 

@@ -20,8 +20,8 @@ module hdf5_objects
 
   integer, parameter :: scalar(0) = [integer ::]  !! extents of a dataset with a single value
 
-  ! Largest lengths of texts in a file. The limits are needed because a damaged file may contain wrong lengths. All texts that this
-  ! program writes are within the limits.
+  ! Largest lengths of texts in a file. The lengths of texts are limited, because a damaged file may contain wrong lengths. All
+  ! texts that this program writes are shorter than the limit.
   integer(int64), parameter :: most_texts = 10000
   integer(size_t), parameter :: longest_text = 67108864      !! [bytes]
 
@@ -42,10 +42,11 @@ module hdf5_objects
 
 contains
 
-  !> Removes the dataset that was created last, so that the file ends after the values of the dataset `before`. The removal has
-  !> three steps, so that the file is valid at all times. First the link to the dataset is deleted; the storage is not freed yet,
-  !> because the dataset is still open. Then the new length of the file is written into its header, because HDF5 would write the
-  !> length only after the truncation of the file. Finally the dataset is closed, which frees the storage.
+  !> Removes the dataset that was created last, so that the file ends after the values of the dataset `before`. The dataset is
+  !> removed in three steps, after each of which the file is valid. In the first step, the link to the dataset is deleted, but the
+  !> storage is not freed yet, because the dataset is still open. In the second step, the new length of the file is written into its
+  !> header, because HDF5 would write the length only after the truncation of the file. In the third step, the dataset is closed,
+  !> which frees the storage.
   subroutine remove_last(self, name, before)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, before
@@ -244,7 +245,7 @@ contains
   subroutine put_text(self, name, text)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, text
-    character(len=:), allocatable, target :: padded     ! allocatable: a long text would not fit on the stack
+    character(len=:), allocatable, target :: padded     ! allocatable, because a long text would not fit on the stack
     integer(hid_t) :: string
     integer :: closed
 
@@ -383,7 +384,7 @@ contains
       call h5oclose_f(object, closed)
     else
       if (in_memory == h5t_native_double) then
-        call self%open_dataset(name, dataset, extents, status)      ! integers are also accepted: HDF5 converts integers to reals
+        call self%open_dataset(name, dataset, extents, status)      ! integers are accepted, because HDF5 converts them
       else
         call self%open_dataset(name, dataset, extents, status, like=in_memory)
       end if

@@ -1,6 +1,6 @@
 !> A track: a set of series that are sampled together, so that each sample adds values to every series of the track. The frames, the
-!> observables and the event log are tracks. A counter in the file contains the number of complete samples of a track. The counter
-!> is written after the values have been flushed; readers and resumed runs can therefore rely on the counter.
+!> observables and the event log are tracks. A counter in the file contains the number of complete samples of a track. Readers and
+!> resumed runs can rely on the counter, because the counter is written after the values have been flushed.
 !>
 !> A sample is an array of reals that contains the values of all series, one series after another. Integers in a sample are exact
 !> only up to 2**53, because they are stored as double-precision numbers. Small samples are buffered, because one HDF5 call takes as
@@ -83,8 +83,8 @@ contains
     if (n == 0) n = max(fewest, first_bytes/self%bytes_per_sample())
   end function first_capacity
 
-  !> Capacity required for `count` more samples. If the present capacity is too small, it is multiplied by a factor, which leaves
-  !> space for later samples.
+  !> Capacity required for `count` more samples. A capacity that is too small is multiplied by a factor, so that there is also space
+  !> for later samples.
   pure function enlarged(self, count) result(n)
     class(track_t), intent(in) :: self
     integer(int64), intent(in) :: count
@@ -96,8 +96,8 @@ contains
     end do
   end function enlarged
 
-  !> Changes the type of series to 64-bit integers if the given samples contain integers that are too large for 32 bits. The types
-  !> in the present file do not change; the 64-bit integers are used in the next file that is created.
+  !> Changes the type of series to 64-bit integers if the given samples contain integers that are too large for 32 bits. The present
+  !> file keeps its types, and the next file that is created contains 64-bit integers.
   subroutine widen(self, samples, widened)
     class(track_t), intent(inout) :: self
     real(real64), intent(in) :: samples(:, :)           !! (width,count)
@@ -149,7 +149,7 @@ contains
     end do
   end subroutine link_step_and_time
 
-  !> Locates the series in a file and continues after the first `count` samples. The file is not changed.
+  !> Locates the series in a file, without changing the file, and continues after the first `count` samples.
   subroutine resume(self, file, count)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -170,8 +170,8 @@ contains
     self%committed = count
   end subroutine resume
 
-  !> Writes the number of complete samples to the file. If this procedure is called after `resume`, readers ignore samples that were
-  !> written after the checkpoint.
+  !> Writes the number of complete samples to the file. A call of `put_counter` after `resume` makes readers ignore samples that
+  !> were written after the checkpoint.
   subroutine put_counter(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file

@@ -170,7 +170,7 @@ contains
     end subroutine report_unknown
   end subroutine parse_arguments
 
-  !> Default path of the output: `runs/<input name>.h5`.
+  !> Default path of the output, in the form runs/NAME.h5, where NAME is the name of the input file.
   pure function default_output(input) result(output)
     character(len=*), intent(in) :: input
     character(len=:), allocatable :: output

@@ -18,7 +18,7 @@ module input_groups
   type :: value_t
     integer :: row = 0                         !! row of the variable in the table of variables
     character(len=name_length) :: name = ""
-    character(len=8) :: kind = ""              !! type of the values: "integer", "real", "logical" or "text"
+    character(len=8) :: kind = ""              !! type of the values, 'integer', 'real', 'logical' or 'text'
     logical :: given = .false.                 !! .true. if the user has set the variable
     logical :: faulty = .false.                !! .true. if the user has set an invalid value, which has been reported
     !> Number of the line that sets the variable, or the negative integer -k if override number k sets the variable
@@ -245,8 +245,8 @@ contains
   end subroutine demand
 
   !> Sets choices (such as `placement = 'grid'`) that the user has not given but that follow from other variables. If the user has
-  !> given a variable that has an effect only with one choice (such as the variable `grid`), that choice is made. If several given
-  !> variables determine a choice, the last variable in the table takes precedence.
+  !> given a variable that has an effect only with one choice (such as the variable `grid`), the choice follows from this variable.
+  !> If several given variables determine a choice, the last variable in the table takes precedence.
   pure subroutine infer_choices(self)
     class(group_t), intent(inout) :: self
     character(len=len(table%goes_with)), allocatable :: words(:)   ! name of a second variable, and values of the second variable
@@ -261,8 +261,8 @@ contains
 
   !> Checks the variables that have an effect only with certain choices. If a choice requires a variable, the variable must be
   !> given. If a variable has no effect with the choices in the group, the value of the variable is removed. If the user has set a
-  !> variable that has no effect, an error is reported, because no part of an input may be ignored silently. Mutually exclusive
-  !> variables are also reported.
+  !> variable that has no effect, an error is reported, because no part of an input may be ignored silently. The procedure also
+  !> reports variables that exclude each other.
   pure subroutine check_choices(self, problems)
     class(group_t), intent(inout) :: self
     type(problem_list_t), intent(inout) :: problems
@@ -293,8 +293,8 @@ contains
     end do
   end subroutine check_choices
 
-  !> Reports that a choice requires a variable that is not given. If the choice also permits a variable that excludes the first
-  !> variable, one of the two variables is required, and the problem is reported once.
+  !> Reports that a choice requires a variable that is not given. A choice can also require one of two variables that exclude each
+  !> other, for example drive.temperature or drive.velocity; the problem is then reported only once.
   pure subroutine demand_one(self, k, choice, word, problems)
     class(group_t), intent(in) :: self
     integer, intent(in) :: k                           !! position of the variable in `self%values`

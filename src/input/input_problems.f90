@@ -62,8 +62,8 @@ contains
     rank = merge(line, whole_file - line, line > 0)
   end function rank
 
-  !> Converts all problems to one error. The message contains one line for each problem: `path:line: group.variable: problem,
-  !> allowed values`.
+  !> Converts all problems to one error. The message contains one line for each problem, in the form path:line: group.variable:
+  !> problem, allowed values.
   subroutine report(self, path, error, overrides)
     class(problem_list_t), intent(in) :: self
     character(len=*), intent(in) :: path

@@ -28,7 +28,7 @@ contains
     type(group_t), intent(inout) :: groups(:)             !! groups of the same name are adjacent
     type(settings_t), intent(out) :: settings
     type(problem_list_t), intent(inout) :: problems
-    logical, intent(in), optional :: stepped              !! .true.: the caller ends the run, and `&stop` may therefore be empty
+    logical, intent(in), optional :: stepped              !! .true. if the caller ends the run, so that `&stop` may be empty
     logical :: must_end
     type(wall_law_t) :: wall_law                          ! default contact law of walls, from `&contact`
     integer :: o(2), s(2), w(2), k
@@ -217,8 +217,8 @@ contains
     end subroutine take_sampling
   end subroutine resolve_settings
 
-  !> Reports settings of different groups that cannot be combined, and intervals that are too short. Variables of the same group
-  !> that exclude each other are not checked here; the table of variables lists them.
+  !> Reports settings of different groups that cannot be combined, and intervals that are too short. The module `input_groups`
+  !> reports variables of the same group that exclude each other.
   subroutine check_conflicts(settings, groups, must_end, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
@@ -282,7 +282,7 @@ contains
 
   contains
 
-    !> Reports columns of frames that are named twice.
+    !> Reports columns of the frames that output.frame_columns names twice.
     subroutine check_columns()
       integer :: g, k
 
@@ -296,8 +296,9 @@ contains
       end associate
     end subroutine check_columns
 
-    !> Checks the conditions for placement = 'relaxed': event chains move all disks of the run in a box with four straight sides at
-    !> rest, and sample the uniform distribution of positions, which is the equilibrium without gravity.
+    !> Checks the conditions for placement = 'relaxed'. Event chains move all disks of the run, in a box without obstacles and
+    !> moving sides. The chains sample the uniform distribution of positions, which is the equilibrium distribution only without
+    !> gravity.
     subroutine check_relaxed()
       character(len=*), parameter :: with = "'relaxed' cannot be combined with "
       logical :: relaxed(size(settings%species))

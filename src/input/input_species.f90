@@ -157,9 +157,10 @@ contains
       end associate
     end subroutine take_velocities
 
-    !> Sets the number of sweeps for placement = 'relaxed'. All species have the same number, because a sweep moves all disks.
+    !> Sets the number of sweeps for placement = 'relaxed'. All species must have the same number of sweeps, because a sweep moves
+    !> the disks of all species.
     subroutine take_sweeps()
-      integer :: k, giver                                 ! giver: index of the first species that gives the number, or 0
+      integer :: k, giver                                 ! giver: index of the first species with a given number, or 0
 
       giver = findloc([(groups(k)%given("relaxation_sweeps"), k=1, size(groups))], .true., dim=1)
       do k = 1, size(groups)
@@ -176,8 +177,8 @@ contains
       end do
     end subroutine take_sweeps
 
-    !> Sets the masses and radii of all species. The species in `relative_to` may also have a `relative_to`; the factors of all
-    !> species in such a chain are multiplied.
+    !> Sets the masses and radii of all species. A species to which another species is relative may itself be relative to a third
+    !> species; the factors are then multiplied.
     subroutine resolve_sizes()
       real(real64), dimension(size(species)) :: mass, radius
       character(len=:), allocatable :: wanted
@@ -233,7 +234,7 @@ contains
       relative = group%given("relative_to")
       radius = group%real_of("radius", 0.0_real64)
       if (group%given("packing_fraction") .and. (given .or. relative)) then
-        radius = 0                                        ! another procedure reports variables that exclude each other
+        radius = 0                                        ! `input_groups` reports variables that exclude each other
       else if (group%given("packing_fraction")) then
         if (s%count > 0 .and. area(s%region) > 0) &
           radius = sqrt(group%real_of("packing_fraction", 0.0_real64)*area(s%region)/(pi*s%count))

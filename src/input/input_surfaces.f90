@@ -75,7 +75,7 @@ contains
       end do
     end subroutine take_walls
 
-    !> The arcs of a group, which all extend between the same angles.
+    !> The arcs of a group, which all extend between the same two angles.
     subroutine take_arcs(centre, radius, from_angle, to_angle)
       real(real64), intent(in) :: centre(:)               !! x and y of the centre of the circle of each arc [length]
       real(real64), intent(in) :: radius(:)               !! [length]
@@ -108,7 +108,7 @@ contains
     yes = has(group, "file") .or. has(group, "points")
   end function has_many
 
-  !> Whether the group contains a variable of this name that the user has set.
+  !> Whether the group contains a variable with the given name that the user has set.
   pure function has(group, name) result(yes)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: name
@@ -212,7 +212,7 @@ contains
         width = box%upper(axis) - box%lower(axis)
         call take_motion(sides(k), box%surface(side)%motion)
         if (.not. box%surface(side)%motion%moves()) cycle
-        ! No combination of the phases of the two motions may let opposite sides touch each other.
+        ! Opposite sides must not touch each other, whatever the phases of their motions are.
         if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%innermost_position()) >= width) call sides(k)%complain( &
           culprit(box%surface(side)%motion), "lets the sides meet, which are "// &
           written(width)//" apart (box.upper)", problems)

@@ -1,10 +1,10 @@
 !> Reads the text of an input file and splits the text into lines and tokens. The namelist reader of Fortran is not used: it accepts
-!> some invalid texts without a message, its messages contain neither the line nor the variable, and it can crash. In its place,
-!> this module and `namelist_input` read the text with a small and strict grammar:
+!> some invalid texts without a message, its messages contain neither the line nor the variable, and it can crash. The modules
+!> `input_text` and `namelist_input` read the text instead, with a small and strict grammar.
 !>
 !>     &group  name = value, value  name(2) = value  name = 3*value  /     ! comment
 !>
-!> Any other text is reported as an error with its line number.
+!> A text that does not obey the grammar is reported as an error with its line number.
 module input_text
   use kinds, only: int64
   use errors, only: error_t, exit_files, exit_usage, fail
@@ -32,7 +32,7 @@ module input_text
   type :: token_t
     character(len=1) :: kind
     integer :: first, last, line
-    integer :: repeats                           !! repeat count: the 3 in 3*value
+    integer :: repeats                           !! repeat count, such as 3 in 3*value
   end type token_t
 
   type :: assignment_t
@@ -45,7 +45,7 @@ module input_text
 
 contains
 
-  !> Finds the words in a line of a table. A # and the text after it are a comment.
+  !> Finds the words in a line of a table. The text from a # to the end of the line is a comment.
   pure subroutine find_words(line, first, last, n)
     character(len=*), intent(in) :: line
     integer, intent(out) :: first(:), last(:)

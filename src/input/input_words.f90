@@ -89,7 +89,7 @@ contains
       hint = ""
       associate (tokens => assignment%tokens)
         do k = 1, size(tokens), 2
-          if (tokens(k + 1)%first /= tokens(k)%last + 2) return     ! no hint: more than a comma separates the two numbers
+          if (tokens(k + 1)%first /= tokens(k)%last + 2) return     ! the two numbers are not separated by a comma alone
           if (verify(content(text, tokens(k + 1)), digits) > 0) return
         end do
         hint = "; did you mean "//content(text, tokens(1))//"."//content(text, tokens(2))// &

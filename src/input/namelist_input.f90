@@ -49,7 +49,7 @@ contains
     end do
     allocate (found(size(group_names) + n_sides + min(count([(text(k:k) == "&", k=1, len(text))]), &
       count(is_repeated(group_names))*most_instances)))
-    do k = 1, size(group_names)  ! each group that cannot be repeated exists, even if the text does not contain the group
+    do k = 1, size(group_names)  ! groups that cannot be repeated always exist, even if the text does not contain them
       if (.not. is_repeated(group_names(k))) call add_group(group_names(k), 0, 1)
     end do
     call open_source(unix_lines(text))
@@ -317,7 +317,7 @@ contains
       integer :: instances
 
       own = plain(name)
-      do group = n, 1, -1                                 ! `group` becomes 0 if no group has this name
+      do group = n, 1, -1                                 ! `group` becomes 0 if no group has the name
         if (found(group)%name == name) exit
       end do
       instances = 0
@@ -333,7 +333,7 @@ contains
         call add_group(name, opened, instances + 1)
         group = n
       else
-        problems = problem_list_t()                       ! only this problem is reported, and the rest of the text is not read
+        problems = problem_list_t()                       ! the rest of the text is not read, and other problems are not reported
         call problems%add(opened, name, "more than "//written(most_instances)//" groups of this name" &
           //trim(merge("; a file may hold many obstacles (file)", repeat(" ", 39), any(obstacle_groups == name))))
         too_many = .true.
@@ -452,7 +452,7 @@ contains
     end subroutine split_element
 
     !> Removes the sampling interval that the file sets if an override sets an interval of a different kind for the same samples.
-    !> The override thus replaces the interval in the file.
+    !> The interval in the override thus replaces the interval in the file.
     subroutine replace_cadence(group, name)
       type(group_t), intent(inout) :: group
       character(len=*), intent(in) :: name                !! name of the variable that the override sets
@@ -467,8 +467,8 @@ contains
       end do
     end subroutine replace_cadence
 
-    !> Finds the group to which an override refers. If the override refers to a side without a group, the group is created. In every
-    !> other case in which the override does not match exactly one group, the problem is reported and g is set to 0.
+    !> Finds the group to which an override refers. If the override refers to a side without a group, the group is created. If any
+    !> other override does not match exactly one group, the problem is reported and g is set to 0.
     subroutine find_group(group, instance, line, g)
       character(len=*), intent(in) :: group, instance
       integer, intent(in) :: line

@@ -1,6 +1,6 @@
 !> Reads obstacles from a text file: a line of column names, then one line per obstacle, `x y radius` for circles or `x1 y1 x2 y2`
-!> for straight walls. Empty lines, and text from a # to the end of its line, are ignored. Alternatively reads an HDF5 file with the
-!> datasets `centre` and `radius`, or `from` and `to`.
+!> for straight walls. Empty lines, and text from a # to the end of its line, are ignored. The module can also read obstacles from
+!> an HDF5 file with the datasets `centre` and `radius`, or `from` and `to`.
 module obstacle_file
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds, only: int64, real64

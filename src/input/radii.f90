@@ -1,6 +1,6 @@
-!> The radii of the disks of a species, which are equal or drawn from a distribution. The distribution is truncated at a smallest
-!> and a largest radius, which is ten times the smallest radius. If a drawn radius is outside these limits, a new radius is drawn.
-!> Polydispersities for which many radii would be outside the limits are not allowed.
+!> The radii of the disks of a species, which are equal or drawn from a distribution. The distribution is truncated such that the
+!> largest possible radius is ten times the smallest possible radius. If a drawn radius is outside the limits of the distribution, a
+!> new radius is drawn. Polydispersities for which many radii would be outside the limits are not allowed.
 module radii
   use kinds, only: int64, real64
   use random_stream, only: random_stream_t

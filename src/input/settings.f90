@@ -25,7 +25,7 @@ module settings
     real(real64) :: dt                                !! time step if `dynamics` is 'steps' [time]
     character(len=:), allocatable :: search           !! method of the neighbour search: 'cells', 'pairs' or 'rescan'
     character(len=:), allocatable :: queue            !! kind of the event queue: 'calendar' or 'heap'
-    !> Number of threads. If the input contains 0, the number of threads is taken from the environment when the threads are started.
+    !> Number of threads. The value 0 means that the number of threads is taken from the environment when the threads are started.
     integer :: threads
     integer :: threads_asked = 1                      !! number of threads that the user requested
   end type run_settings_t
@@ -77,11 +77,11 @@ module settings
     real(real64) :: rotational_temperature = -1.0_real64
   end type species_settings_t
 
-  !> Quantities that determine when samples are taken, as written in the names of variables.
+  !> Quantities that determine when samples are taken, as in the names of variables such as output.frames_every_time.
   character(len=19), parameter, public :: sampled_by(4) = [character(len=19) :: "time", "collisions", "events", &
     "collisions_per_disk"]
 
-  !> Kinds of samples, as written in the names of variables.
+  !> Kinds of samples, as in the names of variables such as output.frames_every_time.
   character(len=11), parameter, public :: sampled(2) = [character(len=11) :: "frames", "observables"]
 
   !> A sampling schedule. Intervals that the input does not set have the value `never`.
@@ -89,7 +89,7 @@ module settings
     real(real64) :: every(4) = never                  !! interval for each quantity in `sampled_by`
     real(real64), allocatable :: at(:)                !! given sampling times in ascending order [time]
     integer :: per_decade = 0                         !! number of logarithmic sampling times per decade; 0 if there are none
-    real(real64) :: from = never                      !! the first of the logarithmic sampling times [time]
+    real(real64) :: from = never                      !! first logarithmic sampling time [time]
   end type sampling_t
 
   type :: output_settings_t
@@ -116,7 +116,7 @@ module settings
     procedure :: wants_domains
   end type settings_t
 
-  !> The input of a run in all its forms: text, groups and settings.
+  !> The input of a run in three forms: text, groups and settings.
   type :: run_input_t
     character(len=:), allocatable :: path                !! path of the input file, for messages
     character(len=:), allocatable :: text                !! contents of the input file

@@ -70,8 +70,8 @@ contains
     padded = text//repeat(" ", max(comment_column - len(text), 0))
   end function padded
 
-  !> Answers `--explain`. The topic may be the name of a variable, with or without its group, or the name of a group. Any other word
-  !> is searched for in names, choices and help texts.
+  !> Answers `--explain`. The topic is the name of a variable, with or without its group, or the name of a group. Any other topic is
+  !> searched for in names, choices and help texts.
   pure subroutine explain(name, text, error)
     character(len=*), intent(in) :: name
     character(len=:), allocatable, intent(out) :: text
@@ -251,7 +251,7 @@ contains
   end function variables_text
 
   !> Converts a row of the table of variables to JSON. The bounds of a number are called `from` and `to` if they are allowed values,
-  !> or `above` and `below` if they are not.
+  !> and `above` and `below` if they are not allowed values.
   pure function row_text(k) result(text)
     integer, intent(in) :: k                               !! row number in the table of variables
     character(len=:), allocatable :: text, value, meanings

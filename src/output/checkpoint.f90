@@ -1,11 +1,11 @@
 !> Checkpoints. A checkpoint contains the present state of a simulation and the progress of its output, and is stored in the output
 !> file. A resumed run yields bit-identical data to a run without interruption.
 !>
-!> During a run the output file contains two slots, which are datasets with space for one checkpoint each. One of the slots is
-!> valid, and the next checkpoint is written to the slot that is not valid. After the new checkpoint has been stored on the disk, a
-!> number in the file is changed, which marks the slot of the new checkpoint as valid. The file therefore contains a complete
-!> checkpoint at all times. Each checkpoint has a checksum. The output of a finished run contains one slot. The output of a run that
-!> broke off contains no valid checkpoint.
+!> During a run the output file contains two slots, which are datasets with space for one checkpoint each. One of the two slots is
+!> valid, and a new checkpoint is written to the other slot. After the new checkpoint has been stored on the disk, a number in the
+!> file is changed, so that the slot with the new checkpoint becomes the valid slot. The file therefore contains a complete
+!> checkpoint at all times. Each checkpoint contains a checksum. The output of a finished run contains one slot. The output of a run
+!> that broke off contains no valid checkpoint.
 module checkpoint
   use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int8
@@ -40,7 +40,7 @@ module checkpoint
 
   !> Path of a hard link to the first slot. The link is created after all other links of the file and is never deleted. To delete
   !> the last link of a group, HDF5 first overwrites the name of the link and then removes the link from a list. If the program were
-  !> killed after the overwriting and before the removal, h5dump could not list the file.
+  !> killed between the overwriting of the name and the removal of the link, h5dump could not list the file.
   character(len=*), parameter :: kept = checkpoint_group//"kept"
 
 contains
@@ -65,7 +65,7 @@ contains
 
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
-        if (groups(g)%values(k)%name == "relative_to") cycle           ! omitted, because mass and radius have their final values
+        if (groups(g)%values(k)%name == "relative_to") cycle           ! not needed, because mass and radius have final values
         if (.not. groups(g)%values(k)%is_set() .or. table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add(groups(g)%value_line(k)//eol)
       end do
@@ -73,7 +73,7 @@ contains
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
         if (.not. allocated(groups(g)%values(k)%reals)) cycle
-        if (size(groups(g)%values(k)%reals) <= most_written) cycle  ! `value_line` has already written all values of a short list
+        if (size(groups(g)%values(k)%reals) <= most_written) cycle  ! `value_line` contains all values of a short list
         if (table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add("checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
           //trim(groups(g)%values(k)%name)//" = "//checksum(transfer(groups(g)%values(k)%reals, [0_int8]))//eol)
@@ -101,7 +101,7 @@ contains
     call file%open(source_of(output), writable=.false.)
     call file%fetch_text(parameters_group//"overrides", text)
     if (checkpoint_number(file) /= none) then
-      call check_program(file, error)                         ! names of variables may differ between versions of the program
+      call check_program(file, error)                         ! another version may have other names of variables
       if (.not. allocated(error)) call check_description(file, error)
     end if
     call file%close()
@@ -257,7 +257,7 @@ contains
     number = int(there(1))
   end function checkpoint_number
 
-  !> Whether a file contains the second slot.
+  !> Whether a file contains the second of the two slots for checkpoints.
   function has_both_checkpoints(file) result(yes)
     type(hdf5_file_t), intent(inout) :: file
     logical :: yes
@@ -288,7 +288,7 @@ contains
     bytes = 8*record%words
   end function checkpoint_bytes
 
-  !> Writes a checkpoint to a slot. A missing slot is created.
+  !> Writes a checkpoint to a slot, and creates the slot if it does not exist.
   subroutine put_slot(file, name, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
     character(len=*), intent(in) :: name
@@ -307,8 +307,8 @@ contains
     call exchange_all(file, record, sim, copy)
   end subroutine put_slot
 
-  !> Restores a run from its finished or unfinished output. The returned `progress` states how many samples the output contained at
-  !> the checkpoint.
+  !> Restores a run from its finished or unfinished output. The argument `progress` returns how many samples the output contained at
+  !> the time of the checkpoint.
   subroutine read_checkpoint(output, input, sim, progress, finished, error)
     character(len=*), intent(in) :: output      !! path of the finished output
     type(run_input_t), intent(in) :: input
@@ -506,7 +506,8 @@ contains
       end associate
       settled = merge(1, 0, sim%events_done)
       do k = 1, merge(1, 0, sim%features%rotation) + merge(2, 0, sim%features%orientation)
-        ! `settled` is repeated so that the length of the record depends on whether the run has rotation and orientation.
+        ! Copies of `settled` make the length of the record depend on whether the run has rotation and orientation, so that a
+        ! checkpoint of a run with other features is detected.
         call record%exchange(file, settled)
       end do
       if (allocated(sim%extra)) call record%pass(file, c_loc(sim%extra(1)), size(sim%extra)*storage_size(sim%extra)/64)

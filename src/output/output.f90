@@ -149,8 +149,8 @@ contains
   end subroutine check_start
 
   !> Opens the output of a resumed run after `claim`. New samples follow the samples that had been written before the checkpoint. If
-  !> a finished run is continued, its output is not changed until the continued run has finished. If the description of the input in
-  !> the file differs from the present input, a new file is written.
+  !> a finished run is continued, the finished output is not changed until the continued run has finished. If the description of the
+  !> input in the file differs from the present input, a new file is written.
   subroutine resume(self, input, sim, progress, finished, error)
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
@@ -332,7 +332,7 @@ contains
     class(output_t), intent(inout) :: self
     integer(int64), intent(in) :: capacities(:)
     type(simulation_t), intent(inout) :: sim
-    !> Treatment of the checkpoints: one of the constants `kept`, `anew` and `dropped` `kept`, `anew` or `dropped`
+    !> Treatment of the checkpoints, one of the constants `kept`, `anew` and `dropped`
     integer, intent(in) :: checkpoints
     type(hdf5_file_t), allocatable :: new
     integer(int64) :: needed
@@ -352,7 +352,7 @@ contains
     if (checkpoints == anew) call make_checkpoints(new, self%input%groups, sim, self%progress)
     if (checkpoints == dropped) call mark_as_broken(new)
     call new%flush()
-    if (allocated(self%file%failure)) then        ! reading from the old file has failed
+    if (allocated(self%file%failure)) then        ! the old file could not be read
       call new%discard()
       return
     end if
@@ -375,7 +375,7 @@ contains
   end subroutine save
 
   !> Completes the output of a finished run: checks the file and gives the file its final name. If the completion fails, the run can
-  !> be resumed from the checkpoint in the file, just before the end of the run.
+  !> be resumed from the checkpoint in the file, which was written just before the end of the run.
   subroutine finish(self, sim, cost, note, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -399,8 +399,8 @@ contains
     if (.not. allocated(error)) call self%release()
   end subroutine finish
 
-  !> Writes the last samples, removes unused space, and records how the run ended. The final checkpoint contains the progress before
-  !> the last samples, because these samples might not be due if the run is continued.
+  !> Writes the last samples, removes unused space, and records how the run ended. The final checkpoint does not count the samples
+  !> that are taken only because the run ends. If the run is continued, new samples overwrite the uncounted samples.
   subroutine write_end(self, sim, cost, note, broken)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

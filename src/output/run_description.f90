@@ -99,7 +99,7 @@ contains
 
       do g = 1, size(input%groups)
         associate (own => input%groups(g))
-          if (any(obstacle_groups == own%name)) cycle     ! `describe_table` writes a table of all obstacles and walls
+          if (any(obstacle_groups == own%name)) cycle     ! obstacles are written by `describe_table`
           group = parameters_group//trim(own%name)
           if (is_repeated(own%name)) group = group//"/"//trim(own%instance)
           call file%make_group(group)
@@ -235,7 +235,7 @@ contains
       associate (row => table(groups(1)%values(k)%row))
         path = parameters_group//trim(row%group)//"/"
         second = trim(row%choices(index(trim(row%choices), " ", back=.true.) + 1:))
-        ! The variable `file` is not stored, because `describe_rows` stores the obstacles that the file describes.
+        ! The variable `file` is omitted, because `describe_rows` stores the obstacles that the file describes.
         if (row%name == "file") cycle
         if (row%kind == "text") then
           do g = 1, n
@@ -245,7 +245,7 @@ contains
           if (second /= "") call file%put(path//second, [n], merge(1_int32, 0_int32, texts == second))
         else
           if (.not. any([(groups(g)%values(k)%is_set(), g=1, n)])) cycle
-          ! lists of any length are omitted: `describe_rows` stores the obstacles that follow from a list of points
+          ! Lists of points are omitted, because `describe_rows` stores the obstacles that follow from a list of points.
           if (row%size == 0) cycle
           values = spread(ieee_value(0.0_real64, ieee_quiet_nan), 1, row%size*n)     ! NaN if a group has no value
           do g = 1, n

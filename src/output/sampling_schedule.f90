@@ -79,7 +79,7 @@ contains
       .or. any([sim%tally%collisions, sim%tally%events] >= self%next(by_collisions:))
   end function is_due
 
-  !> Whether the present state has not been sampled yet.
+  !> Whether the present state is new, so that no sample of it has been taken.
   pure function is_new(self, sim) result(yes)
     class(schedule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -99,9 +99,8 @@ contains
     call self%look_ahead(sim)
   end subroutine take
 
-  !> Finds the time and the counts at which the next samples are due, which are the next multiples of the intervals. The result
-  !> depends on the time of the last sample only in one respect: a sample may be due at the present time if further events may occur
-  !> and no sample has been taken at the present time.
+  !> Finds the time and the numbers of collisions and events at which the next samples are due. A sample may be due at the present
+  !> time only if further events may occur and no sample has been taken at the present time.
   elemental subroutine look_ahead(self, sim)
     class(schedule_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -158,7 +157,7 @@ contains
     end do
   contains
 
-    !> Whether t is not before `time`, and is later than `past` by more than rounding errors.
+    !> Whether the time t is equal to or later than `time`, and later than `past` by more than rounding errors.
     pure logical function is_ahead(t)
       real(real64), intent(in) :: t
 
@@ -185,8 +184,8 @@ contains
     end function first_ahead
   end function next_time
 
-  !> The smallest number of collisions (or events) above n at which a multiple of the interval `every` is reached. If the stop rule
-  !> limits the number of collisions (or events) to that multiple of `every`, the run ends at the returned number.
+  !> The smallest number of collisions (or events) above n at which a multiple of the interval `every` is reached. If the limit of
+  !> the stop rule equals the multiple of `every`, the run ends at the returned number of collisions (or events).
   elemental function next_number(n, every) result(next)
     integer(int64), intent(in) :: n
     real(real64), intent(in) :: every
@@ -226,7 +225,7 @@ contains
   end function planned
 
   !> Number of times from 0 to t at which samples are due, including 0 and t. The result is 0 if there are more than `too_many` such
-  !> times, because the output then does not reserve space for all samples.
+  !> times, because the output does not reserve space for so many samples.
   pure function number_within(self, t) result(n)
     class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: t                 !! [time]
@@ -245,7 +244,7 @@ contains
   end function number_within
 
   !> Number of multiples of dt from 0 to t, including 0 and t. The result is 0 if there are more than `too_many` multiples, because
-  !> the output then does not reserve space for all samples.
+  !> the output does not reserve space for so many samples.
   pure function multiples_within(t, dt) result(n)
     real(real64), intent(in) :: t, dt
     integer(int64) :: n
