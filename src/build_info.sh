@@ -1,4 +1,5 @@
 #!/bin/sh
+
 # Writes a Fortran module with the origin of the program (commit, compiler and flags), which `--version` prints.
 # Arguments: the flags of the compiler.
 # shellcheck disable=SC2016 # `make dist` puts the commit here

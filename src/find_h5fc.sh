@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Prints the compiler of HDF5 for Fortran that is used: the first h5fc on PATH, or else /usr/bin/h5fc, with which a program that uses HDF5
-# compiles and runs. The h5fc of a conda environment, for example, can name a compiler that is not installed. If there is no such
-# h5fc, the script prints "h5fc" and its exit status is 1.
+
+# Prints the path of the HDF5 compiler for Fortran (h5fc) that the Makefile uses. The script takes the first h5fc on PATH, or
+# otherwise /usr/bin/h5fc, with which a program that uses HDF5 compiles and runs. The h5fc of a conda environment, for example, can
+# name a compiler that is not installed. If no h5fc works, the script prints "h5fc" and its exit status is 1.
 set -u
 mapfile -t candidates < <(type -ap h5fc)
 # The h5fc of the system is not tested, because the test takes as long as everything else that make does before it compiles.

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # The actions of `make install`, `make uninstall` and `make dist`.
 # usage: src/install.sh install|uninstall|dist    environment: PREFIX, DESTDIR, BUILD
 set -euo pipefail
@@ -52,8 +53,8 @@ put() {
   if [[ $1 == '-> '* ]]; then ln -sfn "${1#-> }" "$root/$2"; else install -T -m $mode "$1" "$root/$2"; fi
 }
 
-# Removes the files whose names are read from standard input, the compiled Python files (*.pyc) that belong to them, and
-# folders of this installation that are then empty.
+# Removes the files whose names are read from standard input, the compiled Python files (*.pyc) that belong to them, and folders of
+# the installation that have become empty.
 remove() {
   local name folder
   while read -r name; do

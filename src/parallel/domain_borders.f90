@@ -14,7 +14,8 @@ module domain_borders
 contains
 
   !> Determines whether a disk that the k-th domain owns can have touched a disk whose copy in this domain was wrong or missing. The
-  !> procedure also lists the corrections for the copies in this domain. The procedure reads the states of the neighbouring domains.
+  !> procedure also lists the corrections for the copies in this domain. For this purpose the procedure reads the states of the
+  !> neighbouring domains.
   subroutine compare_copies(domain, k)
     type(domain_t), intent(inout) :: domain(:)
     integer(int32), intent(in) :: k
@@ -50,7 +51,7 @@ contains
           found = found + 1
           associate (history => mine%history(mine%history_of(s)))
             same = history%digest == theirs%history(r)%digest .and. same_state() &
-              .and. self%patch%holds(self%sim%tag(s)%cell)  ! a copy that has left the patch must be corrected
+              .and. self%patch%holds(self%sim%tag(s)%cell)  ! a copy that has left the patch must be removed or corrected
             if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
             near = came_near(theirs%history(r), met)
             if (.not. met) met = mine%could_have_met(int(history%low, int32), int(history%high, int32))
@@ -67,8 +68,8 @@ contains
     end associate
   contains
 
-    !> Whether a disk of the neighbouring domain, in any periodic image, was inside the patch during the window. `met` becomes
-    !> .true. if the disk could have touched a disk that this domain owns.
+    !> Whether a disk of the neighbouring domain, in any periodic image, was inside the patch during the window. The argument `met`
+    !> becomes .true. if the disk could have touched a disk that this domain owns.
     function came_near(history, met) result(near)
       type(history_t), intent(in) :: history
       logical, intent(out) :: met
@@ -105,7 +106,7 @@ contains
       yes = all(transfer(self%sim%extra(s), [0_int64]) == transfer(other%sim%extra(t), [0_int64]))
     end function same_state
 
-    !> Adds the true state of a disk to the list of corrections. The disk has the index t in the neighbouring domain.
+    !> Adds the true state of a disk, which has the index t in the neighbouring domain, to the list of corrections.
     subroutine add_correction()
       if (.not. allocated(self%corrections)) allocate (self%corrections(256))
       if (self%n_corrections == size(self%corrections)) self%corrections = [self%corrections, self%corrections]
@@ -158,7 +159,7 @@ contains
       end if
       if (s == 0) then
         s = self%vacant
-        self%valid = s > 0 .and. self%valid          ! if there is no vacant slot, the domain has to be loaded again
+        self%valid = s > 0 .and. self%valid          ! without a vacant slot, the domain has to be loaded again
         if (s == 0) return
         self%vacant = self%global_index(s)
       else if (self%patch%holds(self%sim%tag(s)%cell)) then

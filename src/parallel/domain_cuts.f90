@@ -77,8 +77,8 @@ contains
       end do
     end function numbers
 
-    !> Estimated work of one thread: the number of domains per thread times the number of cells in the largest patch. The estimate
-    !> assumes that all domains have equal sizes.
+    !> Estimated work of one thread, if all domains had equal sizes: the number of domains per thread times the number of cells in
+    !> the largest patch.
     pure function work(n)
       integer(int32), intent(in) :: n(2)
       real(real64) :: work

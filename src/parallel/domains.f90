@@ -50,7 +50,7 @@ module domains
     integer(int32), allocatable :: global_index(:)
     integer(int32) :: vacant = 0                   !! index of the first vacant slot; 0 if no slot is vacant
     type(event_log_t), allocatable :: log          !! log of the collisions that this domain counts
-    integer(int64) :: iterations = 0               !! number of iterations of the engine in this window
+    integer(int64) :: iterations = 0               !! number of iterations of the engine in the present window
     logical :: done = .false.                      !! whether the engine has reached the end of the window
     logical :: valid = .false.                     !! whether no disk that the domain owns can have touched a wrong copy
     integer(int32) :: n_corrections = 0
@@ -206,7 +206,7 @@ contains
     integer(int64) :: iterations_left
 
     self%done = .false.
-    if (.not. self%valid) return                   ! there were not enough slots for all copies
+    if (.not. self%valid) return                   ! without enough slots for all copies, the window is invalid
     began = seconds()
     limits%time = t_end
     iterations_left = iterations
@@ -246,7 +246,7 @@ contains
   end subroutine write_back
 
   !> Moves the log entries of all domains to the log of the whole simulation, sorted by time. The order of simultaneous collisions
-  !> in different domains is unknown. `good` is .false. if the logs of different domains contain simultaneous collisions.
+  !> in different domains is unknown. If the logs of different domains contain simultaneous collisions, `good` becomes .false.
   subroutine merge_logs(domain, log, good)
     type(domain_t), intent(inout) :: domain(:)
     type(event_log_t), intent(inout) :: log

@@ -19,7 +19,7 @@ module parallel_events
 
   integer, parameter :: most_windows = 24                      !! largest number of windows in one call of `run_domains`
   real(real64), parameter :: shortest = 0.1_real64             !! shortest window that is tried, relative to the usual length
-  !> Domains are used only if more than a certain number of events per disk remain before a limit is reached. This number is
+  !> Domains are used only if enough events per disk remain before a limit is reached. The required number of events per disk is
   !> `least_left` if domains are already in use, and `least_left_to_begin` otherwise.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
   !> Shortest and longest period of the serial engine if domains cannot be used, if a limit or an inelastic collapse is reached, or
@@ -37,8 +37,8 @@ module parallel_events
     !> Template of the serial engine, which is copied when the serial engine is needed.
     type(event_driven_t) :: serial
     type(partition_t) :: parts
-    !> Smallest number of disks in a domain. A domain must contain at least twice this number in a periodic box, in which domains
-    !> have neighbouring domains on all sides.
+    !> Smallest number of disks in a domain. In a periodic box, in which domains have neighbouring domains on all sides, a domain
+    !> must contain at least twice as many disks.
     integer(int32) :: least_disks = 1250
     integer(int32) :: most_disks = 62000           !! largest number of disks in a domain that fits into the cache
     !> Average number of active cores below which the serial engine is faster than several threads.
@@ -58,7 +58,7 @@ module parallel_events
 
 contains
 
-  !> Prepares a run. Events are not predicted here, because the engine that will execute the events is not known yet.
+  !> Prepares a run. The procedure predicts no events, because the engine that will execute the events is not known yet.
   subroutine start(self, sim)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -90,8 +90,8 @@ contains
     end if
   end subroutine renew
 
-  !> Largest number of domains for which the cost of the copies is justified. The result is also the largest number of threads that
-  !> can be used.
+  !> Largest number of domains for which the work on copies of disks is worthwhile. The result is also the largest number of threads
+  !> that can be used.
   pure function most_domains(self, n_disks, periodic) result(n)
     class(parallel_events_t), intent(in) :: self
     integer(int32), intent(in) :: n_disks
@@ -117,7 +117,7 @@ contains
     if (serially) call advance_serially()
     if (self%parts%wanted > self%parts%threads .and. allocated(self%parts%domain) .and. &
       (sim%now >= sim%epoch_end .or. sim%tally%events >= most_events(sim))) then
-      deallocate (self%parts%domain)               ! the freed memory is needed to sort the disks
+      deallocate (self%parts%domain)               ! the memory of the domains is needed to sort the disks
       self%predicted_by = no_engine
     end if
   contains
@@ -176,17 +176,17 @@ contains
       if (all(self%parts%domain%engine%idle)) call use_serial_engine(brief)
     end subroutine run_domains
 
-    !> Largest number of windows in the next call of `run_domains`. The number is reduced after invalid windows, because a single
-    !> invalid window invalidates all windows of a call.
+    !> Largest number of windows in the next call of `run_domains`. After invalid windows the number of windows per call is reduced,
+    !> because a single invalid window invalidates all windows of a call.
     pure function most_windows_now() result(n)
       integer :: n
 
       n = max(1, int(most_windows*self%parts%shortening**4))
     end function most_windows_now
 
-    !> Makes windows longer after a call in which all windows were valid. The length of windows is constant within a call. Otherwise
-    !> the windows could become so long during one call that the last window of the call is invalid. If this happened in each call,
-    !> all windows would be discarded, and the run would make no progress.
+    !> Makes windows longer after a call in which all windows were valid. The length of windows is constant within a call. If
+    !> windows became longer during a call, the last window of every call could be invalid. All windows of every call would then be
+    !> discarded, and the run would make no progress.
     subroutine lengthen_windows(windows)
       integer, intent(in) :: windows               !! number of windows in the last call
 
@@ -195,8 +195,8 @@ contains
       end associate
     end subroutine lengthen_windows
 
-    !> Makes windows shorter after an invalid window. If windows already have the shortest length, the serial engine is used for a
-    !> period.
+    !> Makes windows shorter after an invalid window, or selects the serial engine for a period if windows already have the shortest
+    !> length.
     subroutine shorten_windows()
       self%windows_failed = self%windows_failed + 1
       associate (shortening => self%parts%shortening)
@@ -207,9 +207,9 @@ contains
       call use_serial_engine(after_failures)
     end subroutine shorten_windows
 
-    !> Selects the serial engine for a period. The period is twice as long as the last period, unless the domains have worked for
-    !> longer than the last period in the meantime. If a run is unsuitable for domains, the repeated doubling ensures that the run
-    !> takes hardly longer than with the serial engine alone.
+    !> Selects the serial engine for a period. A period of the serial engine is twice as long as the previous period, unless the
+    !> domains have executed more events since the previous period than the serial engine in that period. Because of the repeated
+    !> doubling, a run that is unsuitable for domains takes hardly longer than with the serial engine alone.
     subroutine use_serial_engine(periods)
       integer(int64), intent(in) :: periods(2)      !! limits of the period [events per disk]
 
@@ -219,7 +219,7 @@ contains
       serially = .true.
     end subroutine use_serial_engine
 
-    !> Advances the simulation with the serial engine, at most to the end of its period.
+    !> Advances the simulation with the serial engine, at most to the end of the period for which the serial engine was selected.
     subroutine advance_serially()
       type(limits_t) :: goal
       integer(int64) :: events

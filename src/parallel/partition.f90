@@ -1,6 +1,6 @@
-!> A simulation that is divided into domains, which advance together by time windows. The domains contain the predicted events. The
-!> whole simulation keeps its old state until the states of the domains are copied back. After an invalid window the states in the
-!> domains are wrong, and the domains have to be loaded again.
+!> A simulation that is divided into domains, which advance together by time windows. Each domain predicts and stores the events of
+!> the disks in its patch. The object `sim` of the whole simulation does not change until the states of the disks are copied back
+!> from the domains. After an invalid window the states in the domains are wrong, and the domains have to be loaded again.
 module partition
   use kinds, only: int16, int32, int64, real64
   use cell_faces, only: patch_t
@@ -50,8 +50,8 @@ module partition
     type(domain_t), allocatable :: domain(:)
     real(real64) :: event_rate = 0.0_real64        !! number of events per unit of time; 0 if not known yet [1/time]
     real(real64) :: iterations_per_event = 10.0_real64  !! number of iterations of an engine per event
-    real(real64) :: shortening = 1.0_real64        !! factor by which windows are shortened after failures
-    integer(int32) :: widening = 0                 !! increase of the width of the halo after failures [cells]
+    real(real64) :: shortening = 1.0_real64        !! factor of the length of windows after invalid windows
+    integer(int32) :: widening = 0                 !! increase of the width of the halo after invalid windows [cells]
     real(real64) :: cores = 0.0_real64             !! recent average of the number of active cores; 0 if not known yet
   contains
     procedure :: fill
@@ -103,8 +103,8 @@ contains
     !$omp end parallel do
   end subroutine fill
 
-  !> Updates the event rate and the number of iterations per event from a measurement. The event rate determines the length of
-  !> windows, and both values determine the limit of iterations.
+  !> Updates the measured event rate and the measured number of iterations per event. The event rate determines the length of
+  !> windows. The product of the two values determines the limit of iterations.
   pure subroutine update_rates(self, events, iterations, time)
     class(partition_t), intent(inout) :: self
     integer(int64), intent(in) :: events, iterations

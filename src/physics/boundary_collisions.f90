@@ -60,7 +60,7 @@ contains
   end subroutine collide_wall
 
   !> Ends a series of bounces on a moving side when a collision dissipates less than the rounding error. The normal velocity of the
-  !> disk is then set to the velocity of the side. A series of bounces on a moving side could otherwise be infinite.
+  !> disk is then set to the velocity of the side. Without this rule, a series of bounces on a moving side could be infinite.
   pure subroutine end_bouncing(v, before, normal_velocity, normal)
     real(real64), intent(inout) :: v(2)          !! velocity of the disk after the collision [length/time]
     !> Velocity of the disk before the collision, and normal velocity of the side [length/time]
@@ -72,10 +72,10 @@ contains
     if (left >= -dot_product(before - normal_velocity, normal)) v = v - left*normal
   end subroutine end_bouncing
 
-  !> Applies the momentum transfer between a disk and a piston. On entry the disk has the velocity after a rebound from a piston of
-  !> infinite mass. The procedure reduces this impulse to the value for the finite mass of the piston. On return u
-  !> contains the mean of the velocities of the piston before and after the collision, from which the work of the piston is
-  !> calculated.
+  !> Applies the momentum transfer between a disk and a piston. When the procedure is called, the disk has the velocity after a
+  !> rebound from a piston of infinite mass. The procedure reduces the impulse of the rebound to the value for the finite mass of
+  !> the piston. When the procedure returns, u contains the mean of the velocities of the piston before and after the collision,
+  !> from which the work of the piston is calculated.
   pure subroutine move_piston(sim, i, code, normal, before, u, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -103,8 +103,8 @@ contains
   end subroutine move_piston
 
   !> Draws the velocity of disk i after a collision with a thermal wall, as if the disk came from a gas with the temperature of the
-  !> wall. The normal component has the density (m v/kT) exp(-m v**2/2kT). The tangential component and the angular velocity are
-  !> Gaussian.
+  !> wall. The normal component v of the velocity has the probability density (m v/kT) exp(-m v**2/2kT). The tangential component of
+  !> the velocity and the angular velocity are Gaussian.
   pure subroutine draw_thermal_velocity(sim, i, temperature, normal, u)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -165,10 +165,9 @@ contains
     end associate
   end subroutine apply_tangential_impulse_at_wall
 
-  !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk is the sum of the work of the
-  !> moving surface and a remainder. At a thermal wall, the energy change of the disk minus the work of the surface is the
-  !> transferred heat. At a wall that is not thermal, the work of the surface minus the energy change of the disk is the dissipated
-  !> energy.
+  !> Adds a collision with a side or obstacle to the counters and sums. The energy of the disk changes by the work of the moving
+  !> surface and by a second contribution. At a thermal wall, the energy change of the disk minus the work of the surface is the
+  !> transferred heat. At any other wall, the work of the surface minus the energy change of the disk is the dissipated energy.
   pure subroutine add_wall_sums(sim, i, k, heats, u, v, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

@@ -1,5 +1,5 @@
 !> The box that contains the disks: four sides (walls or periodic boundaries), fixed obstacles, and gravity. The contact time of a
-!> disk with the box is a pure function of the state of the disk. Contact times, like the clocks of disks, are relative to the time
+!> disk with the box is a pure function of the state of the disk. Contact times and the clocks of disks are relative to the time
 !> origin `box%epoch`.
 module box_geometry
   use collisions, only: wall_law_t
@@ -36,7 +36,7 @@ module box_geometry
     !> The sides in the order left, right, bottom, top, followed by the groups of obstacles. The elements of periodic sides are not
     !> used.
     type(surface_t), allocatable :: surface(:)
-    type(obstacle_t), allocatable :: obstacle(:)   !! obstacles of a group have consecutive indices
+    type(obstacle_t), allocatable :: obstacle(:)   !! the obstacles of one group have consecutive indices
     ! State of the box that changes during a run. The input determines the initial state of the sides.
     real(real64) :: epoch = 0.0_real64          !! time origin of all clocks, measured from the start of the run [time]
     type(side_state_t) :: side(n_sides)
@@ -227,7 +227,7 @@ contains
     yes = any([(self%is_wall(k), k=1, size(self%surface))] .and. self%surface%law%tangential%is_rough())
   end function has_rough_walls
 
-  !> Highest temperature of a thermal wall.
+  !> Highest temperature of all thermal walls.
   pure function highest_temperature(self) result(highest)
     class(box_t), intent(in) :: self
     real(real64) :: highest                     !! [energy]
@@ -294,8 +294,9 @@ contains
   end function side_velocity
 
   !> Finds the first contact of a disk with any of the given obstacles, if this contact is earlier than an event that is already
-  !> known. A disk that passes a periodic side is shifted back into the box, and its contacts are predicted again. Only images of an
-  !> obstacle that are shifted by at most one period are therefore tested. An obstacle that encloses the disks has no images.
+  !> known. A disk that passes a periodic side is shifted back into the box, and its contacts are predicted again. It is therefore
+  !> sufficient to test images of an obstacle that are shifted by at most one period. An obstacle that encloses the disks has no
+  !> images.
   pure subroutine next_obstacle(box, disk, last, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -319,9 +320,9 @@ contains
     end do
   end subroutine next_obstacle
 
-  !> Finds the contact of a disk with one image of an obstacle, if this contact is earlier than an event that is already known.
-  !> A disk that leaves a convex obstacle on a straight path cannot touch this obstacle again. Without gravity, a contact with a
-  !> convex obstacle of the last collision could only result from rounding errors and is not predicted.
+  !> Finds the contact of a disk with one image of an obstacle, if this contact is earlier than an event that is already known. A
+  !> disk that leaves a convex obstacle on a straight path cannot touch this obstacle again. If the last collision of the disk was
+  !> with the same convex obstacle, a contact without gravity could only result from rounding errors and is not predicted.
   pure subroutine find_image_contact(box, disk, last, obstacle, shift, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -371,15 +372,15 @@ contains
   end function stays_clear
 
   !> Whether a point on a straight path certainly stays outside of a circle around the origin during a given time. The result
-  !> .false. means that the point may enter the circle. A point that moves away from the centre does not touch a round outline. The
-  !> radius of the circle is enlarged by a margin that exceeds all rounding errors. A contact before the time s requires c < -2 b s,
-  !> as in `neighbour_search: earliest_contact`.
+  !> .false. means that the point may enter the circle. If the obstacle is the circle itself, a point that moves away from the
+  !> centre does not touch the obstacle. The radius of the circle is enlarged by a margin that exceeds all rounding errors. A
+  !> contact before the time s requires c < -2 b s, as in `neighbour_search: earliest_contact`.
   pure function passes_by(d, v, s, rho, is_round) result(yes)
     real(real64), intent(in) :: d(2)            !! initial position [length]
     real(real64), intent(in) :: v(2)            !! [length/time]
     real(real64), intent(in) :: s               !! duration [time]
     real(real64), intent(in) :: rho             !! radius of the circle [length]
-    logical, intent(in) :: is_round             !! whether the outline is this circle
+    logical, intent(in) :: is_round             !! whether the obstacle itself is the circle
     logical :: yes
     real(real64) :: b, c, sigma2, disc
 
@@ -391,10 +392,10 @@ contains
     yes = (min(disc, -2*b*s - c) < 0 .and. c > 0) .or. (is_round .and. b >= 0)
   end function passes_by
 
-  !> Like `passes_by`, for a falling point. The path of the point lies in a triangle. The corners of the triangle are the two ends
-  !> of the path, and the position that the point would reach without gravity in half the time. The circle does not overlap the
-  !> triangle if a line that is parallel or perpendicular to the chord of the path (the line between its two ends) separates the
-  !> circle from all three corners.
+  !> Like `passes_by`, for a falling point. The parabolic path of the point lies in a triangle whose corners are the two ends of the
+  !> path, and the position that the point would reach without gravity in half the time. The circle does not overlap the triangle if
+  !> a line that is parallel or perpendicular to the chord of the path (the line between its two ends) separates the circle from all
+  !> three corners.
   pure function falls_past(d, v, g, s, rho) result(yes)
     real(real64), intent(in) :: d(2), v(2), g(2), s, rho
     logical :: yes

@@ -6,20 +6,22 @@ module collisions
   public :: contact_law_t, normal_rule, pair_impulse, restitution_laws, series_terms, speed_law_t
   public :: tangential_impulse, tangential_law_t, wall_law_t, wall_rebound, wall_rules
 
-  !> Names of the wall rules in the input. The restitution of a wall multiplies the whole velocity ('velocity') or only the normal
-  !> component ('normal'). Elsewhere in the program a wall rule is represented by its position in the list `wall_rules`.
+  !> Names of the wall rules in the input. With the rule 'velocity' the coefficient of restitution of a wall multiplies both
+  !> components of the velocity of the disk, with the rule 'normal' only the normal component. Elsewhere in the program a wall rule
+  !> is represented by its position in the list `wall_rules`.
   character(len=*), parameter :: wall_rules = "velocity normal"
   integer, parameter :: normal_rule = 2              !! position of the rule 'normal' in `wall_rules`
 
-  !> Names in the input for the laws by which the restitution depends on the impact velocity. For each law, `series_terms` contains
-  !> the coefficient c of `speed_law_t`, which is 3/5 for viscoelastic spheres.
+  !> Names in the input for the laws by which the coefficient of restitution depends on the impact velocity. For each law,
+  !> `series_terms` contains the coefficient c of the series in `speed_law_t`, which is 3/5 for viscoelastic spheres.
   character(len=*), parameter :: restitution_laws = "constant power viscoelastic"
   real(real64), parameter :: series_terms(3) = [0.0_real64, 0.0_real64, 0.6_real64]
 
-  !> Restitution that increases towards 1 for small impact velocities (Ramirez, Poschel, Brilliantov and Schwager, Physical Review E
-  !> 60, 4465 (1999)). For normal velocities g < g0 the restitution is 1 - y + c y**2 with y = y0 (g/g0)**(1/5). The constant y0 is
-  !> chosen such that the restitution at g0 equals the restitution given by the input. For g >= g0 the restitution given by the
-  !> input is used.
+  !> Coefficient of restitution that increases towards 1 for small impact velocities (Ramirez, Poschel, Brilliantov and Schwager,
+  !> Physical Review E 60, 4465 (1999)). At impact velocities g below a reference velocity g0, the coefficient of restitution is 1 -
+  !> y + c y**2 with y = y0 (g/g0)**(1/5). The constant y0 follows from the condition that the coefficient of restitution at the
+  !> reference velocity g0 has the value in the input. At all impact velocities above g0 the coefficient of restitution also has the
+  !> value in the input.
   type :: speed_law_t
     real(real64) :: speed = 0.0_real64               !! reference impact velocity g0; 0 if the restitution is constant [length/time]
     real(real64) :: c = 0.0_real64                   !! coefficient c of the series 1 - y + c y**2: see `series_terms`
@@ -73,7 +75,7 @@ contains
   !> Coefficient of restitution at an impact velocity.
   elemental function restitution_at(self, restitution, g) result(xi)
     class(speed_law_t), intent(in) :: self
-    real(real64), intent(in) :: restitution          !! coefficient of restitution at the impact velocity g0
+    real(real64), intent(in) :: restitution          !! coefficient of restitution at the reference velocity g0
     real(real64), intent(in) :: g                    !! normal impact velocity [length/time]
     real(real64) :: xi, y
 
@@ -83,9 +85,8 @@ contains
     xi = 1 - y + self%c*y**2
   end function restitution_at
 
-  !> Smallest coefficient of restitution at g0 for which the restitution is a monotonic function of the impact velocity. With this
-  !> smallest coefficient, the series 1 - y + c y**2, which describes the restitution, has its minimum exactly at the impact
-  !> velocity g0.
+  !> Smallest coefficient of restitution in the input with which the series 1 - y + c y**2 decreases at all impact velocities up to
+  !> the reference velocity g0. With the smallest coefficient, the series has its minimum exactly at g0.
   elemental function least(self) result(xi)
     class(speed_law_t), intent(in) :: self
     real(real64) :: xi
@@ -130,9 +131,9 @@ contains
     if (abs(impulse) > law%friction*normal_impulse) impulse = sign(law%friction*normal_impulse, impulse)
   end function tangential_impulse
 
-  !> Velocity after a collision with a wall at rest. After the collision the normal velocity points away from the wall, even if it
-  !> already did so before the collision. A second collision caused by rounding errors therefore cannot move a disk through the
-  !> wall.
+  !> Velocity after a collision with a wall at rest. After the collision the normal velocity always points away from the wall, even
+  !> if the disk already moved away from the wall before the collision. A second collision caused by rounding errors therefore
+  !> cannot move a disk through the wall.
   pure function wall_rebound(law, v, normal, elastic) result(after)
     type(wall_law_t), intent(in) :: law
     real(real64), intent(in) :: v(2)                 !! [length/time]

@@ -1,7 +1,7 @@
 !> Data of the disks, grouped by the frequency of access. The record of a disk occupies one cache line and is read in every
 !> prediction. The tag of a disk occupies half a cache line and is needed only in events of the disk itself. Optional data of disks
-!> are in arrays that exist only in some simulations. Derived data are not stored in checkpoints, because they are recomputed at
-!> every start.
+!> are in arrays that exist only in some simulations. Derived data of the disks are not stored in checkpoints, because they are
+!> recomputed at every start.
 module disks
   use free_flight, only: flight, flight_velocity
   use kinds, only: int16, int32, int64, real64
@@ -26,7 +26,7 @@ module disks
 
   type :: tag_t
     integer(int32) :: species = 1               !! index of the species
-    integer(int32) :: id = 0                    !! number of the disk in the order of the input
+    integer(int32) :: id = 0                    !! number of the disk in the order of the input file
     integer(int64) :: collisions = 0            !! number of events of the disk since the start of the run
     integer(int32) :: last_partner = 0  !! last collision partner: id of a disk, code of an obstacle, or 0; see `partners: repeated`
     ! Derived data, which the search and the event queue use.

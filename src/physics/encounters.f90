@@ -1,5 +1,5 @@
 !> Executes events: applies the contact law when two disks or a disk and a wall collide, moves disks through periodic sides, and
-!> updates counters and sums. Both the event-driven and the time-stepped dynamics use this module.
+!> updates counters and sums. Both the event-driven and the time-stepped dynamics use the module `encounters`.
 module encounters
   use kinds, only: int32, int64, real64
   use collisions, only: pair_impulse, tangential_impulse
@@ -19,8 +19,8 @@ module encounters
 
   !> Limits for the detection of an inelastic collapse. A series of at most `most_visible` simultaneous collisions of a pair is not
   !> considered a collapse. The limit `rounded` is an approach velocity, divided by the speed of the faster disk and by 1 -
-  !> restitution. Below the approach velocity `rounded`, further collisions only result from rounding errors. The limit `slowest` is
-  !> an absolute approach velocity, which is far below all velocities in an input [length/time]. The absolute limit `slowest` is
+  !> restitution. At approach velocities below `rounded`, further collisions only result from rounding errors. The limit `slowest`
+  !> is an absolute approach velocity, which is far below all velocities in an input [length/time]. The absolute limit `slowest` is
   !> needed if collisions with walls slow down all disks.
   integer(int32), parameter :: most_visible = most_repeats - 3
   real(real64), parameter :: rounded = 1.0e-12_real64, slowest = 1.0e-120_real64
@@ -109,7 +109,8 @@ contains
     dx = sim%disk(j)%x - sim%disk(i)%x
     dv = sim%disk(j)%v - sim%disk(i)%v
     if (any(sim%box%periodic)) then
-      if (any(abs(dx) >= 0.5_real64*sim%box%edges())) call use_nearest_image(sim, t, dx, dv)  ! few pairs touch across a side
+      ! Few pairs touch across a periodic side
+      if (any(abs(dx) >= 0.5_real64*sim%box%edges())) call use_nearest_image(sim, t, dx, dv)
     end if
     b = dx(1)*dv(1) + dx(2)*dv(2)
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
@@ -120,8 +121,8 @@ contains
       mass_j = sim%own_mass(j)
     end if
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
-    ! The velocity change is the impulse divided by the mass. A multiplication by a stored reciprocal mass would repeat the same
-    ! rounding error in all collisions.
+    ! The velocity change is the impulse divided by the mass. A multiplication by a stored reciprocal mass is not used, because it
+    ! would repeat the same rounding error in all collisions.
     sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     dv = sim%disk(j)%v - sim%disk(i)%v
@@ -173,8 +174,8 @@ contains
     restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(j)%species)
     if (sim%law%contact_time > 0 .or. .not. restitution < 1) return
     last_partner = sim%tag([i, j])%last_partner
-    ! Each disk stores the number of collisions in its series. If a collision with a wall has erased the number of a disk, the
-    ! number of the other disk is used.
+    ! Each disk stores the number of collisions in its series of simultaneous collisions. If a collision with a wall has erased this
+    ! number for one of two disks, the number of the other disk is used.
     n = minval(merge(repeats(last_partner), most_repeats, last_partner > 0)) + 1
     fastest = max(magnitude(sim%disk(i)%v), magnitude(sim%disk(j)%v))
     if (impact_velocity(sim, i, j, t) > max(rounded*(1 - restitution)*fastest, slowest)) n = min(n, most_visible)
@@ -313,16 +314,16 @@ contains
     type(images_t) :: images
     type(image_t) :: image
 
-    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! nearly all calls return here
+    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! the pair itself is nearest in nearly all calls
     images = sim%images()
     image = images%image(images%nearest_image(dx, t))
     dx = dx + [image%shift(1) + image%velocity*t, image%shift(2)]
     dv(1) = dv(1) + image%velocity
   end subroutine use_nearest_image
 
-  !> Whether disks i and j, which touch at the time t, are still in contact after their last collision, in the same periodic image.
-  !> If two disks in contact approach each other, the approach is a rounding error from the shift of one disk by a period, because
-  !> no force acts between disks.
+  !> Whether disks i and j, which touch at the time t, are still in contact since their last collision with each other, in the same
+  !> periodic image. No force acts between disks; if two disks in contact approach each other, the approach is therefore a rounding
+  !> error from the shift of one disk by a period.
   pure function are_in_contact(sim, i, j, t) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j

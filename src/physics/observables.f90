@@ -36,7 +36,7 @@ module observables
   integer, parameter :: own_kinetic = 9, own_momentum = 10
   integer, parameter :: flux = 12  !! kinetic flux relative to the velocity profile, five components: see `tally: kinetic_flux`
   integer, parameter :: tensor(*) = flux + [0, 1, 1, 2]                    !! components xx, xy, yx, yy of the momentum flux
-  !> Total energy, and the rounding error of the sum that yields the total energy. The sums `energy` and `lost` are computed only in
+  !> Total energy (`energy`), and the rounding error of its summation (`lost`). The sums `energy` and `lost` are computed only in
   !> driven simulations.
   integer, parameter :: energy = 17, lost = 18
 
@@ -172,7 +172,7 @@ contains
     call empty%make_room(0)
     call empty%tally%make_room(n_sides)
     empty%box = box_t()
-    empty%box%surface%law%temperature = 1         ! all observables of walls exist if walls are thermal and move
+    empty%box%surface%law%temperature = 1         ! all observables of walls exist if the walls are thermal and move
     empty%box%surface%law%speed = 1
     empty%features%stress = .true.
     empty%features%helfand = .true.
@@ -206,8 +206,8 @@ contains
     if (sim%is_driven()) total = sums(energy) + sums(lost)
   end function total
 
-  !> Adds a term to the energy with compensated summation (Neumaier, ZAMM 54, 39 (1974)). The energy gained from driving is so small
-  !> compared with the energy of many disks that simple summation would lose digits of the gain.
+  !> Adds a term to the energy with compensated summation (Neumaier, ZAMM 54, 39 (1974)). Simple summation would lose digits of the
+  !> energy that disks gain from driving, because the gain can be small compared with the total energy of many disks.
   pure subroutine add_energy(sums, term)
     real(real64), intent(inout) :: sums(:)
     real(real64), intent(in) :: term

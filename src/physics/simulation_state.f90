@@ -14,12 +14,12 @@ module simulation_state
   private
   public :: specification_t, simulation_t, system_t
 
-  !> Factors that determine the bound for the terms of a sum: see `exact_sums: choose_unit`. The bound is the smaller of two values:
-  !> `common` times a typical term of the heaviest disks, and `rare` times a typical term of the lightest disks.
+  !> Factors that determine the bound for the terms of a sum: see `exact_sums: choose_unit`. The bound is the smaller of two values,
+  !> which are `common` times a typical term of the heaviest disks and `rare` times a typical term of the lightest disks.
   real(real64), parameter :: common = 2.0_real64**7, rare = 2.0_real64**22
   !> Factor by which the units of the sums are multiplied in driven simulations. The work of walls and kicks may be far less than
-  !> the estimate from their parameters. The factor `finer` makes the units so small that the sums also resolve the energies of
-  !> undriven disks.
+  !> the estimate from their parameters. With the factor `finer` the units are so small that the sums resolve the work even if it is
+  !> far less than the estimate.
   real(real64), parameter :: finer = 2.0_real64**(-30)
 
   !> The system: box, contact law, driving and features, which together determine the motion of the disks.
@@ -45,12 +45,12 @@ module simulation_state
     !> (n) Number of times that each disk has been recycled, in the order of ids; allocated if the driving moves disks.
     integer(int64), allocatable :: recycled(:)
     real(real64) :: now = 0.0_real64              !! present time, relative to the time origin `box%epoch` [time]
-    logical :: events_done = .false.              !! all events up to and including `now` have been executed
+    logical :: events_done = .false.              !! whether all events up to and including the time `now` have been executed
     real(real64) :: epoch_begin = 0.0_real64      !! start of the epoch, relative to the time origin `box%epoch` [time]
     real(real64) :: epoch_end = 0.0_real64        !! end of the epoch, relative to `box%epoch`; 0 if not known yet [time]
     integer(int64) :: epoch_events = 0            !! number of events from the start of the run to the start of the epoch
-    ! The components `negligible_time`, `last_advance` and `events_then` serve to detect a collapse, which is an infinite series of
-    ! events during which time does not advance.
+    ! The components `negligible_time`, `last_advance` and `events_then` serve to detect an inelastic collapse, which is an infinite
+    ! series of events during which time does not advance.
     real(real64) :: negligible_time = 0.0_real64  !! duration in which no disk moves noticeably; 0 if not known yet [time]
     !> Time at which the simulation last advanced by more than `negligible_time`, relative to the time origin `box%epoch` [time]
     real(real64) :: last_advance = 0.0_real64

@@ -43,7 +43,7 @@ module tally
     integer(int64) :: collisions = 0               !! number of collisions of disks
     !> Number of simultaneous inelastic collisions, see `encounters: count_simultaneous_collision`.
     integer(int64) :: simultaneous = 0
-    real(real64) :: collapse = never               !! time of the first collapse, since the start of the run [time]
+    real(real64) :: collapse = never               !! time of the first inelastic collapse, since the start of the run [time]
     type(exact_sum_t) :: sum(size(sums))
     integer(int64), allocatable :: surface_collisions(:)  !! (surfaces) number of collisions with each surface
     type(exact_sum_t), allocatable :: surface_sums(:, :)   !! (3,surfaces) impulse along x and y, and energy gained by disks

@@ -14,7 +14,7 @@ module cell_contents
   integer(int32), parameter :: count_slot = cell_capacity + 1
   integer(int32), parameter :: counted = 65535               !! bit mask of the number of disks in the slots
   integer(int32), parameter :: crowd = counted + 1           !! increment of the bit field that counts crowded cells
-  integer(int32), parameter :: marked = shiftl(crowd, 8)     !! bit of the mark, above the bits that count crowded cells
+  integer(int32), parameter :: marked = shiftl(crowd, 8)     !! bit that contains the mark of the cell
 
   !> The array `slot` of a cell contains the slots and, as its last element, bit fields. A slot contains the index of a disk,
   !> counted from 0. In the last element of `slot`, bits 0 to 15 contain the number of disks in the slots. Bits 16 to 23 contain the
@@ -173,8 +173,8 @@ contains
     n = iand(self%slot(count_slot), counted)
   end function in_slots
 
-  !> Whether predictions in this cell need the general procedure: the cell is marked, or the cell or one of its eight neighbours is
-  !> crowded.
+  !> Whether predictions for disks in a cell need the general procedure: the cell is marked, or the cell or one of its eight
+  !> neighbours is crowded.
   elemental function needs_care(self) result(yes)
     class(cell_t), intent(in) :: self
     logical :: yes

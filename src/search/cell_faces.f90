@@ -1,8 +1,9 @@
 !> The faces of the cells, and the times when disks leave their cells. The sides of the box are also faces of cells.
 !>
-!> Neighbouring cells overlap. The overlap has the largest width for which two disks in cells that are not adjacent cannot touch
-!> each other. A disk in the overlap of two cells is assigned to the cell that the disk leaves last. If cells are much wider than
-!> disks, the overlap halves the number of events in which disks cross faces.
+!> Neighbouring cells overlap, so that a disk in the overlap can be assigned to either cell. The width of the overlap is the largest
+!> width for which two disks in cells that are not adjacent cannot touch each other. A disk in the overlap of two cells is assigned
+!> to the cell that the disk leaves last. If cells are much wider than disks, the overlap halves the number of events in which disks
+!> cross faces.
 module cell_faces
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t
@@ -30,8 +31,7 @@ module cell_faces
     real(real64) :: lower(2) = 0.0_real64          !! lower left corner of the box [length]
     real(real64) :: width(2) = 0.0_real64          !! distance between the centres of adjacent cells [length]
     ! If a periodic side of the box is inside the patch, `last` is the last column or row before the side, and `next` is the first
-    ! column or row behind the side. If the patch contains no periodic side along an axis, `last` and `next` are set to 0 for this
-    ! axis.
+    ! column or row behind the side. If the patch contains no periodic side along an axis, `last` and `next` are 0 for the axis.
     integer(int32) :: last(2) = 0
     integer(int32) :: next(2) = 0
   contains
@@ -94,7 +94,7 @@ contains
     patch%n = n
     patch%reach = reach
     patch%lower = box%lower
-    ! The width is slightly increased, so that rounding errors cannot place the last face inside the box.
+    ! The width of a cell is slightly increased, so that rounding errors cannot place the last face inside the box.
     patch%width = box%edges()/n*(1 + 4*epsilon(reach))
     call patch%find_sides(box%periodic)
   end function all_cells
@@ -475,7 +475,7 @@ contains
       x = flight(disk%x(axis), disk%v(axis), g, now - disk%clock)
       v = flight_velocity(disk%v(axis), g, now - disk%clock)
       up = merge(1, 0, v > -g*resolution(now))
-      sense = 2*up - 1                             ! simplified formulas for the roots in `time_to_line`
+      sense = 2*up - 1                             ! simplified form of the formulas in `time_to_line`
       gap = max(sense*(line(up)%place - x), 0.0_real64)
       disc = (v*v + tiny(v)) + 2*sense*g*gap       ! `tiny` keeps `disc` positive if the disk is at rest on the face
       if (disc >= 0) then
@@ -532,7 +532,8 @@ contains
     end do
   end subroutine next_moving
 
-  !> Time when a disk on a parabolic path reaches a face or side. The earlier root, at which the disk entered the cell, is excluded.
+  !> Time when a disk on a parabolic path reaches a face or side. The equation of motion has two roots; the earlier root, at which
+  !> the disk entered the cell, is excluded.
   pure function falling_time(line, axis, box, disk, now) result(t)
     type(line_t), intent(in) :: line
     integer(int32), intent(in) :: axis

@@ -35,7 +35,7 @@ module cell_grid
     type(images_t) :: images                       !! periodic images of the box
     integer(int32) :: n_listed = 0                 !! number of disks inserted into cells
     type(neighbour_lists_t), public :: lists       !! neighbour lists of the small disks, used if cells contain many disks
-    real(real64) :: plain_radius = 0.0_real64  !! radius up to which crossings of disks change no list; -1 if there is none [length]
+    real(real64) :: plain_radius = 0.0_real64  !! largest radius of disks whose crossings change no list, or -1 [length]
   contains
     procedure :: build
     procedure :: predict
@@ -54,7 +54,7 @@ module cell_grid
 
 contains
 
-  !> Chooses the cells, and lists the disks and obstacles in each cell. If the cells are as before, the obstacles remain listed.
+  !> Chooses the cells, and lists the disks and obstacles in each cell. Lists of obstacles for the same cells remain valid.
   subroutine build(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -258,7 +258,7 @@ contains
     end if
   end subroutine cross_with_care
 
-  !> Moves disk i into the cell beyond a face. If the face is a periodic side, the new cell is the first cell behind it.
+  !> Moves disk i into the cell beyond a face. If the face is a periodic side, the new cell is the first cell behind the side.
   subroutine change_cell(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -273,7 +273,7 @@ contains
     cell = sim%tag(i)%cell
     cell(axis) = cell(axis) + int(sense_of(side), int16)
     if (is_wall(code) .and. self%patch%last(axis) > 0) then
-      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%patch%cell_at(sim%position(i)), int16)   ! shear displaces the image
+      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%patch%cell_at(sim%position(i)), int16)  ! shear displaces the image
       cell(axis) = int(merge(self%patch%next(axis), self%patch%last(axis), sense_of(side) > 0), int16)
     end if
     inside = .true.
@@ -282,7 +282,7 @@ contains
     call move(self, sim%tag(i), i, cell)
   end subroutine change_cell
 
-  !> Chooses the cell of disk i again after a collision, if cells overlap.
+  !> After a collision of disk i, chooses its cell again if cells overlap.
   subroutine choose_cell(self, gravity, disk, tag, i)
     class(cell_grid_t), intent(inout) :: self
     real(real64), intent(in) :: gravity(2)         !! [length/time**2]
@@ -418,7 +418,7 @@ contains
     call self%lists%copy_list(near)
   end subroutine survey_list
 
-  !> Predicts the next events of two disks in unmarked cells. The tests of candidates begin when both disks have their candidates.
+  !> Predicts the next events of two disks in unmarked cells. The candidates of both disks are listed before the tests begin.
   subroutine predict_two(self, box, disk, tag, now, known, pair)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box

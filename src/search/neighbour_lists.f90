@@ -22,11 +22,11 @@ module neighbour_lists
   private
   public :: neighbour_lists_t
 
-  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! marks stored instead of the number of entries
+  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! marks stored instead of a number of entries
   !> Number of array elements that are copied from every list, even if the list is shorter, so that copying a short list needs no
   !> branch.
   integer(int32), parameter :: always_copied = 15
-  !> Factor by which the index of an image is multiplied in an entry. The factor exceeds the index of every disk in a list.
+  !> Factor by which the index of a periodic image is multiplied in an entry of a list. The factor exceeds the index of every disk.
   integer(int32), parameter :: image_unit = 2**27
   !> Largest number of disks for which neighbour lists are used, so that 32-bit integers can number all entries.
   integer(int32), parameter :: most_listed = image_unit/4
@@ -75,9 +75,9 @@ module neighbour_lists
 
 contains
 
-  !> Determines whether neighbour lists save time, and allocates the lists in that case. With neighbour lists, a prediction after a
-  !> collision tests fewer disks. The disadvantage of neighbour lists is their renewal, which is more frequent at lower densities.
-  !> The limit `least_candidates` and the margin were optimised for polydisperse disks.
+  !> Allocates the neighbour lists if they are expected to save time. With neighbour lists, a prediction after a collision tests
+  !> fewer disks. On the other hand, neighbour lists must be renewed, and more frequently so at lower densities. The limit
+  !> `least_candidates` and the width of the neighbourhoods were optimised for polydisperse disks.
   subroutine prepare(self, disk, tag, lower, edges, patch)
     class(neighbour_lists_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -126,7 +126,7 @@ contains
     end if
     if (.not. allocated(self%first)) then
       allocate (self%first(n + 1), self%neighbourhood(n))
-      allocate (self%extent(4, n), source=0.0_real32)           ! the values of disks without a list are also read
+      allocate (self%extent(4, n), source=0.0_real32)           ! the values of disks without a list are read, too
     end if
     self%first(1) = 0
     do i = 1, n

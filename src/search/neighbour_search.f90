@@ -1,5 +1,5 @@
 !> Defines types for predicted events, and the procedure `earliest_contact`, which predicts contacts of disks. All search methods
-!> use this procedure.
+!> use `earliest_contact`.
 module neighbour_search
   use images, only: image_t
   use kinds, only: int32, never, real64
@@ -40,13 +40,13 @@ contains
   !> Finds the earliest contact of a disk with the candidates, if this contact precedes the earliest event that is known so far.
   !>
   !> The contact time of two disks is a pure function of the states of the two disks, which are both advanced to the later of their
-  !> clocks. An exchange of the two disks changes at most the signs of the terms in the formula. The contact time is therefore
-  !> bit-identical for both disks and for any time of the prediction. The function `wins` defines the order of simultaneous
-  !> contacts. A contact time before `now` results from rounding errors. For example, the distance of two disks after a perfectly
-  !> inelastic collision equals the sum of their radii within rounding errors, and the shift of one disk by a period changes these
-  !> errors. If the contact time is before `now`, the procedure decides whether a contact occurs at the time `now` or not at all.
-  !> The shift of a disk by a period is an event, after which the contact is predicted again. Predictions for the two disks at later
-  !> times lead to the same decision.
+  !> clocks. An exchange of the two disks changes at most the signs of the terms in the formula of the contact time. The contact
+  !> time is therefore bit-identical for both disks and for any time of the prediction. The function `wins` defines the order of
+  !> simultaneous contacts. A contact time before `now` results from rounding errors. For example, the distance of two disks after a
+  !> perfectly inelastic collision equals the sum of their radii within rounding errors, and the shift of one disk by a period
+  !> changes these errors. If the contact time is before `now`, the procedure decides whether a contact occurs at the time `now` or
+  !> not at all. The shift of a disk by a period is an event, after which the contact is predicted again. Predictions at later times
+  !> decide in the same way whether the two disks collide.
   !>
   !> The root of |dx + dv s| = sigma is s = c/(sqrt(disc) - b). The expression for the root s loses no digits by cancellation if the
   !> disks are close to contact. The discriminant sigma**2 dv**2 - (dx x dv)**2 loses no digits by cancellation if two distant disks
@@ -55,9 +55,9 @@ contains
   !>
   !> A single test, which combines several conditions, excludes most candidates. A candidate is excluded if the root is not real, if
   !> the root is not earlier than the earliest contact found so far, or if the root is not earlier than the next event of the
-  !> candidate. When the candidate executes its next event, its events are predicted again, and the new prediction tests the pair.
-  !> If the root is earlier than a time t, then c < -2 b (t - late), where `late` is the later clock of the two disks. The condition
-  !> for c is tested with a margin that is larger than all rounding errors.
+  !> candidate. A contact after the next event of the candidate need not be predicted, because the pair is tested again when the
+  !> candidate executes its next event. If the root is earlier than a time t, then c < -2 b (t - late), where `late` is the later
+  !> clock of the two disks. The inequality for c is tested with a margin that is larger than all rounding errors.
   pure subroutine earliest_contact(disk, tag, near, now, gravity, known, image)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, with indices that start at 0
     type(tag_t), intent(in) :: tag(*)
@@ -80,7 +80,7 @@ contains
     do k = 1, n
       j = near%list(k)
       call read_state(disk(j), xj, yj, uj, vj, clock_j, rj)
-      if (.not. fresh) then                   ! skipped if si = 0: the state would not change
+      if (.not. fresh) then                   ! the state would not change if si = 0
         late = merge(clock, clock_j, clock > clock_j)
         from = 2*late - margin
         si = late - clock

@@ -3,9 +3,9 @@
 !>
 !> The width of the cells is chosen for the small disks. A big disk is listed in each cell in which a small disk could touch the big
 !> disk. The entries of a big disk are valid while the disk stays within a margin around its reference position, which is the
-!> position for which the entries were made. A prediction for a small disk finds big disks in the list of the cell of the small
-!> disk. A prediction for a big disk tests the small disks in the cells along the boundary of the big disk. The cost of a prediction
-!> for a disk depends only on the sizes of nearby disks.
+!> position for which the entries were made. The list of a cell contains the big disks that a small disk in the cell may touch. A
+!> prediction for a big disk tests the small disks in the cells along the boundary of the big disk. The cost of a prediction for a
+!> disk depends only on the sizes of nearby disks.
 module object_lists
   use kinds, only: int16, int32, real64
   use cell_faces, only: cell_faces_t, patch_t
