@@ -4,10 +4,10 @@
 
 The command `make docs` runs this script.  The folder build/docs-sources receives a copy of all
 pages, in which links between pages of different folders are changed to links within the site; the
-site build/docs is made from this copy by Sphinx.  Each README.md of docs/ is the index page of its
-folder, and the pages to which it links, in this order, are the pages of the folder.  The same holds
-for a page with a folder of the same name.  A warning of Sphinx ends the script with exit code 1, as
-does a link within the site that leads nowhere.
+site build/docs is made from this copy by Sphinx.  In each folder of docs/, the file README.md is
+the index page, and the site lists the pages of the folder in the order of the links in README.md.
+A page NAME.md beside a folder NAME is the index page of that folder.  The script ends with exit
+code 1 if Sphinx prints a warning, or if a link within the site leads nowhere.
 """
 
 import argparse
@@ -29,11 +29,11 @@ from urllib.parse import unquote, urlsplit
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
-#: Folder of the site with the pages of the Fortran source, which FORD writes.
+#: Folder of the site with the pages about the Fortran source, which the program FORD writes.
 FORTRAN = "fortran"
-#: Pages that Sphinx makes without a source.
+#: Pages that Sphinx generates and that have no source file.
 OWN = ("genindex.html", "search.html", "py-modindex.html")
-#: Pages outside of docs/, with their names in the folder `project` of the site.
+#: Pages whose sources are outside docs/, with their names in the folder `project` of the site.
 OUTSIDE = {
     "README.md": "readme",
     "CHANGELOG.md": "changelog",
@@ -68,7 +68,7 @@ API_HEAD = """\
 
 
 def sources() -> dict[str, str]:
-    """Return the path in the site of each page, without ending, by its path in the project."""
+    """Return a dictionary from the path of each page in the project to its path in the site."""
     pages = {}
     for path in sorted([*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")]):
         name = path.relative_to(DOCS).with_suffix("").as_posix()
@@ -83,13 +83,13 @@ class Stage:
     """The folder with the sources of the site."""
 
     def __init__(self, folder: Path) -> None:
-        """Use a folder, whose earlier content is kept until `tidy` is called."""
+        """Store the folder for the sources; its earlier files remain until `tidy` is called."""
         self.folder = folder
         self.pages = sources()
         self.written: set[Path] = set()
 
     def write(self, name: str, content: str | bytes) -> None:
-        """Write a file, unless the same content is already there: then Sphinx keeps its page."""
+        """Write a file unless its content is unchanged; Sphinx then rebuilds only changed pages."""
         path = self.folder / name
         data = content.encode() if isinstance(content, str) else content
         if not path.exists() or path.read_bytes() != data:
@@ -98,13 +98,13 @@ class Stage:
         self.written.add(path)
 
     def tidy(self) -> None:
-        """Remove files of earlier calls."""
+        """Remove the files that earlier calls of the script wrote and this call did not write."""
         for path in self.folder.rglob("*"):
             if path.is_file() and path not in self.written:
                 path.unlink()
 
     def target(self, page: str, link: str) -> str:
-        """Return a link of a page as it is in the site; other files are copied into the site."""
+        """Convert a link of a page to a link within the site, and copy linked files."""
         name, mark, section = link.partition("#")
         if not name or link.startswith(ELSEWHERE):
             return link
@@ -122,9 +122,9 @@ class Stage:
         return posixpath.relpath(new, posixpath.dirname(self.pages[page])) + mark + section
 
     def relinked(self, page: str, text: str) -> str:
-        """Return the text of a page with the links of the site.
+        """Convert all links in the text of a page to links within the site.
 
-        A link to a folder without a page is replaced by its text.
+        A link to a folder that contains no page is replaced by the text of the link.
         """
         here = (ROOT / page).parent
 
@@ -137,10 +137,11 @@ class Stage:
         return LINK.sub(lambda found: self.target(page, found[0]), text)
 
     def contents(self, page: str, text: str) -> str:
-        """Return a hidden table of contents: the links of an index page to pages of its folder.
+        """Return a hidden table of contents, which lists the pages of the folder of an index page.
 
-        A README belongs to its own folder, and any other page to the folder of its name.  If a
-        page has a section "All pages", only the links of this section count.
+        An index page README.md lists pages of its own folder, and any other index page NAME.md
+        lists pages of the folder NAME.  If an index page has a section "All pages", only the links
+        in this section are listed.
         """
         here = posixpath.dirname(page)
         folder = here if page.endswith("README.md") else page.removesuffix(".md")
@@ -174,7 +175,8 @@ class Stage:
                 continue
             if page == "LICENSE":
                 text = f"# Licence\n\n{text}"
-            # Diagrams in the language Mermaid need a script from another machine: they stay text.
+            # Mermaid diagrams remain text, because a browser could draw them only with a script
+            # from another server.
             text = self.relinked(page, text).replace("```mermaid", "```text")
             text = with_cards(text)
             own = page.startswith("docs/") and page.endswith("/README.md")
@@ -183,7 +185,7 @@ class Stage:
             self.write(f"{name}.md", text)
 
     def write_project_index(self) -> None:
-        """Write the index of the pages from outside of docs/."""
+        """Write an index of the pages whose sources are outside the folder docs/."""
         own = [name for name in self.pages.values() if name.startswith("project/")]
         lines = "\n".join(f"/{name}" for name in own)
         self.write(
@@ -228,7 +230,7 @@ class Stage:
         )
 
     def write_index(self, folder: str, text: str, names: list[str]) -> None:
-        """Write the first page of a folder of the reference, with links to its pages."""
+        """Write the index page of a folder of the reference, with links to the other pages."""
         contents = "\n".join(names)
         self.write(
             f"reference/{folder}/index.md",
@@ -236,7 +238,7 @@ class Stage:
         )
 
     def write_script_pages(self) -> None:
-        """Write a page for each script in post/ from its parser."""
+        """Write a page for each script in post/, with the texts of its command-line parser."""
         drawn = self.figures_of_scripts()
         names = []
         for path in sorted((ROOT / "post").glob("*.py")):
@@ -259,7 +261,7 @@ class Stage:
         )
 
     def figures_of_scripts(self) -> dict[str, list[str]]:
-        """Return the figures on the pages that the scripts in runs/ draw with each script."""
+        """Return, for each script in post/, the figures on the pages that the script has drawn."""
         shown = {path.name: path.relative_to(ROOT).as_posix() for path in DOCS.rglob("*.png")}
         found: dict[str, list[str]] = {}
         for path in sorted((ROOT / "runs").glob("*.sh")):
@@ -273,7 +275,7 @@ class Stage:
 
 
 def with_cards(text: str) -> str:
-    """Return a page whose lists after the comment `<!-- cards -->` are grids of cards."""
+    """Convert the lists of a page that follow the comment `<!-- cards -->` to grids of cards."""
 
     def grid(found: re.Match) -> str:
         cards = [
@@ -292,7 +294,7 @@ class ParserFoundError(Exception):
 
 
 def parser_of(path: Path) -> argparse.ArgumentParser | None:
-    """Return the parser of a script, or None; the script is not executed beyond its parsing."""
+    """Return the parser of a script, which runs only until it parses its command line, or None."""
     source = importlib.util.spec_from_file_location(f"script_{path.stem}", path)
     module = importlib.util.module_from_spec(source)
     source.loader.exec_module(module)
@@ -314,7 +316,7 @@ def parser_of(path: Path) -> argparse.ArgumentParser | None:
 
 
 def escaped(text: str) -> str:
-    """Return a text without characters that have a meaning in Markdown, except in code."""
+    """Escape the characters of a text that have a special meaning in Markdown, except in code."""
     parts = re.split(r"(`[^`]*`)", text)
     return "".join(
         part if part.startswith("`") else re.sub(r"([*_<>|$\\\[\]])", r"\\\1", part)
@@ -345,7 +347,7 @@ def options_of(parser: argparse.ArgumentParser) -> Iterator[str]:
 
 
 class Page(HTMLParser):
-    """The links and the anchors of a page of the site."""
+    """Parser that collects the links and the anchors of an HTML page of the site."""
 
     def __init__(self, path: Path) -> None:
         """Read a page."""
@@ -364,7 +366,7 @@ class Page(HTMLParser):
 
 
 def broken(site: Path) -> list[str]:
-    """Return all links of the site, except those of the pages of FORD, that lead nowhere.
+    """Return the broken links of the site; links on the pages that FORD writes are not checked.
 
     Scripts, styles and pictures from other machines also count as broken, because the site works
     without a network.
@@ -391,7 +393,7 @@ def broken(site: Path) -> list[str]:
 
 
 def main(build: Path) -> int:
-    """Build the site; return 0 if there was no warning and no broken link."""
+    """Build the site, and return 0 if Sphinx printed no warning and no link is broken."""
     site, stage = build / "docs", Stage(build / "docs-sources")
     stage.copy_pages()
     stage.write_project_index()

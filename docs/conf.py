@@ -65,7 +65,7 @@ def without_aliases(app: Any, kind: str, name: str, *rest: Any) -> None:
 
 
 def setup(app: Any) -> dict[str, bool]:
-    """Register the renderer of formulas."""
+    """Register the function that writes formulas, which Sphinx calls."""
     app.connect("autodoc-process-docstring", without_aliases)
     app.add_html_math_renderer(
         "mathml",

@@ -2,10 +2,11 @@
 
     python docs/guide_figures.py [NAME...]
 
-The script executes the blocks of code of the guides with the given names, or of all guides, as
-tests/runs/test_pages.py does, but without the replacements that make runs short.  A guide that
-shows the picture `NAME.png` makes the figure `runs/NAME.png`; the script stores it beside the
-page, with fewer pixels and colours.  The runs are kept if the variable GUIDE_RUNS names a folder.
+The script executes the code blocks of the guides that the arguments name, or of all guides.  The
+test tests/runs/test_pages.py executes the same code blocks, but shortens the runs.  If a guide
+shows the picture NAME.png, its code blocks write the figure runs/NAME.png, and the script copies
+this figure to the folder of the guide, with fewer pixels and colours.  If the environment variable
+GUIDE_RUNS names a folder, the output files of the runs are kept in this folder.
 """
 
 import os
@@ -25,12 +26,12 @@ MOST, NARROW = 120_000, 700  # [bytes] and [pixels]: pictures of many disks beco
 
 
 def pictures_of(page: str) -> list[str]:
-    """Return the names of the pictures of a guide that stand in its own folder."""
+    """Return the names of the pictures in a guide that are stored in the folder of the guide."""
     return re.findall(r"!\[[^]]*\]\((\w+)\.png\)", page)
 
 
 def main() -> None:
-    """Make the figures of all guides, or of those that are named."""
+    """Make the figures of all guides, or of the guides that the command line names."""
     program = ROOT / "build" / "ricochet"
     for name in sys.argv[1:] or [path.stem for path in sorted(GUIDES.glob("*.md"))]:
         page = (GUIDES / f"{name}.md").read_text()

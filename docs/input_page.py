@@ -2,9 +2,9 @@
 
 python docs/input_page.py build/ricochet
 
-The script writes the page docs/reference/input.md, which lists the groups and their variables, and
-for each group a page in docs/reference/input/ with its variables, an example and a picture.  The
-example of a group is a part of an input file in input/.
+The page docs/reference/input.md lists the groups of input variables.  For each group, the script
+also writes a page in docs/reference/input/, which describes the variables and contains an example
+and a picture.  The example of a group is a part of an input file in input/.
 """
 
 import json
@@ -91,7 +91,7 @@ def said(program: Path, *words: str) -> str:
 
 
 def variables(program: Path) -> dict[str, dict[str, dict]]:
-    """Return the input variables of each group of `GROUPS`.
+    """Return the input variables that belong to each group in `GROUPS`.
 
     Variables that are common to all kinds of boundaries form a separate group.  Numbers in the
     table of variables are stored as texts in the format of the program.
@@ -106,7 +106,7 @@ def variables(program: Path) -> dict[str, dict[str, dict]]:
 
 
 def written(entry: dict) -> str:
-    """Return the default value of a variable, or an example, in the format of an input file."""
+    """Convert the default or an example value of a variable to the format of an input file."""
     value = entry["example"] if entry["default"] is None else entry["default"]
     words = value if isinstance(value, list) else [value]
     words = [str(word).lower() if isinstance(word, bool) else word for word in words]
@@ -122,7 +122,7 @@ def shared(walls: list[dict[str, dict]], name: str) -> bool:
 
 
 def condition(group: str, entry: dict) -> str:
-    """Return the setting that makes a variable apply, or an empty text if none is needed."""
+    """Return the setting that a variable requires, or an empty text if it requires none."""
     if not entry["goes_with"]:
         return ""
     [(choice, words)] = entry["goes_with"].items()
@@ -133,7 +133,7 @@ def condition(group: str, entry: dict) -> str:
 
 
 def facts(group: str, entry: dict) -> list[str]:
-    """Return the properties of a variable, such as its allowed values, for its section."""
+    """Return the properties of a variable, such as its allowed values, as text for the page."""
     allowed = [f"Allowed: {entry['allowed']}" + f" [{entry['unit']}]" * bool(entry["unit"])]
     if entry["default"] is not None:
         default = f"Default: `{written(entry)}`"
@@ -168,12 +168,12 @@ def plain(text: str) -> str:
 
 
 def file_of(group: str) -> str:
-    """Return the name of the page of a group, without ending."""
+    """Return the file name, without extension, of the page about a group of input variables."""
     return "boundaries" if group == LAW else group
 
 
 def title_of(group: str) -> str:
-    """Return the heading of the page of a group."""
+    """Return the heading of the page about a group of input variables."""
     return group if group == LAW else f"&{group}"
 
 
@@ -191,13 +191,13 @@ def example_of(group: str) -> list[str]:
 
 
 def linked(name: str, group: str) -> str:
-    """Return a variable as a link to its section."""
+    """Return a link to the section of the page that describes a variable."""
     title = name if group == LAW else f"{group}.{name}"
     return f"[`{name}`](#{re.sub(r'[^a-z0-9_ -]', '', title)})"
 
 
 def group_page(group: str, entries: dict[str, dict]) -> str:
-    """Return the text of the page of a group."""
+    """Return the text of the page about a group of input variables."""
     lines = [f"# {title_of(group)}", "", GROUPS[group], "", *example_of(group)]
     lines += ["## Variables", "", "| variable | default |", "|---|---|"]
     for name, entry in entries.items():
@@ -208,7 +208,7 @@ def group_page(group: str, entries: dict[str, dict]) -> str:
 
 
 def pages(program: Path) -> dict[str, str]:
-    """Return the text of each page by its path."""
+    """Return a dictionary from the path of each page to its text."""
     groups = variables(program)
     found = {
         f"{FOLDER}/{file_of(group)}.md": group_page(group, entries)

@@ -67,7 +67,7 @@ def section(paragraph: str) -> list[str]:
 
 
 def installed(link: re.Match) -> str:
-    """Return the path of the installed page to which a link leads."""
+    """Convert a link to a page of the documentation to the path at which the page is installed."""
     return f"PREFIX/share/doc/ricochet/{posixpath.normpath(f'docs/reference/input/{link[1]}')}"
 
 

@@ -1,10 +1,11 @@
-"""Copy figures of runs/ into the pages, as small pictures.
+"""Copy figures from runs/figures/ to the documentation pages, with fewer pixels and colours.
 
     make figures                         or the scripts in runs/ that draw some of the figures
     python docs/page_figures.py [NAME...]
 
-The script copies the figures with the given names, or all that exist, from runs/figures/ into the
-folders of the pages that show them.  The number of pixels and of colours is reduced.
+The script copies the figures that the arguments name, or all existing figures, from runs/figures/
+to the folders of the pages that show the figures.  The script reduces the numbers of pixels and
+colours of each figure.
 """
 
 import io

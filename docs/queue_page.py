@@ -83,7 +83,8 @@ def table(now: float, queue: list[Expected]) -> str:
 def draw(axes: plt.Axes, now: float, queue: list[Expected]) -> None:
     """Draw the disks, their velocities, and the next event.
 
-    A line shows the motion to the next event, and outlines show the positions at the event.
+    For each disk that takes part in the next event, a line shows its motion to the event, and an
+    outline shows its position at the event.
     """
     first, disks = queue[0], {event.disk: event for event in queue}
     axes.add_patch(Rectangle((0, 0), BOX, BOX, fill=False, clip_on=False, **WALL))

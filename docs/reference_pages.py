@@ -1,4 +1,4 @@
-"""Write the reference pages that are not about input variables.
+"""Write the reference pages about the C interface, the input files and the command line.
 
 python docs/reference_pages.py build/ricochet
 
@@ -68,7 +68,7 @@ def c_page() -> str:
 
 
 def parts_of(comment: str) -> tuple[str, list[tuple[str, str]], str]:
-    """Return the description, the arguments and the end of a comment of the header."""
+    """Split a comment of the header into the description, the arguments and the return value."""
     words: list[str] = []
     values: list[tuple[str, str]] = []
     returns: list[str] = []
@@ -113,7 +113,7 @@ def inputs_page() -> str:
 
 
 def command_page(program: Path) -> str:
-    """Return the text of the page on the command line with the help text of the program."""
+    """Return the page about the command line, with the present help text of the program."""
     page = (ROOT / "docs/reference/command-line.md").read_text(encoding="utf-8")
     said = subprocess.run([program, "--help"], check=True, capture_output=True, text=True).stdout
     before, start, rest = page.partition("<!-- help -->\n")
@@ -122,7 +122,7 @@ def command_page(program: Path) -> str:
 
 
 def pages(program: Path) -> dict[str, str]:
-    """Return the text of each page by its path."""
+    """Return a dictionary from the path of each page to its text."""
     return {
         "docs/reference/c.md": c_page(),
         "docs/reference/inputs.md": inputs_page(),

@@ -1,9 +1,10 @@
-"""Take the screenshots of the laboratory that the pages show.
+"""Take the screenshots of the laboratory (the interactive web page) for the tutorials.
 
     python docs/screenshots.py
 
 The script starts the laboratory, opens it in headless Chromium, and writes pictures to
-docs/tutorials.  It needs the program, the library, chromium and chromedriver.
+docs/tutorials.  The script needs the program and its library (`make all library`), Chromium and
+chromedriver.
 """
 
 import base64
@@ -19,7 +20,7 @@ sys.path[:0] = [str(DOCS), str(DOCS.parent / "tests"), str(DOCS.parent / "post")
 from browser import browsing  # noqa: E402
 from page_figures import reduced  # noqa: E402
 
-#: Input of each picture, and the seconds for which the disks move.
+#: Input of each screenshot, and the duration of the simulation before the screenshot [s].
 PICTURES = {"laboratory": ("mixture", 8), "laboratory_crater": ("crater", 20)}
 
 

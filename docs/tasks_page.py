@@ -3,8 +3,9 @@
     make figures                     or runs/mixture.sh, cooling.sh, crater.sh, gravity.sh alone
     python docs/tasks_page.py        reads runs/figures into docs/tasks.json, and writes the pages
 
-The file docs/tasks.json contains each number of the pages together with its error.  In a page, HTML
-comments enclose each text that this script replaces, and contain the name of the text.
+The file docs/tasks.json contains each measured number on the pages, with the error of the number.
+On a page, two HTML comments enclose each text that the script replaces; the first comment is the
+name of the text.
 """
 
 import csv
@@ -89,7 +90,7 @@ def mixture() -> Numbers:
 
 
 def cooling() -> Numbers:
-    """Return the ratios of the temperatures of both species at the end of cooling."""
+    """Return the ratio of the temperatures of the two species after cooling, by restitution."""
     end = table("cooling_velocity")[-1]
     return {
         f"ratio_{xi}": value(end, f"ratio_xi{xi}", f"ratio_error_xi{xi}")
@@ -127,7 +128,7 @@ def gravity() -> Numbers:
 
 
 def words(number: tuple[float, float | None]) -> str:
-    """Return a number as text in the format of the page."""
+    """Return a number and its error as text, rounded as on the pages."""
     mean, error = number
     if error is None:
         return f"{mean:.1g}" if mean < 1e-6 else f"{mean:.4g}"
@@ -135,7 +136,7 @@ def words(number: tuple[float, float | None]) -> str:
 
 
 def filled(page: str, numbers: Numbers) -> str:
-    """Return the page after replacing all texts that contain results."""
+    """Replace all texts of a page that contain results, and return the new page."""
     for name, template in TEXTS.items():
         start, end = f"<!-- {name} -->\n", "<!-- end -->"
         if start not in page:
