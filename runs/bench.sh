@@ -8,7 +8,8 @@
 # A rate is the number of collisions, in millions, per second of processor time. A rate is measured in runs on one core that also
 # sample observables, and the printed rate is the median of RUNS=5 runs. Before the measurement, the system is simulated until it
 # has lost all correlations to its initial state. No other program should run at the same time. The environment variable RICOCHET
-# names the measured program (default build/ricochet). The option --check requires a program without AVX-512 code.
+# names the measured program (default build/ricochet). The option --check requires a program that was compiled without AVX-512 code,
+# because valgrind cannot execute such code.
 set -euo pipefail
 export LC_ALL=C # awk then reads and writes 0.5 with a point in every language
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
@@ -30,9 +31,10 @@ input() {
   for species; do echo "&species $species, $start /"; done >"$file"
 }
 
-# state NAME SPECIES...: simulates these species for 20 collisions per disk, and writes the input file $work/NAME.nml, which starts
-# from the last frame of this simulation. The initial positions are random or, if the packing fraction is too high for random
-# insertion, on a lattice. A lattice of 1e5 disks or more does not melt during a simulation of 20 collisions per disk.
+# state NAME SPECIES...: simulates disks of the species SPECIES for 20 collisions per disk, and writes the input file
+# $work/NAME.nml, which starts from the last frame of this simulation. The initial positions are random or, if the packing fraction
+# is too high for random insertion, on a lattice. A lattice of 1e5 disks or more does not melt during a simulation of 20 collisions
+# per disk.
 state() {
   local name=$1 placement=random
   shift
@@ -205,7 +207,7 @@ threads() {
   faster 'gravity, 100000 disks, packing 0.5' 1.6 gas_100000_0.5 6000000 --set box.gravity=0,-1
 }
 
-# ensemble JOBS: performs four runs that take several seconds each; JOBS runs are performed at the same time.
+# ensemble JOBS: performs four runs of several seconds each, of which JOBS runs are performed at the same time.
 ensemble() {
   RICOCHET=$program runs/ensemble.sh "$work/gas_10000_0.5.nml" -d "$work/ensemble$1" --seeds 1-4 -j "$1" \
     --set stop.collisions=20000000
@@ -238,8 +240,8 @@ counted() {
   awk '/Collected/ { print $4 }' "$work/count"
 }
 
-# obstacles NAME: writes the input file $work/NAME.nml with one disk among 1225 circular obstacles. The obstacles are randomly
-# placed with a density of one per unit of area, form the regular pattern of a pegboard, or form a Lorentz gas.
+# obstacles NAME: writes the input file $work/NAME.nml with one disk among 1225 circular obstacles. Depending on NAME, the obstacles
+# are randomly placed with a density of one per unit of area, form the regular pattern of a pegboard, or form a Lorentz gas.
 obstacles() {
   local file=$work/$1.nml kind=${1%_*} number=${1#*_}
   case $kind in

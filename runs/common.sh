@@ -17,8 +17,8 @@ command -v "$python" >/dev/null || {
 }
 mkdir -p -- "$data" "$figures"
 
-# replace FILE: writes standard input to FILE. If FILE is a symbolic link, the link is replaced, and the file to which it refers is
-# not changed.
+# replace FILE: writes standard input to FILE. If FILE is a symbolic link, the link is replaced by a file, and the target of the
+# link is not changed.
 replace() {
   rm -f -- "$1" && (set -C && cat >"$1")
 }

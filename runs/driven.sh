@@ -13,7 +13,8 @@ done
   -o "$figures/couette.png" --csv "$figures/couette.csv"
 "$python" post/rough.py "$data"/rough/*.h5 -o "$figures/rough.png" --csv "$figures/rough.csv"
 
-# Runs for viscosity, conductivity and diffusion: at each packing fraction, the interval between frames is several mean free times.
+# In the runs for viscosity, conductivity and diffusion, the interval between frames is several mean free times at each packing
+# fraction.
 transport=()
 while read -r packing interval samples placement; do
   runs/ensemble.sh input/bulk.nml -d "$data/transport_$packing" --seeds 1-4 \
@@ -32,8 +33,8 @@ TABLE
 "$python" post/transport.py "${transport[@]}" -o "$figures/transport.png" \
   --csv "$figures/transport.csv"
 
-# The arguments are the system, the quantity to show, the member run from which the film is made, and the options that define the
-# member runs.
+# The arguments of the function are the system, the quantity that the figure shows, the name of the run for the film, and the
+# options of ensemble.sh that define the runs.
 while read -r system show film scan; do
   runs/ensemble.sh "input/$system.nml" -d "$data/$system" --seeds 1-4 ${scan:+--scan "$scan"} "$@"
   "$python" post/driven.py "$data/$system"/*.h5 --show "$show" -o "$figures/$system.png" \

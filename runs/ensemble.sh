@@ -92,8 +92,8 @@ scan_seeds() {
 }
 
 # Adds a member run for every combination of the values of the scanned variables and the seeds. The first scanned variable varies
-# slowest. The name of a member run contains its values, without blanks and slashes. For example, the name is ball.mass_5 for
-# species.ball.mass=5, and gravity_2_-5 for box.gravity(2)=-5.
+# slowest. The name of a member run contains the values of the scanned variables, without blanks and slashes. For example, the name
+# is ball.mass_5 for species.ball.mass=5, and gravity_2_-5 for box.gravity(2)=-5.
 generate_members() {
   local scan variable list values separator value k short old_names old_overrides known=' '
   names=("") overrides=("")
@@ -119,7 +119,7 @@ generate_members() {
   done
 }
 
-# Reads the names and overrides of the member runs from standard input, in the format of the manifest.
+# Reads the names and the overrides (options --set) of the member runs from standard input, in the format of a manifest.
 read_manifest() {
   local line rest
   while IFS= read -r line || [[ -n $line ]]; do
@@ -197,9 +197,9 @@ run_member() {
     [[ -n $resume && $(last_words "${names[$1]}") == *": its run broke off "* ]] || break
     resume= # the member starts from the beginning
   done
-  # While the script is being stopped, a negative exit status or an exit status of at least 127 means that the member run was
-  # stopped, too: either while the member run started, or while bash waited for the member run a second time. An exit status of -1
-  # means that bash has lost the exit status of the member run.
+  # While the script is being stopped, a member run with a negative exit status, or with an exit status of at least 127, is regarded
+  # as stopped, too. Such a member run was stopped either during its start, or while bash waited for the member run a second time.
+  # An exit status of -1 means that bash has lost the exit status of the member run.
   if [[ -n $stopping ]] && ((status >= 127 || status < 0)); then status=75; fi
   if ((status == 3)) && [[ -e $base.h5 && $(last_words "${names[$1]}") == *"$is_finished"* ]]; then
     touch -- "$base.h5" && status=0
@@ -353,9 +353,9 @@ summarise() {
 
 # --- engines (GNU parallel, Slurm): they start this script several times, each time for a share of the member runs ---
 
-# Sets two variables. `shares` is the number M of shares into which the member runs are divided; M does not exceed the argument of
-# this function. `share_command` is the command to which the text K/M is appended in order to perform share K. Finished and failed
-# member runs do not belong to any share.
+# Sets two variables. `shares` is the number M of shares into which the member runs are divided; the argument of the function is the
+# largest allowed value of M. `share_command` is the command that performs share K of M if the text K/M is appended to the command.
+# Finished and failed member runs do not belong to any share.
 prepare_shares() {
   local most=$1 k here left=0
   here=$(cd -- "$folder" && pwd)

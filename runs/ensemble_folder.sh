@@ -1,8 +1,9 @@
 # shellcheck shell=bash
 # shellcheck disable=SC2154,SC2034 # ensemble.sh assigns `folder` and other variables, and reads variables that this file assigns
-# Functions of ensemble.sh for the files of a sweep. They determine from the files in `folder` which member runs are finished, have
-# failed or can continue, and they store the settings of the member runs. They do not write through links, into FIFOs, or into files
-# that ensemble.sh did not create. Errors are reported by the functions `fail` and `die` of ensemble.sh.
+# Functions of ensemble.sh for the files of a sweep. The functions of ensemble_folder.sh determine from the files in `folder` which
+# member runs are finished, have failed or can continue, and store the settings of the member runs. The functions never write
+# through links, into FIFOs, or into files that ensemble.sh did not create. Errors are reported by the functions `fail` and `die` of
+# ensemble.sh.
 
 # may_be_ours FILE: returns success if FILE does not exist or is an ordinary file.
 may_be_ours() { [[ ! -L $1 && (! -e $1 || -f $1) ]]; }
@@ -23,8 +24,8 @@ put() {
   fi
 }
 
-# Sets `last_line` to the last line of the log of member NAME. The function starts no process, because there can be 100 000 member
-# runs.
+# Sets `last_line` to the last line of the log of member NAME. The function starts no other process, because a process for each of
+# up to 100 000 member runs would take too much time.
 read_last_line() {
   local lines=()
   last_line=''
@@ -47,11 +48,10 @@ goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line
 # has failed, its log file states the reason.
 has_data() { [[ -e $folder/$1.h5 || -e $folder/$1.h5.part && $(last_words "$1") =~ $goes_on ]]; }
 
-# A finished output file is not the result of the present settings if it is older than the input file, or if a run is extending the
-# output file.
+# An output file is not regarded as finished if it is older than the input file, or if a run is extending the output file.
 is_done() { [[ -e $folder/$1.h5 && ! -e $folder/$1.h5.part && ! $folder/input.nml -nt $folder/$1.h5 ]]; }
 
-# may_continue NAME OVERRIDES: returns success if the program can continue the member run NAME with these settings.
+# may_continue NAME OVERRIDES: returns success if the program can continue the member run NAME with the settings OVERRIDES.
 may_continue() {
   local arguments=("$input" -o "$folder/$1.h5" --resume --check --quiet) said
   add_overrides "$2"
@@ -83,8 +83,8 @@ forget_failure() {
   exec {lock}>&-
 }
 
-# Checks that the member runs of earlier commands in this folder have the same settings. This check is necessary because results are
-# identified only by the names of the member runs.
+# Checks that the settings of the member runs agree with the settings of member runs of the same names that earlier commands
+# performed in this folder. The settings are compared because each result is identified only by the name of its member run.
 remember() {
   local line name k door='' changed='' mended='' extended=() found=()
   local -A before=() linked=()
@@ -134,8 +134,8 @@ remember() {
   for name in "${found[@]}"; do
     [[ ! -e $folder/$name.h5 || -e $folder/$name.h5.part ]] || touch -- "$folder/$name.h5"
   done
-  # While a .part file exists, the program is extending the output file and identifies the output file by its modification time;
-  # this time is then not changed.
+  # While a .part file exists, the modification time of the output file is not changed, because the program that is extending the
+  # output file identifies the file by this time.
   for name in "${extended[@]}"; do
     [[ ! -e $folder/$name.h5 || -e $folder/$name.h5.part ]] || touch -d @1 -- "$folder/$name.h5"
   done

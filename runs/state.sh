@@ -2,7 +2,7 @@
 # Properties of hard disks in a periodic box: equation of state, time correlations, order, and Haff's law; four seeds each.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# Runs for the pressure: the initial positions depend on the packing fraction. The initial positions are random for packing
+# In the runs for the pressure, the initial positions depend on the packing fraction. Initial positions are random for packing
 # fractions up to 0.5, result from Lubachevsky-Stillinger compression between 0.5 and 0.7, and form a crystal in a commensurate box
 # for 0.72 and above.
 runs/ensemble.sh input/bulk.nml -d "$data/fluid" --seeds 1-4 \
@@ -16,8 +16,8 @@ runs/ensemble.sh input/bulk.nml -d "$data/crystal" --seeds 1-4 \
 "$python" post/equation_of_state.py "$data"/{fluid,dense,crystal}/*.h5 \
   -o "$figures/equation_of_state.png" --csv "$figures/equation_of_state.csv"
 
-# Runs for time correlations: at each packing fraction, the interval between frames is about a tenth of the mean free time. All
-# disks start with the same speed.
+# In the runs for time correlations, the interval between frames is about a tenth of the mean free time at each packing fraction.
+# All disks start with the same speed.
 memory=()
 while read -r packing interval placement; do
   runs/ensemble.sh input/bulk.nml -d "$data/memory_$packing" --seeds 1-4 \
@@ -36,7 +36,8 @@ TABLE
   --csv "$figures/correlations.csv"
 "$python" post/rates.py "$data"/memory_0.3/*.h5 -o "$figures/rates.png" --csv "$figures/rates.csv"
 
-# Runs for the cooling of a dilute gas: the theory is valid until flows and clusters develop (shear and clustering instability).
+# In the runs for the cooling of a dilute gas, the theory applies until flows and clusters develop (shear and clustering
+# instability).
 runs/ensemble.sh input/bulk.nml -d "$data/cooling" --seeds 1-8 \
   --set species.disks.packing_fraction=0.02 --set stop.collisions_per_disk=60 \
   --set output.observables_every_collisions=100 --scan contact.restitution=0.95,0.9,0.8 "$@"
