@@ -60,9 +60,10 @@ def film_path(wish: Path | None, run: Run) -> Path:
 def animate(
     run: Run, frames: list[int], colour: str | None = None, fps: float = 25
 ) -> animation.FuncAnimation:
-    """Write a film of the given frames that shows `fps` frames per second.
+    """Write a film that shows the given frames, `fps` of them per second.
 
-    `colour` is "species" or a key of `COLOURINGS`.
+    The argument `colour` is "species" or the name of another quantity in `COLOURINGS`, which the
+    colours of the disks show.
     """
     colour = chosen_colour(run, colour)
     aspect = aspect_of(run)

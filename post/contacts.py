@@ -3,13 +3,16 @@
     python post/contacts.py runs/hopper.h5 --from 3.5 --until 4 -o contacts.png --csv contacts.csv
 
 The run needs an event log (output.event_log = .true.).  Each line connects two disks that collided
-in the window, at their places in the frame that is nearest to the middle of the window.  The width
-of a line is proportional to the mean force: the sum of the impulses divided by the length of the
-window.  Short lines lead to sides and obstacles.  Contacts with an impulse above --above times the
-mean impulse of two disks are strong; red lines show strong contacts that belong to a chain of at
-least --at-least disks.  The second panel is the distribution of the force, in units of its mean.
-The default window is the last tenth of the run.  The option --contacts FILE writes one line for
-each contact: the ids, the number of collisions, the impulse, the force, the change of momentum.
+in the window of time; the disks are drawn at their positions in the frame that is nearest to the
+middle of the window.  The width of a line is proportional to the mean force between the two disks,
+which is the sum of the impulses divided by the length of the window.  A line from the centre of a
+disk to its edge shows the contact of the disk with a side or an obstacle.  A contact of two disks
+is strong if its impulse is larger than the mean impulse times the value of --above.  Disks that are
+connected by strong contacts form a force chain; red lines show the chains of at least --at-least
+disks.  The second panel shows the distribution of the forces between two disks, in units of the
+mean force.  By default, the window of time is the last tenth of the run.  The option --contacts
+FILE writes a table with a row for each contact, which contains the ids of the disks, the number of
+collisions, the impulse, the force, and the change of momentum.
 """
 
 import csv
@@ -29,9 +32,10 @@ COLUMNS = ("i", "j", "contacts", "impulse", "force")
 
 
 def lines_of(run: Run, frame: int, found: contacts.ContactNetwork) -> np.ndarray:
-    """Return the line (E, 2, 2) of each contact, from disk i to the nearest image of j.
+    """Return a line (E, 2, 2) for each contact, from disk i to the nearest image of disk j.
 
-    The line of a contact with a boundary leads from the centre of the disk to its edge.
+    For a contact with a boundary, the line leads from the centre of the disk to the edge of the
+    disk.
     """
     place, start = run.position[frame], found.i - 1
     to_boundary = -found.momentum / np.maximum(np.hypot(*found.momentum.T), 1e-300)[:, None]

@@ -35,7 +35,7 @@ DASHES = ("--", ":", "-.", (0, (5, 1)), (0, (1, 3)), (0, (8, 3)))  # line styles
 
 
 def in_time(found: Curves, name: str) -> Estimate:
-    """Return the reduced energy of a species as a function of time."""
+    """Return the energy of a species as a function of time, in units of the initial mean energy."""
     first = found["energy_all"].mean[0]
     return Estimate(*(part / first for part in found[f"energy_{name}"]))
 
@@ -100,7 +100,7 @@ def randomised(run: Run, kind: Species, tau: np.ndarray) -> np.ndarray:
 def expected_scatter(run: Run, energies: dict[str, np.ndarray], tau: np.ndarray) -> dict:
     """Return the expected standard deviation of the mean energy in single runs.
 
-    The keys are the names of the species, and "all" for all disks.
+    The keys of the returned dictionary are the names of the species, and "all" for all disks.
 
     The energies of the disks are assumed to be independent or, in an elastic gas, independent
     except for their fixed sum.  Inelastic collisions correlate the energies, and therefore the true
@@ -135,7 +135,7 @@ def scatter(runs: list[Run], found: Curves) -> dict[str, np.ndarray]:
 
 
 def ratio_band(runs: list[Run], found: Curves) -> np.ndarray:
-    """Return the error of the temperature ratio.
+    """Return the half-width of the error band of the temperature ratio.
 
     If there are fewer than `FEWEST_RUNS` runs, the function returns twice the standard deviation of
     the temperature ratio over single runs.

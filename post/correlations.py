@@ -7,12 +7,13 @@ combined; lines show means over the runs, and bands show errors.  The frames may
 or logarithmically in time (use --equilibration 0 if the run begins in equilibrium).  The unit of
 time is the mean free time 1/w, and the unit of length is the mean diameter.  Equilibrium begins
 after the first X collisions per disk, where X is the value of --equilibration, or by default when
-no observable drifts any longer.  Frames before equilibrium are used only for a2. If the gas cools
-or flows, the script computes only a2 and the structure.  The structure is averaged over the frames
-after the first X collisions per disk, where X is the value of --equilibration.  Without
---equilibration, the structure is averaged over the frames in which no observable drifts or, if the
-gas cools, over the frames later than 15 collisions per disk.  For mixtures, solid lines show the
-results for all disks, and dashed or dotted lines the results for single species.
+no observable drifts any longer.  Frames before equilibrium are used only for the second Sonine
+coefficient a2. If the gas cools or flows, the script computes only the second Sonine coefficient a2
+and the structure functions.  The structure functions are averaged over the frames after the first X
+collisions per disk, where X is the value of --equilibration.  Without --equilibration, the
+structure functions are averaged over the frames in which no observable drifts or, if the gas cools,
+over the frames later than 15 collisions per disk.  For mixtures, solid lines show the results for
+all disks, and dashed or dotted lines the results for single species.
 
 The time correlations are calculated by the module `ricochet.correlations`, whose docstring explains
 how pairs of frames are chosen.  The time correlations are the velocity autocorrelation <v(0) v(t)>,
@@ -23,15 +24,16 @@ wavenumber k is the value of --wavenumber.  The non-Gaussian parameter is alpha2
 at long times (mode coupling).  The table also contains the overlap, which is the fraction of the
 disks within 0.3 diameters of their first position.
 
-There are two definitions of the diffusion coefficient D(t).  By the first definition, D is a
-quarter of the slope of the mean square displacement between neighbouring lags.  By the second
-definition, D is half of the integral of <v(0) v(s)> from s = 0 to t.  The integral of <v(0) v(s)>
-is computed as <v(0) (x(t) - x(0))>, which is exact for any spacing of frames.  For driven disks,
-whose velocities change between collisions, only the definition by the mean square displacement
-applies.  Enskog's coefficient D_E is shown for equal smooth disks of fixed energy.  In two
-dimensions D(t) grows as the logarithm of t without limit, because of the long-time tail.  Therefore
-a value of D applies only to one time and to one size of the box: when sound has crossed the box, D
-depends on its size.  The table contains D from the mean square displacement and D from the velocity
+There are two definitions of the diffusion coefficient D(t).  By the first definition, the diffusion
+coefficient D is a quarter of the slope of the mean square displacement between neighbouring lags.
+By the second definition, the diffusion coefficient D is half of the integral of <v(0) v(s)> from s
+= 0 to t.  The integral of <v(0) v(s)> is computed as <v(0) (x(t) - x(0))>, which is exact for any
+spacing of frames.  For driven disks, whose velocities change between collisions, only the
+definition by the mean square displacement applies.  Enskog's coefficient D_E is shown for equal
+smooth disks of fixed energy.  In two dimensions D(t) grows as the logarithm of t without limit,
+because of the long-time tail.  Therefore a value of the diffusion coefficient D applies only to one
+time and to one size of the box; after the time in which sound crosses the box, D depends on the
+size of the box.  The table contains D from the mean square displacement and D from the velocity
 autocorrelation, both averaged over the lags from `D_time` / 2 to `D_time`; the two values must
 agree.  `D_time` is the time in which sound crosses the box, but at most an eighth of the duration
 of the run.  D is calculated only for a periodic box and equally spaced frames.

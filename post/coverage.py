@@ -3,12 +3,12 @@
     python post/coverage.py runs/coverage/*/*.h5 -o coverage.png --csv coverage.csv
 
 The script requires many runs at each of one or more packing fractions; the runs at one packing
-fraction differ only by their seed.  For each run it calculates the compressibility factor Z from
-the virial, and an error, which is half the width of the 68 % confidence interval. The mean of Z
-over all runs at a packing fraction is taken as the true value.  If the errors are correct, 68 % of
-the intervals contain the true value, and the errors are equal to the standard deviation of Z over
-the runs.  For comparison, the script also calculates a naive error, which assumes that all samples
-of the observables are independent.
+fraction differ only by their seed.  For each run, the script calculates the compressibility factor
+Z from the virial, and the error of Z, which is half the width of the 68 % confidence interval. The
+mean of Z over all runs at a packing fraction is taken as the true value.  If the errors are
+correct, 68 % of the intervals contain the true value, and the errors are equal to the standard
+deviation of Z over the runs.  For comparison, the script also calculates a naive error, which
+assumes that all samples of the observables are independent.
 """
 
 from ricochet import Run, RunError

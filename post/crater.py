@@ -4,17 +4,18 @@
     python post/crater.py runs/scan/*.h5 --csv craters.csv     sizes of many runs, no figure
 
 The projectile is the species 'projectile'.  Without a species of this name, the projectile is the
-only disk that moves at the start.  All other disks form the bed.  The script measures six sizes of
-each crater: `hit`, `displaced`, `width`, `depth`, `hole_width` and `hole_depth`.  `hit` is the
-number of bed disks that collided at least once.  `displaced` is the number of bed disks whose
-displacement in the last frame is larger than their radius.  `width` and `depth` are the extent of
-the region from which disks were displaced; the depth is measured downwards from the surface of the
-bed.  `hole_width` and `hole_depth` are the extent of the hole.  The hole is the region in which the
-packing fraction, averaged over a few disks, is smaller than half of the initial packing fraction of
-the bed.  The script rejects runs in which the bed moves without a projectile, for example under
-gravity.  The table marks a crater if the walls affect it, which is assumed if collisions with walls
-exceed 1 % of the number of disks.  The table also marks a crater if the run ended with more energy
-left than `stop.energy_fraction`.
+only disk that moves at the start.  All other disks form the bed.  The script measures six
+quantities that describe the size of a crater: `hit`, `displaced`, `width`, `depth`, `hole_width`
+and `hole_depth`.  `hit` is the number of bed disks that collided at least once.  `displaced` is the
+number of bed disks whose displacement in the last frame is larger than their radius.  `width` and
+`depth` are the extent of the region from which disks were displaced; the depth is measured
+downwards from the surface of the bed.  `hole_width` and `hole_depth` are the extent of the hole.
+The hole is the region in which the packing fraction, averaged over a few disks, is smaller than
+half of the initial packing fraction of the bed.  The script rejects runs in which the bed moves
+without a projectile, for example under gravity.  The table marks a crater as affected by the walls
+if the number of collisions with walls exceeds 1 % of the number of disks.  The table also marks a
+crater if the run ended before the energy had fallen to the fraction `stop.energy_fraction` of its
+initial value.
 """
 
 from ricochet import Run, crater, drawing

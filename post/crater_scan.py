@@ -12,9 +12,10 @@ a collision dissipates.  The exponents are printed with chi^2 per degree of free
 not describe its points, a warning is printed.  If a point of a curve is the mean of fewer than four
 runs, all points of the curve have equal weights.  If the points of a curve have equal weights, the
 error of the exponent is determined from the deviations of the points from the fit.  Points with
-open symbols are not used in fits.  A point is not used if the walls affect the crater, which is
-assumed if the number of collisions with walls exceeds 1 % of the number of disks.  A point is also
-not used if some of its runs reached `stop.time` with more energy left than `stop.energy_fraction`.
+open symbols are not used in fits.  A point is not used if the number of collisions with walls
+exceeds 1 % of the number of disks, because the walls then affect the crater.  A point is also not
+used if some of its runs reached `stop.time` before the energy had fallen to the fraction
+`stop.energy_fraction` of its initial value.
 """
 
 from itertools import chain
@@ -105,7 +106,7 @@ def others(axis: str, curve: list[Point]) -> dict[str, float]:
 
 
 def scanned(points: list[Point]) -> Scans:
-    """Return all curves with at least two points, or the longest curve if there are none."""
+    """Return the curves with at least two points, or the longest curve if all have one point."""
     scans = {}
     for axis in AXES:
         families = grouped(points, lambda p, axis=axis: tuple(others(axis, [p]).values()))

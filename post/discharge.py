@@ -2,14 +2,15 @@
 
     python post/discharge.py runs/hopper/*.h5 -o discharge.png --csv discharge.csv
 
-The runs must recycle disks (drive.kind = 'recycle') below a mouth between the ends of two straight
-walls.  The rate W is the number of recycled disks per time after the time --after.  D is the width
-of the mouth and d the mean diameter of the disks.  Under gravity g, Beverloo's law in two
+Each run must contain a hopper, whose mouth is the gap between the ends of two straight walls, and
+must recycle the disks that leave the mouth (drive.kind = 'recycle').  The rate W is the number of
+disks that are recycled per unit of time; recycled disks are counted after the time --after.  D is
+the width of the mouth and d the mean diameter of the disks.  Under gravity g, Beverloo's law in two
 dimensions is W = C sqrt(g / d) (D / d - k)^(3/2).  If the runs have at least three values of D, the
-script determines C and k by a fit.  In a second fit the exponent is free, and k has the value 1.4
-of Beverloo, Leniger and van de Velde, Chemical Engineering Science 15, 260 (1961), who measured in
-three dimensions, where the exponent is 5/2.  The law applies to rough disks.  The rate of smooth
-disks increases with the height of the bed.
+script determines C and k by a fit.  In a second fit the exponent is free, and k has the fixed value
+1.4.  Beverloo, Leniger and van de Velde, Chemical Engineering Science 15, 260 (1961), measured k =
+1.4 in three dimensions, where the exponent is 5/2.  Beverloo's law applies to rough disks.  The
+rate of smooth disks increases with the height of the bed.
 """
 
 from ricochet import Run, RunError
@@ -62,7 +63,7 @@ def rate(run: Run, after: float):
 
 
 def fitted(x: np.ndarray, y: np.ndarray, error: np.ndarray) -> dict[str, tuple[float, float]]:
-    """Return C, k and the exponent with their standard errors: see the text of the script."""
+    """Return C and k of the first fit and the exponent of the second fit, with standard errors."""
     known = np.where(np.isfinite(error), error, 0)
     sigma = np.hypot(known, LEAST_ERROR * y)
     largest = x.min() - 1e-6
@@ -96,12 +97,12 @@ def table(runs: list[Run], after: float) -> tuple[list[dict], list[str]]:
 
 
 def columns(rows: list[dict]) -> np.ndarray:
-    """Return the rows D / d, rate and error of the rate (3, M); an unknown error is NaN."""
+    """Return an array (3, M) with D / d, the rate and its error; an unknown error is NaN."""
     return np.array([[row[name] for row in rows] for name in ("D_over_d", "W", "W_error")], float)
 
 
 def draw(rows: list[dict], runs: list[Run], fit: dict) -> plt.Figure:
-    """Draw the rates and the fits, and the power 2/3 of the rates, which is linear in D."""
+    """Draw the rates with the fits, and in a second panel rate^(2/3), which is linear in D."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8))
     x, y, error = columns(rows)
     left.errorbar(x, y, error, fmt="o", label="measured")

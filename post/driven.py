@@ -36,13 +36,13 @@ is averaged over the time between two samples of the observables.  The disks may
 if the gap between them is smaller than a tenth of the mean diameter.
 
 The figure contains a curve for each run; the colours denote inputs and species.  Each point is an
-average over 1/60 of the duration of the run, or over 1/1000 of the duration for `width`.  The
+average over 1/60 of the duration of the run, or with --show width over 1/1000 of the duration.  The
 script prints the mean over the second half of the run with its error, and the ratio of this mean to
-the theoretical value.  For `share` the script prints the mean fraction of the disks in the half of
-the box that contains more disks.  For each frame, the half with more disks is determined from
-another part of the run, because the mean would otherwise be biased.  The pictures show the last
-frame of the first run of each input.  If all runs have the same input, the pictures show the first
-and the last frame.  Very small disks are drawn enlarged.
+the theoretical value.  With --show share, the script prints the mean fraction of the disks in the
+half of the box that contains more disks.  For each frame, the half with more disks is determined
+from another part of the run, because the mean would otherwise be biased.  The pictures show the
+last frame of the first run of each input.  If all runs have the same input, the pictures show the
+first and the last frame.  Very small disks are drawn enlarged.
 """
 
 from collections.abc import Callable

@@ -6,15 +6,16 @@ Runs with the same width v0 of the initial velocity distribution are combined.  
 averaged over the runs, and over windows of time of the length --window.  The thermalisation time
 T_therm is the time at which the relative difference of the two energies falls below --within and
 stays below this value for three windows.  The error of T_therm is determined by the jackknife
-method: T_therm is calculated again after leaving out each run in turn.  Of few runs T_therm is too
-late, because their noise exceeds the limit once more: by 16 % on average of ten runs of 60 disks,
-and by less than 1 % of 100 runs.  For a single run, the error of the relative energy difference is
-the fluctuation of the ratio of the two energies in the second half of the run.  The limits of
-T_therm are then the values of T_therm for the difference minus this error and plus this error.
-With 30 disks of each species, the error of the difference is 26 %, which is too large to determine
-T_therm; many runs or many disks are then required.  In the table, K_light and K_heavy are mean
-energies in equilibrium, which begins after the first X collisions per disk, where X is the value
-of --equilibration, or by default when no observable drifts any longer.
+method: the value of T_therm is calculated again after leaving out each run in turn.  With few runs
+T_therm is overestimated, because noise raises the energy difference above the limit again.  The
+overestimate is 16 % on average for ten runs of 60 disks, and less than 1 % for 100 runs.  For a
+single run, the error of the relative energy difference is the fluctuation of the ratio of the two
+energies in the second half of the run.  For a single run, the error limits of T_therm are the
+values of T_therm for the energy difference minus its error and plus its error.  With 30 disks of
+each species, the error of the difference is 26 %, which is too large to determine T_therm; many
+runs or many disks are then required.  In the table, K_light and K_heavy are mean energies in
+equilibrium, which begins after the first X collisions per disk, where X is the value of
+--equilibration, or by default when no observable drifts any longer.
 """
 
 from collections.abc import Callable

@@ -6,9 +6,9 @@
     python post/export.py runs/gas.h5 -o gas.lammpstrj     a dump file of LAMMPS
 
 The extended XYZ file contains two position coordinates of each disk; therefore OVITO treats the
-system as two-dimensional. The file also contains the velocity, radius, mass and any further
-quantities of each disk (such as the orientation), the box, and the time.  Numbers are written with
-full precision.
+system as two-dimensional. The extended XYZ file also contains the velocity, radius, mass and any
+further quantities of each disk (such as the orientation), the box, and the time.  Numbers are
+written with full precision.
 """
 
 import math
@@ -70,7 +70,7 @@ TEXTS = {".xyz": xyz_frame, ".csv": csv_frame}
 
 
 def write_text(run: Run, path: Path, frames: list[int]) -> None:
-    """Write frames to a text file in the format that the end of its name states."""
+    """Write frames to a text file, whose file name extension selects the format."""
     with destination(path).open("w") as file:
         if path.suffix == ".csv":
             file.write(",".join([HEAD, *run.disk_data]) + "\n")

@@ -14,9 +14,9 @@ neighbouring cells.  The averages include the frames after the first X collision
 is the value of --equilibration; by default they include the second half of each run.  Errors are
 determined from the differences between blocks of time, taken from all runs of one input
 (docs/explanation/statistics.md).  If a cell contained disks in fewer than two blocks, only its
-density is calculated.  For kT, stress and heat flux, the table contains only cells in which at
-least three disks remain, whichever block of time is left out.  With --species, the fields of one
-species are calculated, relative to the mean flow of that species.
+density is calculated.  The table contains kT, stress and heat flux only for cells in which at least
+three disks remain if any one block of time is left out.  With --species, the fields of one species
+are calculated, relative to the mean flow of that species.
 
 With --grid, the script also draws the stream function psi of the particle flux j = n u, where j_x =
 d psi / dy and j_y = -d psi / dx.  The contour lines of psi are the streamlines of the mean flow.
@@ -31,7 +31,8 @@ and thermal conductivity (Gass 1971) and the equation of state.  The band shows 
 predicted profile, which follows from the errors of the measured values.  At a packing fraction of
 0.2 the true viscosity is 0.98 to 1.00 times Enskog's viscosity, and the true thermal conductivity
 is 1.03 to 1.05 times Enskog's conductivity.  Squares show the temperatures and velocities of the
-walls.  The table contains the predicted differences between each wall and the gas next to it.
+walls.  The table contains the predicted differences of temperature and velocity between each wall
+and the gas next to the wall.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Table of the settings, states and results of all member runs of a sweep.
+"""Table of the settings, states and results of all runs of a sweep (its member runs).
 
     python post/gather.py runs/scan --csv scan.csv
 

@@ -88,7 +88,7 @@ def log_slope(values: np.ndarray, limits: tuple[float, float]) -> float:
 
 
 def slope_of(values: np.ndarray, reach: tuple[float, float], laws: np.ndarray) -> Estimate:
-    """Return the ratio of `log_slope` of values (F, n) to the slope of the law, with its error.
+    """Return the ratio of the decay constant of values (F, n) to that of the law, with its error.
 
     `reach` is the range of the fit in units of kT.  The error is determined by the jackknife
     method.  The first element of `laws` (BLOCKS + 1,) is the slope of the law for the mean kT of

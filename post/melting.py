@@ -10,8 +10,8 @@ phase coexist at P* = 9.185 between the packing fractions 0.700 and 0.716. In a 
 pressure is not constant between these packing fractions: the plot of the pressure contains a loop.
 The loop of the pressure is caused by the interface between the two phases, and becomes flatter for
 larger N.  Published values are from Engel and others, Physical Review E 87, 042134 (2013), and for
-N = 128^2 from Li and others, Journal of Chemical Physics 157, 234111 (2022).  The warnings about
-errors are important here, because correlation times are long near melting.
+N = 128^2 from Li and others, Journal of Chemical Physics 157, 234111 (2022).  Near melting, the
+warnings about errors are important, because correlation times are long.
 """
 
 from ricochet import Run

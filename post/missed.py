@@ -17,7 +17,8 @@ first half of the chord, for the time l / g.  An overlap that is detected after 
 ignored, because the disks are already separating.  The time between the first contact and the next
 time step is random.  Therefore the probability that a collision is missed is 1 - l / (g dt), or 0
 if this expression is negative.  The impact parameter b is distributed uniformly between -s and s.
-With q = g dt / s the mean probability is
+With q = g dt / s, the mean probability that a collision is missed is given by the following
+formula:
 
     P(q) = 1 - sqrt(1 - q^2) - (asin q - q sqrt(1 - q^2)) / (2 q)    for q < 1,
     P(q) = 1 - pi / (4 q)                                            beyond; q^2 / 6 for small q.

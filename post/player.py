@@ -292,8 +292,8 @@ def film(
     told, blocks = told_by_log(run, frames, room / 2 // TURN)
     blocks = {name: block.tobytes() for name, block in blocks.items()}
     blocks |= moving(run, frames, tops.get("collisions", 1))
-    # Displacements of disks are measured from the positions `origin`, which are continuous across
-    # periodic sides up to the first frame of the film.  Recycled disks have no displacements.
+    # Displacements of disks are measured from the positions in the first frame of the film,
+    # unwrapped across periodic sides (`origin`).  Recycled disks have no displacements.
     origin = run.position[frames[0]]
     if "recycled" not in run.nature:
         origin = run.unwrapped(0) + origin - run.unwrapped(frames[0])
@@ -337,7 +337,7 @@ def view() -> str:
 
 
 def paged(film: dict | None, words: dict[str, str]) -> str:
-    """Return the page of a film with the given texts.
+    """Insert the given texts into the template of a film page, and return the page.
 
     A page that contains no film requests the film from its server.
     """
@@ -355,7 +355,7 @@ def paged(film: dict | None, words: dict[str, str]) -> str:
 def lab_page(data: dict) -> str:
     """Return the page of the laboratory.
 
-    `data` contains the table of input variables and the input files.
+    The argument `data` contains the table of input variables and the input files.
     """
     style, script = text_of("style.css") + text_of("lab.css"), text_of("lab.js")
     more = "connect-src 'self'", "img-src data:", "frame-src 'self'"
@@ -401,7 +401,7 @@ def enclosed(data: object) -> str:
 
 
 def policy(style: str, script: str, *more: str) -> str:
-    """Return a content security policy that allows only this style, this script and `more`."""
+    """Return a content security policy for one style, one script and the sources `more`."""
     rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'", *more]
     for tag, own in (("script", script), ("style", style)):
         digest = base64.b64encode(hashlib.sha256(own.encode()).digest()).decode()

@@ -7,7 +7,8 @@ distance between the path of the moving disk and the centre of the disk at rest.
 positive if the moving disk passes on the left.  R12 = r1 + r2 is the sum of the radii.  The
 scattering angle is the angle between the initial and the final velocity of the moving disk.  Let M
 = m1 / m2 be the mass ratio, xi the coefficient of restitution, s = b / R12, c^2 = 1 - s^2, and
-kappa = (1 + xi) / 2 * M / (1 + M).  For finite M the exact result is
+kappa = (1 + xi) / 2 * M / (1 + M).  For finite M the exact scattering angle is given by the
+following formula:
 
     tan theta = 2 kappa s c / (1 - 2 kappa c^2).
 

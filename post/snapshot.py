@@ -13,9 +13,9 @@ All frames have the same colour scale, which begins at 0, unless --per-frame is 
 the colour scale is logarithmic.  If colours show a quantity other than the species, all disks
 except those of the first species have an outline.  A disk that overlaps a periodic side is drawn on
 both sides of the box.  If disks can rotate, a line from the centre of each disk shows its
-orientation.  If the run keeps a frame every so many events or collisions, the title of a panel
-contains their number.  Disks that would be too small to be visible are drawn enlarged, and the
-title states the factor.
+orientation.  If the run wrote frames after a fixed number of events or collisions, the title of
+each panel contains the number of events or collisions.  Disks that would be too small to be visible
+are drawn enlarged, and the title states the factor.
 """
 
 import argparse

@@ -21,13 +21,13 @@ sound crosses the box, as in correlations.py.
 Enskog's coefficients are calculated after Gass (1971), and for mixtures after Lopez de Haro, Cohen
 and Kincaid (1983).  The value of the pair correlation function at contact is taken from Henderson
 or, for mixtures, from Jenkins and Mancini (1987).  In the table, the units of all coefficients are
-formed from the mean mass, the mean diameter and kT.  The theory assumes that the velocities of
-colliding disks are independent.  Unless the gas is dense, the predicted viscosities and
-conductivity are accurate to a few per cent, whereas the predicted D is less accurate.  In two
+formed from the mean mass, the mean diameter and kT.  Enskog's theory assumes that the velocities of
+colliding disks are independent.  Unless the gas is dense, the viscosities and the conductivity of
+Enskog's theory are accurate to a few per cent, whereas the predicted D is less accurate.  In two
 dimensions no coefficient converges for long times in large boxes.  A fixed total energy of the N
 disks makes the coefficients smaller (docs/explanation/laws.md).  The relative decrease of the
-conductivity is about 6 / N, that of the bulk viscosity 5 / N, and that of the shear viscosity
-2 / N.
+conductivity is about 6 / N, that of the bulk viscosity 5 / N, and that of the shear viscosity 2 /
+N.
 """
 
 from ricochet.analysis.statistics import combine_runs

@@ -43,8 +43,8 @@ function pan(dx, dy) {
   camera.y += dy / view.unit;
 }
 
-// An object that extends from `low` to `high` has periodic copies, which are shifted by whole numbers of periods. The two functions
-// return the smallest and the largest of these numbers among the visible copies.
+// An object that extends from `low` to `high` has periodic copies, which are shifted by whole numbers of periods. The functions
+// `firstCopy` and `lastCopy` return the smallest and the largest number of periods by which a visible copy is shifted.
 function firstCopy(axis, high) {
   return film.periodic[axis] ? Math.ceil(((axis ? view.y : view.x) - high) / film.edges[axis]) : 0;
 }

@@ -171,7 +171,7 @@ function zoomBy(factor, px, py) {
 let grabbed = null;  // { side } or { disk }, and when the worker was last told [ms]
 const HOLDABLE = [undefined, 'still', 'constant_velocity', 'piston'], TOLD_AGAIN = 100;
 
-// Returns the side or the disk at a point of the canvas that can be dragged.
+// Returns the side or the disk at a point of the canvas, if the user can drag the side or the disk.
 function grabAt(px, py) {
   if (!isPart || !(state.playing ? stream.live : moment.time === last())) return null;
   if (!state.playing) {

@@ -108,8 +108,8 @@ function move(time) {
   Object.assign(moment, { kinetic: kinetic.map(mean), potential: potential.map(mean) });
 }
 
-// Returns the positions of the left, right, bottom and top side of the box at a given time. The positions that this function
-// returns are used only for drawing.
+// Returns the positions of the left, right, bottom and top side of the box at a given time. The returned positions of the sides are
+// used only for drawing.
 function sidesAt(time) {
   return past[moment.frame].sides ?? film.sides.map(({ place, motion, amplitude, period, phase, velocity, start_time: start, end_time: end, way }, k) => {
     if (way?.[0].length > 1) {
@@ -131,7 +131,7 @@ function displacement(i) {
 
 // Returns the free flights of a disk between two times. Each flight has a start, an end, and the offset of the control point of a
 // parabola, which is (0, 0) for a straight line. Without an event log, the flights are straight lines between the positions in
-// successive frames. If a disk has been recycled between two frames, its way between these frames is left out.
+// successive frames. If a disk has been recycled between two frames, its path between these frames is left out.
 function flights(i, from, to) {
   const result = [], plus = (a, b) => a.map((one, axis) => one + b[axis]);
   for (let k = frameAt(from); k < past.length - 1 && past[k].time < to; k++) {

@@ -1,6 +1,6 @@
 // ---------- film of a run that has not finished ----------
 
-// If the page was made by `player.py --live`, it requests new frames from the server of that script until the run ends. The pace of
+// If `player.py --live` made the page, the page requests new frames from the server of that script until the run ends. The pace of
 // the film is chosen such that the newest frame is reached when the next answer is expected. The user can leave the newest frame
 // and move to any other time. In the laboratory, the page receives the frames from a worker process.
 const enclosed = JSON.parse($('film').textContent);

@@ -86,8 +86,8 @@ function prepare(canvas) {
   return { pen, size, left: 42 * size, right: width - 4, top: 6, bottom: height - 26 * size };
 }
 
-// Draws two axes for the values from (x0, y0) to (x1, y1), with about three tick labels on each axis. Returns the functions that
-// convert values to pixels.
+// Draws two axes for the values from (x0, y0) to (x1, y1), with about three tick labels on each axis. The function returns two
+// functions, which convert values to pixels.
 function axes(plot, [x0, x1], [y0, y1], words, name = short, nameOfY = name) {
   const { pen, size, left, right, top, bottom } = plot;
   const x = value => left + (value - x0) / (x1 - x0) * (right - left);
@@ -117,7 +117,7 @@ function round(low, high) {
 }
 
 // Plots curves { time, values, colour, dash, letter } against time. The vertical axis includes 0. The part of each curve after the
-// time `now` is pale, and null values leave gaps. Returns the function that converts times to pixels.
+// time `now` is pale, and null values leave gaps. The function returns another function, which converts times to pixels.
 function plotLines(canvas, lines, now) {
   const range = lines.map(({ time }) => [time[0], time.at(-1)]), start = Math.min(...range.map(([t]) => t));
   const end = Math.max(...range.map(([, t]) => t)), plot = prepare(canvas), { pen } = plot;
@@ -217,10 +217,10 @@ function drawHistogram() {
   pen.restore();
 }
 
-// Returns the data that another film needs to draw the histogram of this film.
+// Returns the data of this film that other films need in order to draw its histogram of speeds beside their own.
 const speedsOfFilm = () => ({ kinds, ...film.speeds, ...speedsNow() });
 
-// Draws the histogram of a compared run as a line above the bars, with the letter of the run at the
+// Draws the histogram of a compared run as a line above the bars, and writes the letter that denotes the compared run at its
 // highest bar.
 function drawOutline(pen, one, x, height, from) {
   one.kinds.forEach((kind, s) => {

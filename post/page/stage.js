@@ -172,7 +172,8 @@ function drawObstacle([x, y, radius, inside, from, to], k) {
   });
 }
 
-// Draws an arc between two angles [degrees], like a wall. Angles of the canvas are clockwise, and the line is drawn counter-clockwise.
+// Draws an arc between two angles [degrees], in the line style of a wall. The canvas measures angles clockwise, and the arc is
+// drawn counter-clockwise.
 function drawArc([x, y, size, from, to], k) {
   ground.lineWidth = (drawLike(film.laws.obstacle[k]) ? 4.5 : 1.5) * page.dots;
   const radius = size / view.unit;
