@@ -23,7 +23,7 @@ def modules() -> dict[str, str]:
 
 
 class Aliases(MetaPathFinder, Loader):
-    """Import finder for short module names; Python calls it after all other finders."""
+    """Import finder for short module names, which Python calls after all other finders."""
 
     def __init__(self) -> None:
         """Collect the short and full names of all modules."""

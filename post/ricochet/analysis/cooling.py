@@ -43,7 +43,7 @@ SETTLED = 0.005  # relative distance from its limit at which the ratio is regard
 
 
 def on_grid(x: Sequence[Any], y: Sequence[Any], points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Interpolate curves (K, T) of each run on a common grid up to the end of the shortest run."""
+    """Interpolate the K curves of each run on a common grid up to the end of the shortest run."""
     grid = np.linspace(0, min(own[-1] for own in x), points)
     each = zip(x, y, strict=True)
     return grid, np.array([[np.interp(grid, own, k) for k in tracks] for own, tracks in each])
@@ -354,7 +354,7 @@ def rough_law(run: Run) -> tuple[float, float, float]:
 
 
 def temperatures(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Return translational and rotational temperatures, (T,) each, at the times of observables."""
+    """Return both temperatures of rough disks, (T,) each, at the times of the observables."""
     kinds = "temperature", "rotational_temperature"
     t, rotational = (run.observable(f"all/{kind}").value for kind in kinds)
     return t, rotational

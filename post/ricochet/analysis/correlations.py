@@ -6,7 +6,7 @@
 
 Each correlation function is a mean over pairs of samples at times t0 and t, as a function of the
 lag t - t0, for one species or for "all" disks.  If r is the displacement of a disk from t0 to t,
-the functions are:
+the correlation functions are defined as follows:
 
     msd        <r^2>, the mean square displacement
     vacf       <v(t0) v(t)>, the velocity autocorrelation; the mean square speed at lag 0
@@ -21,13 +21,13 @@ Along axes where the velocity of the centre of mass is conserved, or changed onl
 Lags are spaced logarithmically: each power of ten is divided into twelve intervals, and from each
 interval the lag with the largest number of pairs of samples is used.  This choice of lags suits
 samples at equal intervals, samples at logarithmic intervals, samples in bursts, and combinations of
-these schedules.  A sample is an origin t0 for a lag if another sample is later by this lag.  If the
-sums over all origins would take too long, time is divided into intervals of one sixteenth of the
-lag, and only the first sample in each interval is an origin.  If fewer samples are origins, the
-correlations of displacements are equally accurate, but the correlations of velocities are less
-accurate at lags of many mean free times.  The method is the multiple-tau correlator of Ramirez et
-al., Journal of Chemical Physics 133, 154103 (2010), but without means over neighbouring samples, so
-that each lag is exact.
+these schedules.  A sample is used as the origin t0 for a lag if another sample is later than this
+sample by the lag.  If the sums over all origins would take too long, time is divided into intervals
+of one sixteenth of the lag, and only the first sample in each interval is an origin.  If fewer
+samples are origins, the correlations of displacements are equally accurate, but the correlations of
+velocities are less accurate at lags of many mean free times.  The method is the multiple-tau
+correlator of Ramirez et al., Journal of Chemical Physics 133, 154103 (2010), but without means over
+neighbouring samples, so that each lag is exact.
 
 Errors follow from the scatter of the runs.  For a single run, errors follow from the scatter of
 sixteen parts of the run.  Lags above an eighth of the duration of a single run have no error (NaN).
@@ -111,7 +111,8 @@ def lags_of(times: np.ndarray) -> np.ndarray:
 def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
     """Return sampling times in bursts, which contain many pairs of samples at every lag.
 
-    Each burst has ten samples in each power of ten from `first` to `last` after its start.
+    In each burst, the times since the start of the burst range from `first` to `last`, with ten
+    samples per power of ten.
 
     Parameters
     ----------
@@ -225,7 +226,7 @@ class Correlator:
     def count(
         self, origins: np.ndarray, lags: np.ndarray, place: np.ndarray, v: np.ndarray
     ) -> None:
-        """Add P pairs of an earlier sample (`origins`) and the present sample, at lags `lags`."""
+        """Add P pairs at the lags `lags`; each contains an earlier and the present sample."""
         before, v0 = (np.stack([self.held[k][part] for k in origins]) for part in (0, 1))
         way = place - before
         square, half = np.einsum("pna,pna->pn", way, way), np.einsum("pna,pna->pn", v0, way) / 2
@@ -293,7 +294,7 @@ def mean_of(members: Sequence[Correlator], name: str, species: int, lags: np.nda
 
 
 def curves(members: Sequence[Correlator]) -> dict[str, dict[str, Curve]]:
-    """Return the correlation functions that correlators measured, by species and by name.
+    """Return the correlation functions measured by several correlators, by species and by name.
 
     Parameters
     ----------

@@ -44,8 +44,8 @@ class Crater(NamedTuple):
     side_collisions: int
 
 
-# Properties (traits of `nature`) that a run may have: none of them sets the bed in motion, so that
-# only the projectile can do so.
+# Properties (traits of `nature`) that a run with a crater may have, because they do not set the bed
+# in motion.
 QUIET: tuple[str, ...]
 QUIET = (
     "inelastic",

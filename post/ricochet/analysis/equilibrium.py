@@ -1,4 +1,4 @@
-"""Steady states of runs: when a run becomes steady, its thermal motion, and kT over time.
+"""Steady states of runs, the thermal motion of disks, and kT as a function of time.
 
 The parameter `skip` of many functions is the duration of the equilibration, in collisions per disk;
 samples from the equilibration are left out.  If `skip` is None, the duration of the equilibration
@@ -54,9 +54,9 @@ def all_settle(runs: Sequence[Run]) -> bool:
 def after_start(run: Run, skip: float | None = None) -> float:
     """Return the time after which `skip` collisions per disk have occurred.
 
-    The default of `skip` is `SPEEDS_FORGET`, but at most half of the number of collisions per disk
-    in the whole run.  If the run contains no collisions and `skip` is not given, the returned time
-    is half of the duration of the run.
+    By default, `skip` is 15 collisions per disk (`SPEEDS_FORGET`), but at most half of the number
+    of collisions per disk in the whole run.  If the run contains no collisions and `skip` is not
+    given, the returned time is half of the duration of the run.
     """
     time = np.union1d(run.time, run.collisions_per_disk.time)
     tau = run.collisions_per_disk_at(time)
@@ -75,10 +75,10 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
 
     A run is regarded as steady after the time at which the collision rate and the energies of the
     species stop drifting.  Drifts are found in the samples of the observables or, if there are few
-    samples, in the frames.  Unless `skip` is given, the first `SPEEDS_FORGET` collisions per disk
-    are not part of the steady state, because the distribution of speeds relaxes during these
-    collisions.  In a run with fewer than 2 `SPEEDS_FORGET` collisions per disk, the first half of
-    the collisions is excluded instead.
+    samples, in the frames.  Unless `skip` is given, the first 15 collisions per disk
+    (`SPEEDS_FORGET`) are not part of the steady state, because the distribution of speeds relaxes
+    during these collisions.  In a run with fewer than 30 collisions per disk, the first half of the
+    collisions is excluded instead of the first 15 collisions per disk.
 
     Parameters
     ----------
@@ -229,7 +229,7 @@ def later(run: Run, skip: float | None = None) -> slice:
 
 
 def motion_notes(runs: Sequence[Run]) -> list[str]:
-    """Return a note that motion is relative to the centre of mass if noise moves this centre."""
+    """Return a note for figures if noise moves the centre of mass (motion is relative to it)."""
     walks = any("random_walk" in run.nature for run in runs)
     note = "noise moves the centre of mass (drive.keep_momentum): motion is measured relative to it"
     return [note] * walks
@@ -238,10 +238,9 @@ def motion_notes(runs: Sequence[Run]) -> list[str]:
 def unforced(source: Run | Simulation) -> np.ndarray:
     """Return a mask (2,) of the axes along which no force except noise changes the total momentum.
 
-    The function `unforced` neglects forces along an axis from walls that are parallel to the axis.
-    Walls exert tangential forces only in runs with a property (trait of `nature`) in `ALONG_WALLS`.
-    If noise moves the centre of mass, and friction at walls may stop the motion of the centre of
-    mass, an error is raised.
+    The function `unforced` neglects the tangential forces of walls.  Walls exert tangential forces
+    only in runs with a property (trait of `nature`) in `ALONG_WALLS`.  If noise moves the centre of
+    mass, and friction at walls may stop the motion of the centre of mass, an error is raised.
     """
     box, nature = source.parameters.get("box", {}), source.nature
     if nature & (KICKED - {"noise_driven"}) or nature & {"obstacles", "changed"}:

@@ -32,14 +32,14 @@ ONE_SIGMA = float(scipy.special.ndtr(1))  # importing scipy.stats takes a second
 
 
 class Estimate(NamedTuple):
-    """A mean with its error; the error is half the width of the 68 % confidence interval."""
+    """Mean with its error, which is half the width of the 68 % confidence interval."""
 
     mean: Any  # a number, or an array of any shape
     error: Any  # same shape as the mean
 
 
 class Curve(NamedTuple):
-    """P points of a curve, with the errors of y."""
+    """Curve that consists of P points (x, y), with the errors of y."""
 
     x: np.ndarray
     y: np.ndarray

@@ -41,7 +41,7 @@ FLOW_LEAST = -0.5  # smallest correlation of neighbouring blocks of the flow
 LONG = 1.5  # length of a block in units of the statistical inefficiency
 POINTS = 1 << 16  # used with obstacles to find the accessible area
 ACROSS = SIDES[:2], SIDES[2:]  # the two sides perpendicular to each axis
-#: Properties (traits of `nature`) that a run between two walls may have if Enskog's theory applies.
+#: Properties (traits of `nature`) of runs between two walls to which Enskog's theory applies.
 LAWFUL = {"walls", "thermal_walls", "unequal_temperatures", "sliding_surfaces"}
 Cells = tuple[int, int]
 
@@ -55,7 +55,7 @@ class Fluxes(NamedTuple):
 
 
 class Block(NamedTuple):
-    """A block of time, which is a part of the steady state of a run."""
+    """Block of time, which is a part of the steady state of a run."""
 
     run: Run
     frames: list[int]
@@ -281,7 +281,7 @@ def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
 
 
 def sums(block: Block, cells: Cells, areas: list[np.ndarray], own: np.ndarray) -> np.ndarray:
-    """Return 12 sums for each cell (12, C) over the frames of a block and the disks `own` (N,).
+    """Return 12 sums for each cell (12, C) over the frames of a block, for the disks `own` (N,).
 
     The sums are the number of frames, the number of disks, disks per area, and the sums of m, m v,
     m v v (xx, xy, yy), m v^2 v / 2 and I omega^2.  In a sheared box v is relative to the shear

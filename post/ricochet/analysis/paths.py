@@ -20,7 +20,7 @@ class Turns(NamedTuple):
 
 
 def why_unknown(run: Run, log: EventLog) -> str:
-    """Return why the event log does not determine the paths, or '' if it determines the paths."""
+    """Return the reason why paths cannot be computed from the event log, or '' if they can."""
     if log.momentum_change is None:
         return "the log has no momentum_change"
     if run.nature & KICKED:
@@ -32,8 +32,8 @@ def seen(run: Run, log: EventLog, frames: list[int]) -> np.ndarray:
     """Return the number of events in the event log before each frame, (T,)."""
     if run.event_count is None:
         return np.searchsorted(log.time, run.time[frames], "right")
-    # The number of events before a frame follows from the event counts of all disks even if several
-    # events occurred at the time of the frame.
+    # The number of events before a frame follows from the event counts of all disks, even if
+    # several events occurred at the time of the frame.
     hits = run.event_count[frames].sum(axis=1, dtype=np.int64)
     return np.searchsorted(np.cumsum(1 + (log.j > 0)), hits, "right")
 

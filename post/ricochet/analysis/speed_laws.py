@@ -3,13 +3,14 @@
 The speeds of each frame are scaled by the energy of the frame, so that conserved and slowly
 fluctuating energies do not influence the test.  Scaled speeds deviate less from the expected
 distribution than independent values would (Lilliefors, Journal of the American Statistical
-Association 62, 399 (1967)).  To obtain p-values, the statistics are therefore compared with the
-statistics of random frames, which have as many disks as the measured frames and are scaled like the
-measured frames.  The velocities in a random frame are uniformly distributed on the sphere of
-constant energy.  Along `comoving` axes, the velocities are relative to the centre of mass.  If the
-frames are correlated, the measured statistics are divided by the statistical inefficiency of the
-series of frames.  The statistics of random frames are divided by random estimates of the
-inefficiency, so that the p-values include the uncertainty of the estimated inefficiency.
+Association 62, 399 (1967)).  The p-values follow from a comparison with random frames, which have
+as many disks as the measured frames and are scaled like the measured frames.  The velocities in a
+random frame are uniformly distributed on the sphere of constant energy.  Along axes where the total
+momentum is conserved, or changed only by noise, velocities are relative to the centre of mass.  If
+the frames of a run are correlated, the measured statistics are divided by the statistical
+inefficiency of the series of frames.  The measured inefficiency is only an estimate.  Therefore the
+statistics of random frames are divided by random estimates of an inefficiency, so that the p-values
+include the uncertainty of the estimate.
 """
 
 from collections.abc import Sequence
@@ -163,8 +164,8 @@ def noise(sizes: tuple[int, ...], true: float, cumulative: bool) -> np.ndarray:
 
     For 20 frames the relative noise of an estimated inefficiency is about a third.  `sizes`
     contains the numbers of frames of the runs.  The function draws random series of the numbers of
-    disks in bins.  The autocorrelation of these series decays exponentially, with the statistical
-    inefficiency `true`.
+    disks in bins.  The autocorrelation of the random series decays exponentially, with the
+    statistical inefficiency `true`.
     """
     if sum(sizes) > LONG:
         return np.ones(NOISES)

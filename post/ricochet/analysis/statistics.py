@@ -1,4 +1,4 @@
-"""Means of correlated time series, with errors and warnings; re-exports the module `estimates`.
+"""Means of correlated time series, with errors and warnings; includes the module `estimates`.
 
 The functions `estimate` and `correlated_mean` compute a mean and its error.  The function
 `estimate` is for independent values, such as the results of runs that differ by their seed.  The
@@ -64,7 +64,7 @@ LEAST_INEFFICIENCY = 0.02  # of a strongly anticorrelated series
 
 
 class SeriesMean(NamedTuple):
-    """The mean of a correlated series, with its error and diagnostics."""
+    """Mean of a correlated series, with its error and diagnostics."""
 
     mean: float
     error: float  # half the 68 % interval, or NaN for fewer than `FEWEST` independent samples
@@ -73,7 +73,7 @@ class SeriesMean(NamedTuple):
     freedom: float = np.inf  # degrees of freedom of the error
 
     def scaled(self, factor: float, offset: float = 0.0) -> "SeriesMean":
-        """Return the mean of the series offset + factor x, where x is the series of this mean."""
+        """Return the mean, with its error, after replacing each sample x by offset + factor x."""
         return self._replace(mean=offset + factor * self.mean, error=abs(factor) * self.error)
 
 
@@ -137,8 +137,9 @@ def inefficiency_and_lag(series: np.ndarray, least: float) -> tuple[float, int]:
 def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
     """Estimate the mean of a correlated series, or the ratio of the sums of two correlated series.
 
-    Let R be the ratio of the sums.  The error of R is the error of the mean of the series (amount -
-    R per) / (mean of per), estimated from the slowest Fourier components of the series.
+    The estimate is the ratio R of the sums of the two series.  The error of the ratio R is the
+    error of the mean of the series (amount - R per) / (mean of per), estimated from the slowest
+    Fourier components of the series.
 
     Parameters
     ----------
@@ -265,7 +266,7 @@ def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
 
     The error of the combined mean follows from the errors of the runs.  If the means of the runs
     scatter by more than their errors explain, or if a run has no error, the error of the combined
-    mean follows from this scatter.
+    mean follows from the scatter of the means.
 
     Parameters
     ----------

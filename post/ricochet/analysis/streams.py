@@ -66,7 +66,7 @@ def stream_function(run: Run, flux: np.ndarray) -> np.ndarray:
 
 
 def differences(terms: list[tuple[np.ndarray, float]], count: int) -> scipy.sparse.csr_array:
-    """Return a sparse matrix with a row for each cell: a weighted sum of values at its corners."""
+    """Return a sparse matrix, whose rows are weighted sums of values at the corners of a cell."""
     cells = terms[0][0].size
     rows = np.tile(np.arange(cells), len(terms))
     columns = np.concatenate([corner.ravel() for corner, _ in terms])

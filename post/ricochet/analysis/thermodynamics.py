@@ -48,9 +48,8 @@ __all__ = [
 
 TIMED = ("every_time", "at", "per_decade")  # samples are taken at times, not after collisions
 MANY = 1e8  # number of disks above which the effect of a fixed energy is negligible
-# Properties (traits of `nature`) that a run may have if an equation of state is to apply. A run
-# with none of the traits of `nature` consists of equal smooth disks with conserved energy in a
-# periodic box.
+# Properties (traits of `nature`) of runs to which an equation of state applies. A run with none of
+# the traits of `nature` consists of equal smooth disks with conserved energy in a periodic box.
 FLUID = ("walls", "thermal_walls", "thermostatted", "rough", "rotating", "mixture")
 
 
@@ -243,18 +242,18 @@ def steps(run: Run, skip: float | None = None) -> Steps:
 
 
 def over_kt(amount: np.ndarray, s: Steps, power: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return two series whose means have the ratio `amount` per time, divided by kT^power.
+    """Return two series; the ratio of their means is the rate of `amount` divided by kT^power.
 
     The factor kT^power is included in the second series, expanded to first order in the deviations
-    of kT from its mean.  If the error of the ratio is estimated from both series, the error
-    therefore includes the correlation between `amount` and kT.
+    of kT from its mean.  If the error of the ratio of the means is estimated from both series, the
+    error therefore includes the correlation between `amount` and kT.
     """
     kt = float(np.average(s.kt, weights=s.time))
     return amount * kt**-power, s.time * (1 + power * (s.kt / kt - 1))
 
 
 def virial_over_kt(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return two series whose means have the ratio Z - 1, calculated from the virial."""
+    """Return two series, calculated from the virial; the ratio of their means is Z - 1."""
     s = steps(run, skip)
     return over_kt(s.virial / (2 * run.n_disks), s, 1)
 

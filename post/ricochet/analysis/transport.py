@@ -1,9 +1,9 @@
 """Transport coefficients: viscosities, thermal conductivity and diffusion coefficients.
 
-The functions for diffusion require equally spaced frames; a lag is a number of frames.  In the
-functions for diffusion, the argument `frames` contains the frames in equilibrium.  The integral of
-<v(0) v(t)> requires no sum over frames, because the integral of v is the displacement x(t) - x(0),
-which is exact for any interval between frames (see `correlations`).
+The functions for diffusion require equally spaced frames, and each lag is given as a number of
+frames.  In the functions for diffusion, the argument `frames` contains the frames in equilibrium.
+The integral of <v(0) v(t)> requires no sum over frames, because the integral of v is the
+displacement x(t) - x(0), which is exact for any interval between frames (see `correlations`).
 
 Viscosities and conductivity follow from Einstein-Helfand relations.  A Helfand moment is the time
 integral of the total flux of momentum or energy.  In free flight, a disk contributes m v_a v_b to
@@ -48,9 +48,9 @@ __all__ = [
 PER_FREE_TIME = 4  # sufficient number of samples of the moments
 SUMS = ("helfand_stress", "virial_tensor", "helfand_heat", "heat_virial")
 # HEAT is the decay time of the heat flux in a dilute gas of equal disks, in mean free times; in a
-# denser gas this decay time is shorter. MEMORY is the lag t, in mean free times, at which
-# transport coefficients are evaluated. The mean square of a moment has a mean slope between the
-# lags t / 2 and t that is less than 0.2 % below the slope at infinite lag.
+# denser gas this decay time is shorter. MEMORY is the lag, in mean free times, at which transport
+# coefficients are evaluated. Between the lags MEMORY / 2 and MEMORY, the slope of the mean square
+# of a moment is on average less than 0.2 % below the slope at infinite lag.
 HEAT, MEMORY = 2.06, 20.0
 CLOSE = 1e-6  # relative difference of steps that are regarded as equal
 UNLIKE = 0.05  # largest relative difference of Enskog's viscosity between runs of one group

@@ -62,9 +62,10 @@ def caption(runs: list[Run]) -> str:
 
 
 def count_at(run: Run, frame: int) -> dict[str, int]:
-    """Return the number of events or collisions before a frame, if frames are counted by them.
+    """Return the events or collisions before a frame, if frames are written after a number of them.
 
-    The result is empty if the number of frames shows that the schedule was changed during the run.
+    The returned dictionary is empty if the number of frames shows that the schedule was changed
+    during the run.
     """
     schedule = run.parameters.get("output", {})
     counted = {"events": ["collisions", "side_collisions", "obstacle_collisions"]}
@@ -78,19 +79,19 @@ def count_at(run: Run, frame: int) -> dict[str, int]:
 
 
 def moment(run: Run, frame: int) -> str:
-    """Return the time of a frame, after the number of events or collisions if it is known."""
+    """Return the title of a panel: the number of events or collisions (if known), and the time."""
     counts = [f"{name[:-1]} {number},  " for name, number in count_at(run, frame).items()]
     return "".join(counts) + f"t = {run.time[frame]:.4g}"
 
 
 def titled(runs: list[Run]) -> str:
-    """Return the title in the input, followed by the caption."""
+    """Return the title of the first run, from its input, followed by the caption."""
     title = str(runs[0].parameter("run", "title", ""))
     return "\n".join(filter(None, (title, caption(runs))))
 
 
 def listed(values: set[float]) -> str:
-    """List up to four numbers in a text; of more numbers, only the smallest and the largest."""
+    """List up to four numbers as text; list only the extremes of more than four numbers."""
     words = [f"{value:g}" for value in sorted(values)]
     return ", ".join(words) if len(words) < 5 else f"{words[0]} to {words[-1]}"
 
@@ -230,7 +231,7 @@ def draw_box(axes: Axes, run: Run, time: float | None = None) -> None:
 
 
 def draw_circles(axes: Axes, run: Run, grey: dict[str, Any]) -> None:
-    """Draw circles (not arcs), including periodic images that overlap the box."""
+    """Draw circular obstacles (not arcs), including periodic images that overlap the box."""
     circles = [obstacle for obstacle in run.obstacles if not obstacle.is_arc]
     if any(circle.inside for circle in circles):
         axes.add_patch(Rectangle((run.lower[0], run.lower[1]), *run.edges, zorder=0, **grey))

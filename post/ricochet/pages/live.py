@@ -1,7 +1,7 @@
 """Web server for browsers on the same computer, and the page that shows an unfinished run.
 
-The server refuses requests from pages of other web sites.  Pages of other web sites might otherwise
-read data through a host name that is resolved to this computer (DNS rebinding).
+The server refuses requests from pages of other web sites.  Without this refusal, pages of other web
+sites might read data through a host name that is resolved to this computer (DNS rebinding).
 """
 
 import asyncio
@@ -158,7 +158,7 @@ class Live:
         return "" if self.lock_file.exists() else "has stopped"
 
     def answer(self, known: str) -> tuple[bytes, bool]:
-        """Return the film unless the page has it already, and whether the run has ended."""
+        """Return the film (empty if the page has the newest one), and whether the run has ended."""
         with self.lock:
             end = self.end
             # If a request fails because the simulation program is renaming the file, the next
@@ -187,9 +187,9 @@ class Live:
 def abandoned(lock: Path) -> bool:
     """Return whether the simulation program was killed.
 
-    A killed program leaves a lock file on which no process holds a lock.  To test the lock, this
-    function acquires and releases it.  If the file system does not support locks, the function
-    returns False.
+    A killed program leaves a lock file on which no process holds a lock.  To test the lock of a
+    file, the function acquires and releases the lock.  If the file system does not support locks,
+    the function returns False.
     """
     import fcntl  # imported here because it does not exist on Windows, where files can be read
 

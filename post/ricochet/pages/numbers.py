@@ -36,7 +36,7 @@ class SnapshotRun(Run):
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """The corners of the box, with an additional margin at each side that is a piston."""
+        """Corners of the box, with an additional margin at each side that is a piston."""
         way = np.zeros(4)
         way[[*self.piston_positions]] = PISTON_MARGIN * self.edges.max()
         lower, upper = Run.bounds.func(self)
@@ -96,7 +96,7 @@ def sampled(count: int, value: dict) -> tuple[float, ...]:
 
 
 def pressure_between(samples: np.ndarray, count: int) -> SeriesMean:
-    """Return the mean pressure between the first and the last sample, also if sides move."""
+    """Return the mean pressure between the first and the last sample; the sides may move."""
     (kinetic, virial, area), apart = samples[1:4], np.diff(samples[0])
     gain = count * kinetic[1:] * apart + np.diff(virial) / 2
     return correlated_mean(gain / area[1:], apart)
@@ -186,7 +186,7 @@ def equilibrium_temperature(run: Run, energy: float) -> float | None:
 
 
 def conserved_drift(run: Run) -> tuple[float, int]:
-    """Return the centre-of-mass energy along axes of conserved momentum, and their number."""
+    """Return the energy of the conserved motion of the centre of mass, and its number of axes."""
     free = conserved_momentum(run)
     momentum = np.sum(run.mass[:, None] * run.velocity[0], axis=0)
     return float(np.sum(momentum[free] ** 2) / 2 / np.sum(run.mass)), int(np.sum(free))

@@ -7,10 +7,10 @@ JSON object names the kind of the answer: "scene" (the constant part of the pict
 "events" (the next events), "state", "problems", "file" or "scan".  The page confirms with the
 request "got" that it has drawn a frame.  The worker process waits while two frames are unconfirmed.
 
-A frame consists of binary numbers in the byte order of the computer.  The first six numbers have 8
-bytes: the time, the number of collisions per disk, and the positions of the left, right, bottom and
-top side.  All numbers after the first six have 4 bytes: the positions x, y of all disks, their
-velocities, and the angles of rotating disks.
+A frame consists of binary numbers in the byte order of the computer.  The first six numbers of a
+frame have 8 bytes each, and are the time, the number of collisions per disk, and the positions of
+the left, right, bottom and top side.  All other numbers of a frame have 4 bytes each, and are the
+positions x, y of all disks, their velocities, and the angles of rotating disks.
 
 Changes are applied only at times at which no event is partly processed.  Therefore the Python
 script that the function `script` returns can repeat the run bit for bit.
@@ -155,7 +155,7 @@ class Session:
         self.apply(name, (disk, value), lambda: set_row(self.simulation, name, disk, value))
 
     def hold(self, request: dict) -> None:
-        """Move a side at constant velocity to a position, or restore the motion that the side had.
+        """Move a side to a position at constant velocity, or restore its earlier motion.
 
         The speed of the side does not exceed the rms speed of the disks.  If the earlier motion of
         a side is impossible from its present position, the side stays there.
@@ -409,7 +409,7 @@ def refuse(reason: Exception, change: bool = False) -> None:
 
 
 def words(what: str, value: object) -> str:
-    """Return the description of a change by the user that sets no variable in the form."""
+    """Describe a change by the user that is not the value of an input variable."""
     if what == "heat":
         return f"all speeds times {value:g}"
     if what == "hold":

@@ -249,7 +249,7 @@ def of_sizes(z: np.ndarray, eta: np.ndarray, alike: float) -> np.ndarray:
     """Return Z of a fluid of disks with different radii r from Z of equal disks.
 
     The argument `alike` is <r>^2 / <r^2>.  The formula is from Santos, Yuste and Lopez de Haro,
-    Molecular Physics 96, 1 (1999).  The second virial coefficient of the result is exact.  If `z`
+    Molecular Physics 96, 1 (1999).  The returned Z has the exact second virial coefficient.  If `z`
     is Z of equal disks in scaled particle theory, the returned value is Z of the mixture in scaled
     particle theory.
     """

@@ -133,7 +133,7 @@ def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
     """Return the inward displacement of a moving side at the given times.
 
     The displacement is measured from the mean position of an oscillating side, or from the initial
-    position of a side that moves at constant velocity.  The formulae are in
+    position of a side that moves at constant velocity.  The formulae for the motion of sides are in
     docs/explanation/theory.md.
     """
     if side.get("motion") == "constant_velocity":

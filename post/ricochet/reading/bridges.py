@@ -1,6 +1,6 @@
-"""Exchange of disks with other programs: MDAnalysis, GSD files, dump files of LAMMPS.
+"""Exchange of disks with other programs, by MDAnalysis, GSD files and LAMMPS dump files.
 
-Conversion for pandas and xarray is implemented by `Run.to_dataframe` and `Run.to_xarray`.
+The methods `Run.to_dataframe` and `Run.to_xarray` convert runs for pandas and xarray.
 """
 
 from collections.abc import Iterator
@@ -32,7 +32,7 @@ CLOSED = "ff"  # word of a LAMMPS dump for an axis with walls
 NAMES = {"angular_velocity": "omegaz"}
 #: Items of a LAMMPS dump whose names are followed by further words.
 ITEMS = ("ATOMS", "BOX BOUNDS")
-#: Columns of a LAMMPS dump that contain numbers and are read.
+#: Columns of a LAMMPS dump that are read and that contain numbers.
 NUMBERS = {f"{axis}{end}" for axis in "xyz" for end in ("", "u", "s", "su")}
 NUMBERS |= {"vx", "vy", "radius", "diameter", "mass", "omegaz", "orientation"}
 #: For each item of a frame: the further words in its first line, and the words of its other lines.
@@ -44,8 +44,9 @@ def mdanalysis_universe(run: Run) -> "MDAnalysis.Universe":
 
     Because MDAnalysis requires three dimensions, all disks have z = 0. Lengths and times are stored
     without conversion of units.  MDAnalysis assumes equally spaced frames; the time between frames
-    is set to the mean interval. The type of an atom is the name of the species, as in
-    `u.select_atoms("type projectile")`.  All analysis classes of MDAnalysis can use `u.trajectory`.
+    is set to the mean interval. In the `Universe`, the type of an atom is the name of its species;
+    for example, the method `select_atoms("type projectile")` selects the disks of the species
+    "projectile".  All analysis classes of MDAnalysis can be applied to the returned `Universe`.
 
     Parameters
     ----------
@@ -76,7 +77,7 @@ def mdanalysis_universe(run: Run) -> "MDAnalysis.Universe":
 
 
 class ImportedFrame(NamedTuple):
-    """Disks that another program has written, at one time.
+    """State of disks at one time, read from a file that another program has written.
 
     The arrays in `disks` have the names of the parameters of `ricochet.write_start`: "position",
     "velocity" (N, 2), "radius", "mass", "angular_velocity", "orientation" (N,) as far as the file
@@ -90,7 +91,7 @@ class ImportedFrame(NamedTuple):
     disks: dict[str, np.ndarray]
 
     def input(self) -> dict[str, Any]:
-        """Return the box and the species as groups of an input, which may be completed and run.
+        """Return the input groups "box" and "species", to which further groups can be added.
 
         Returns
         -------
@@ -133,8 +134,8 @@ def write_gsd(
     A GSD file has its origin at the centre of the box, stores the edges of the box in single
     precision, and contains no walls.  Therefore the time, the corners of the box and the periodic
     axes are also written, as the logged quantities "ricochet/time", "ricochet/lower",
-    "ricochet/upper" and "ricochet/periodic".  The step of a frame is its number in the run.  The
-    programs freud, OVITO and HOOMD-blue read GSD files.
+    "ricochet/upper" and "ricochet/periodic".  In the file, the step of each frame is the number of
+    the frame in the run.  The programs freud, OVITO and HOOMD-blue read GSD files.
 
     Parameters
     ----------
@@ -206,8 +207,9 @@ def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
 
     If the file was not written by `write_gsd`, the axes are periodic, the origin is at the centre
     of the box, and the time is the step of the frame.  Other programs often write positions in
-    single precision.  Rounding errors of these positions can make touching disks overlap, and the
-    program refuses such a start.  Multiply the radii by 1 - 1e-6 to prevent overlaps.
+    single precision.  Rounding errors in single precision can make touching disks overlap, and
+    Ricochet refuses to start with disks that overlap.  To prevent overlaps caused by rounding
+    errors, multiply the radii by 1 - 1e-6.
 
     Parameters
     ----------
@@ -268,7 +270,7 @@ def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
 
 
 def gsd_diameters(particles: Any) -> np.ndarray:
-    """Return the diameters (N,) of the disks, also where hard-particle runs store them by type."""
+    """Return the diameters (N,) of the disks, which a file may contain for each particle type."""
     shapes = [(one or {}).get("diameter") for one in particles.type_shapes or []]
     if len(shapes) == len(particles.types) and all(shapes):
         return np.array(shapes, dtype=float)[particles.typeid]
@@ -301,7 +303,8 @@ def write_lammps(
 
     The columns are id, type, element (the name of the species), x, y, z, vx, vy, vz, radius, mass,
     for a periodic box also ix, iy, iz, and for disks that can rotate omegaz and orientation.
-    Numbers are written with full precision.  The time step of a frame is its number in the run.
+    Numbers are written with full precision.  In the file, the time step of each frame is the number
+    of the frame in the run.
 
     Parameters
     ----------
@@ -370,8 +373,8 @@ def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
 
     The file must contain the positions as x and y, xu and yu (unwrapped), or xs and ys (scaled).
     The columns id, element or type, vx, vy, radius or diameter, mass, omegaz and orientation are
-    read if they exist.  The species has the name of the element, or else of the type.  Without
-    ITEM: TIME, the time is the time step.
+    read if they exist.  The name of a species is the element of its particles or, without a column
+    `element`, their type.  Without ITEM: TIME, the time is the time step.
 
     Parameters
     ----------
@@ -419,7 +422,7 @@ def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
 
 
 def frame_starts(file: BinaryIO) -> Iterator[int]:
-    """Return the place in a dump file at which each frame starts.
+    """Yield the position in a dump file, in bytes, at which each frame starts.
 
     A frame starts with its time step, or with the units and the time that precede the time step.
     """
@@ -434,7 +437,7 @@ def frame_starts(file: BinaryIO) -> Iterator[int]:
 
 
 def items_of(file: BinaryIO) -> Items:
-    """Return the items of the frame at which a dump file is open."""
+    """Read the items of one frame, which starts at the present position of an open dump file."""
     items: Items = {}
     for line in map(bytes.decode, file):
         if not line.startswith("ITEM:"):

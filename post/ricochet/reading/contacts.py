@@ -1,8 +1,8 @@
 """Contact networks and force chains from the event log of a run.
 
 In an event-driven simulation a force is the momentum that collisions transfer per time.  Disks that
-stay close to each other collide many times in a window of time, and the mean force between them is
-the sum of these impulses divided by the length of the window.
+stay close to each other collide many times in a window of time, and the mean force between two
+disks is the sum of the impulses of their collisions divided by the length of the window.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -20,10 +20,11 @@ __all__ = ["ContactNetwork", "chains", "network"]
 
 
 class ContactNetwork(NamedTuple):
-    """Contacts in a window of time: pairs of disks, or a disk and a boundary, that collided.
+    """Contacts of disks with each other and with boundaries, from collisions in a window of time.
 
-    All arrays have one row for each of the E contacts.  `j` has the same meaning as in `EventLog`:
-    numbers from 1 are disks, and the contact then has i < j; 0, -1, -2, ... are boundaries.
+    All arrays of a `ContactNetwork` have one row for each of the E contacts.  The number `j` has
+    the same meaning as in `EventLog`.  Positive values of `j` are ids of disks, and then i < j.
+    The values 0, -1, -2, ... of `j` denote boundaries.
     """
 
     i: np.ndarray  # (E,) id of a disk, counted from 1
@@ -41,7 +42,7 @@ class ContactNetwork(NamedTuple):
 
     @property
     def pairs(self) -> np.ndarray:
-        """Mask (E,) of the contacts of two disks."""
+        """Mask (E,) that is true for contacts of two disks, false for contacts with boundaries."""
         return self.j > 0
 
     def matrix(self, n_disks: int, quantity: str = "impulse") -> "scipy.sparse.csr_array":
@@ -178,7 +179,7 @@ def chains(found: ContactNetwork, above: float = 1.0, at_least: int = 3) -> list
 
 
 def strong_contacts(found: ContactNetwork, above: float = 1.0) -> np.ndarray:
-    """Return a mask (E,) of the contacts of two disks that are strong, as in `chains`."""
+    """Return a mask (E,) of the strong contacts between disks, as `chains` defines them."""
     pairs = found.pairs
     mean = found.impulse[pairs].mean() if pairs.any() else 0.0
     return pairs & (found.impulse > above * mean)

@@ -32,7 +32,7 @@ class Unsound(Exception):
 
 
 def optional_package(module: str, user: str) -> Any:
-    """Import a module that `user` needs, or raise an ImportError with the command to install it."""
+    """Import an optional module, or raise an ImportError that tells how to install it."""
     try:
         return import_module(module)
     except ImportError:
@@ -124,7 +124,7 @@ class TemporaryFolder:
     """
 
     def __init__(self, path: Path | None = None):
-        """Create a folder, or take over the folder of a worker process in order to remove it."""
+        """Create a folder, or become responsible for removing the folder of a worker process."""
         self.path = Path(tempfile.mkdtemp(prefix="ricochet-")) if path is None else path
         self.removal = Finalize(self, shutil.rmtree, (self.path, True), exitpriority=PRIORITY)
 
@@ -151,7 +151,7 @@ class TemporaryFolder:
 def received(path: Path, sent_by_worker: bool) -> TemporaryFolder | None:
     """Return the folder of a run that a worker process has sent.
 
-    The function returns None if the run was sent by the parent process, because the parent process
-    will remove the folder.
+    For a run that the parent process sent to this process, the function returns None, because the
+    parent process will remove the folder.
     """
     return TemporaryFolder(path) if sent_by_worker else None

@@ -62,7 +62,7 @@ class Series(Values):
 
     The times of an observable are in general not the times of the frames.  Indices, NumPy functions
     and arithmetic use the values: for example, `series[-1]` is the last value.  The statement
-    `time, value = series` assigns both arrays.
+    `time, value = series` assigns the array of times and the array of values.
 
     Parameters
     ----------

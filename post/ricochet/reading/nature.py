@@ -188,7 +188,7 @@ def surfaces_of(parameters: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def bath_temperatures(parameters: Mapping[str, Any]) -> list[float]:
-    """Return kT of each heat bath: a driving that is a thermostat, and the thermal surfaces."""
+    """Return kT of each heat bath; heat baths are thermal boundaries and thermostats."""
     drive, surfaces = parameters.get("drive", {}), surfaces_of(parameters)
     baths = [float(drive["temperature"])] if drive.get("kind") in THERMOSTATS else []
     return baths + [float(one["temperature"]) for one in surfaces if known(one.get("temperature"))]

@@ -40,7 +40,7 @@ def called(function: Callable[..., int], *arguments: object) -> bool:
 
 @functools.cache
 def library(files: bool = False) -> ctypes.CDLL:
-    """Load the library; with `files`, the version that reads and writes files, which needs HDF5."""
+    """Load the library of the engine; if `files` is true, load the version with HDF5 files."""
     name = "libricochet_files.so" if files else "libricochet.so"
     wish = os.environ.get("RICOCHET_LIBRARY")  # a folder
     places = [Path(wish)] if wish else [HERE / "lib", HERE.parents[1] / "build"]

@@ -4,10 +4,10 @@
     table = ricochet.sweep("input/gas.nml", values, "runs/scan")
     table = ricochet.ensemble("runs/scan")       # a row per member run; also for runs/ensemble.sh
 
-A sweep can be interrupted at any time; the same call of `sweep` then continues the sweep.  A folder
-contains input.nml, manifest.txt with the overrides of each member run, and the files NAME.h5 and
-NAME.log of each member run.  The script `runs/ensemble.sh` writes the same files, so that `sweep`
-and `runs/ensemble.sh` can continue the member runs of each other.
+A sweep can be interrupted at any time; the same call of `sweep` then continues the sweep.  The
+folder of a sweep contains input.nml, manifest.txt with the overrides of each member run, and the
+files NAME.h5 and NAME.log of each member run.  The script `runs/ensemble.sh` writes the same files;
+therefore `sweep` can continue member runs that `runs/ensemble.sh` started, and vice versa.
 """
 
 import contextlib
@@ -308,7 +308,7 @@ def log_of(path: Path) -> TextIO:
 
 
 def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
-    """Run a member unless it is finished or runs in another process; return the exit code."""
+    """Perform a member run, unless it is finished or runs elsewhere, and return its exit code."""
     if not wanted(mark):
         return STOPPED
     with log_of(folder / f"{name}.log") as log:

@@ -65,7 +65,7 @@ class Held:
     """Context manager that locks a simulation, so that no other thread advances or closes it."""
 
     def __init__(self, simulation: Session):
-        """Store the simulation, whose lock `with` acquires and whose handle `with` returns."""
+        """Store a simulation; the `with` statement locks it and receives its handle."""
         self.simulation = simulation
 
     def __enter__(self) -> int:
@@ -80,7 +80,7 @@ class Held:
 
 
 def after_fork() -> None:
-    """Close, in the child of a fork, the simulations that another thread was advancing."""
+    """After a fork, close in the child process the simulations that other threads advanced."""
     for simulation in ALIVE:
         if not simulation._lock.acquire(blocking=False):
             simulation._handle = None

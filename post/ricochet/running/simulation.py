@@ -382,7 +382,7 @@ class Simulation(State):
         that the engine reaches exactly, so that another simulation that advances to t reaches the
         same state.  The engine computes the time of a simulation as the sum of the origin of time
         and the time since this origin.  Because not every floating-point number can be the sum of
-        these two numbers, `_settle` tries several values of t.
+        the origin and the time since the origin, `_settle` tries several values of t.
         """
         ulps = 0
         while self.time != self._settled:
