@@ -13,8 +13,7 @@ from textwrap import dedent
 
 from input_page import GROUPS, LAW, said, variables, written
 
-#: Section of the manual page for each paragraph of the --help text.  A paragraph is identified by
-#: its first word, if a colon follows this word.
+#: Section of the manual page by the first word (before a colon) of a paragraph of the --help text.
 SECTIONS = {
     "usage": "SYNOPSIS",
     "members": "OPTIONS",

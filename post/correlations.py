@@ -79,8 +79,7 @@ from ricochet.script import by_packing, command_line, launch, measured, over_run
 import numpy as np
 
 PLAIN = {"walls"}  # the only special property allowed for Enskog's D
-#: Physical properties (traits) that prevent a run from reaching equilibrium, but that do not
-#: prevent the calculation of its structure.
+#: Traits (physical properties) of runs without an equilibrium whose structure can be calculated.
 RESTLESS = (
     "inelastic",
     "soft_contacts",

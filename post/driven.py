@@ -256,9 +256,9 @@ def viscosity(run: Run) -> Curves:
     return {"": (time[1:], -stress / (run.shear_rate * np.prod(run.edges)))}
 
 
-#: Each quantity that can be drawn, with the text and unit of its axis label and three functions.
-#: The functions return the measured curves, the prediction, and the values whose mean is compared
-#: with the prediction.
+# For each quantity, `QUANTITIES` contains the text and the unit of the axis label and three
+# functions, which return the measured curves, the prediction, and the values whose mean is compared
+# with the prediction.
 QUANTITIES = {
     "width": (("width of the box", "length"), width, width_law, np.asarray),
     "temperature": (("kT", "energy"), temperature, temperature_law, np.asarray),

@@ -207,7 +207,7 @@ def draw_grid(
 
 
 def cells_of(text: str) -> tuple[int, ...]:
-    """Convert a text to numbers of cells: N for a profile, or (NX, NY) for a map."""
+    """Convert a text to the numbers of cells, N for a profile or (NX, NY) for a map."""
     cells = tuple(int(word) for word in text.split(","))
     if min(cells) < 1 or not 2 <= np.prod(cells) <= MOST_CELLS:
         raise argparse.ArgumentTypeError(f"the number of cells must be 2 to {MOST_CELLS}")

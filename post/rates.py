@@ -39,8 +39,7 @@ import numpy as np
 
 BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
 BLOCKS = 8  # number of blocks of frames of a single run
-#: Traits of runs whose free flights can be analysed: the flights are straight, the speed is
-#: constant, and the distribution of free paths is the same everywhere in the box.
+#: Traits of runs with straight free flights whose lengths have the same distribution everywhere.
 STRAIGHT = {
     "walls",
     "mixture",

@@ -60,9 +60,9 @@ from ricochet.script import command_line, grouped, late_frames, launch, measured
 import numpy as np
 
 BINS = np.linspace(0, 3, 51)  # u = 1 is the centre of a bin
-#: Panel titles, one for each possible state of the gas in the late frames (the frames after the
-#: initial relaxation).  The titles `EQUILIBRIUM` and `STEADY` are used if the average of kT does
-#: not change during the late frames.
+# Panel titles, one for each possible state of the gas in the late frames (the frames after the
+# initial relaxation).  The titles `EQUILIBRIUM` and `STEADY` are used if the average of kT does not
+# change during the late frames.
 EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
 COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each frame at its own kT"
 UNSTEADY = "No steady kT yet: each frame at its own"

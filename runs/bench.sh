@@ -3,7 +3,7 @@
 #
 #   runs/bench.sh            1e3 to 1e5 disks at four packings; gravity, restitution, sizes, samples
 #   runs/bench.sh --full     1e6 disks as well: rates, random start, memory; runs and threads on two cores
-#   runs/bench.sh --check    instructions per collision against what is promised (needs valgrind)
+#   runs/bench.sh --check    numbers of instructions per collision, compared with their limits (needs valgrind)
 #
 # A rate is the number of collisions, in millions, per second of processor time. A rate is measured in runs on one core that also
 # sample observables, and the printed rate is the median of RUNS=5 runs. Before the measurement, the system is simulated until it

@@ -12,8 +12,7 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-#: If the package was installed by pip, the scripts are inside the package.  In a source tree the
-#: scripts are in the folder that contains the package.
+#: Folder of the scripts, which is inside the package if pip installed it, and else around it.
 SCRIPTS = HERE / "post" if (HERE / "post").is_dir() else HERE.parent
 #: Commands that are not Python scripts, with their paths in a source tree.
 IN_CLONE = {"ricochet": "build/ricochet", "ricochet-ensemble": "runs/ensemble.sh"}

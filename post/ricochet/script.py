@@ -84,8 +84,7 @@ def unit_names(text: str) -> Units:
         raise argparse.ArgumentTypeError(str(problem)) from None
 
 
-#: Options that several scripts accept: name, conversion of the value, symbol of the value, help
-#: text.
+#: Options of several scripts, each with name, conversion, symbol of the value, and help text.
 OPTIONS = {
     "frames": (frame_list, "LIST", "frames to use, such as 0,10,-1 or 100:200 or ::5"),
     "count": (positive, "N", "largest number of frames, which are evenly spread"),

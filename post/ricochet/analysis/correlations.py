@@ -163,7 +163,7 @@ class Correlator:
         reach: float | None = None,
         lags: np.ndarray | None = None,
     ):
-        """Set all sums to zero; `waves` has the unit 1/length; `lags_of` selects default lags."""
+        """Set all sums to zero; by default, the lags are those that `lags_of` selects."""
         cools = {"inelastic"} if source.nature.cooling else set()
         what = "time correlations require a steady state without flow"
         allow(source, what, *TRAITS.keys() - FLOWING - cools)

@@ -233,7 +233,7 @@ def displaced(run: Run, frame: int = -1) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        (N,) mask
+        (N,) mask, which is true for displaced disks
 
     Examples
     --------

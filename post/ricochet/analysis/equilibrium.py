@@ -90,7 +90,7 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
     Returns
     -------
     float
-        time
+        time at which the steady state begins
 
     Examples
     --------
@@ -160,7 +160,7 @@ def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
     Returns
     -------
     float
-        time
+        time at which the equilibrium begins
 
     Raises
     ------
@@ -342,7 +342,7 @@ def kt_at_start(run: Run) -> float:
     Returns
     -------
     float
-        kT
+        kT in the first frame
 
     Examples
     --------

@@ -527,7 +527,7 @@ def prediction(
     profiles : dict of str to Estimate or None
         (P,) predicted "flow", "temperature" and "density", or None if no gas can have the measured
         fluxes
-    fluxes : Fluxes
+    fluxes : ricochet.fields.Fluxes
         the pressure, shear stress and heat flux measured at the walls
 
     Raises

@@ -39,7 +39,7 @@ def seen(run: Run, log: EventLog, frames: list[int]) -> np.ndarray:
 
 
 def turns_between(run: Run, log: EventLog, frames: list[int], ends: np.ndarray) -> Turns:
-    """Return the collisions from the first to the last of `frames`; `seen` computes `ends`."""
+    """Return the collisions from the first to the last frame; `ends` is the result of `seen`."""
     if log.momentum_change is None:
         raise ValueError("the log has no momentum_change")
     some = slice(ends[0], ends[-1])

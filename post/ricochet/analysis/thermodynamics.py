@@ -301,7 +301,7 @@ def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
     Returns
     -------
     SeriesMean
-        Z
+        compressibility factor Z
 
     Raises
     ------
@@ -330,7 +330,7 @@ def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
     Returns
     -------
     SeriesMean
-        Z
+        compressibility factor Z
 
     Raises
     ------
@@ -395,8 +395,8 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     Returns
     -------
     dict of str to SeriesMean
-        Z by name of the method: "virial", for equal disks also "rate", and "walls" if the box has
-        four walls
+        Z for each method; the keys are "virial", for equal disks also "rate", and "walls" if the
+        box has four walls
 
     Raises
     ------
@@ -428,7 +428,7 @@ def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     Returns
     -------
     dict of str to SeriesMean
-        pressures by name: "pressure_virial", "pressure_left", ... [energy/length^2]
+        pressures [energy/length^2], with the keys "pressure_virial", "pressure_left" and so on
 
     Raises
     ------
@@ -507,7 +507,7 @@ def rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     Returns
     -------
     dict of str to SeriesMean
-        by name
+        temperature, pressures and collision rates, with their names as keys
 
     Raises
     ------

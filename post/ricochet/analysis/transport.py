@@ -327,8 +327,8 @@ def coefficients(runs: list[Run], skip: float | None = None) -> dict[str, Found]
     Returns
     -------
     dict of str to Found
-        coefficients by name: "viscosity" and "bulk_viscosity", for equal disks also "conductivity",
-        and "D" if the runs contain frames
+        coefficients, with the keys "viscosity" and "bulk_viscosity", for equal disks also
+        "conductivity", and "D" if the runs contain frames
 
     Raises
     ------

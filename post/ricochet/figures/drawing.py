@@ -172,7 +172,7 @@ def colour_map(colour: str) -> str:
 
 
 def chosen_colour(run: Run, wish: str | None) -> str:
-    """Return the quantity that colours disks: `wish`, or the default quantity if `wish` is None."""
+    """Return the quantity that colours show, which is `wish` or, for None, the default quantity."""
     known = ("species", *COLOURINGS)
     if wish is not None and wish not in known:
         hint = did_you_mean(wish, known)

@@ -104,7 +104,7 @@ def henderson(eta: Number) -> Number:
     Returns
     -------
     float or numpy.ndarray
-        Z
+        compressibility factor Z
 
     Examples
     --------
@@ -152,7 +152,7 @@ def simulated_finite(eta: ArrayLike, count: int) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        (...) Z
+        (...) compressibility factor Z
 
     Examples
     --------
@@ -177,7 +177,7 @@ def crystal(eta: Number, count: float = math.inf) -> Number:
     Returns
     -------
     float or numpy.ndarray
-        Z
+        compressibility factor Z
 
     Examples
     --------
@@ -269,7 +269,7 @@ def contact_value(z: Number, eta: Number) -> Number:
     Returns
     -------
     float or numpy.ndarray
-        chi
+        pair correlation function at contact, chi
 
     Examples
     --------
@@ -291,14 +291,15 @@ def collision_rate(
     diameter : float
         diameter of the disks [length]
     free : float
-        effective number of disks that share the energy: N between walls, N - 1 in a periodic box
+        effective number of disks that share the energy, which is N between walls and N - 1 in a
+        periodic box
     kt, mass : float
         temperature and mass of a disk
 
     Returns
     -------
     float
-        rate [1/time]
+        collision rate of a disk [1/time]
 
     Examples
     --------
@@ -422,7 +423,7 @@ def noise_temperature(
     Returns
     -------
     float
-        kT
+        temperature kT in the steady state
 
     Examples
     --------

@@ -38,7 +38,7 @@ def virial_pressure(
     Returns
     -------
     float
-        P / kT [1/length^2]; NaN if the box is too small for a fluid of these disks
+        P / kT [1/length^2], or NaN if the box is too small for a fluid of these disks
 
     Examples
     --------

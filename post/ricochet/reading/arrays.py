@@ -5,8 +5,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-#: Index that selects frames: a number, a slice or a list.  Negative numbers count from the last
-#: frame.
+#: Index that selects frames (number, slice or list); negative numbers count from the last frame.
 Index = int | slice | Sequence[int] | np.ndarray
 #: Argument of a formula: a number or an array of numbers.
 Number = TypeVar("Number", float, np.ndarray)

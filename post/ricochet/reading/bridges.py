@@ -50,8 +50,8 @@ def mdanalysis_universe(run: Run) -> "MDAnalysis.Universe":
 
     Parameters
     ----------
-    run : Run
-        a run
+    run : ricochet.Run
+        the run to convert
 
     Returns
     -------
@@ -139,12 +139,12 @@ def write_gsd(
 
     Parameters
     ----------
-    run : Run
-        a run
+    run : ricochet.Run
+        the run to convert
     path : str or Path
         the file to write
     frames : int, slice or list of int, optional
-        frames of the run; by default all
+        frames of the run [all frames]
     precision : {"double", "single"}
         precision of all real numbers; disks that nearly touch may overlap in single precision
 
@@ -308,15 +308,15 @@ def write_lammps(
 
     Parameters
     ----------
-    run : Run
-        a run
+    run : ricochet.Run
+        the run to convert
     path : str or Path
         the file to write
     frames : int, slice or list of int, optional
-        frames of the run; by default all
+        frames of the run [all frames]
     time : bool
-        whether the time of each frame is written after ITEM: TIME, as LAMMPS does with
-        `dump_modify time yes`; MDAnalysis cannot read files with times
+        whether the time of each frame is written as the item TIME, as LAMMPS does with
+        `dump_modify time yes`; MDAnalysis cannot read files with this item
 
     Returns
     -------
@@ -374,7 +374,8 @@ def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
     The file must contain the positions as x and y, xu and yu (unwrapped), or xs and ys (scaled).
     The columns id, element or type, vx, vy, radius or diameter, mass, omegaz and orientation are
     read if they exist.  The name of a species is the element of its particles or, without a column
-    `element`, their type.  Without ITEM: TIME, the time is the time step.
+    `element`, their type.  If a frame does not contain the item TIME, its time step is used as the
+    time.
 
     Parameters
     ----------

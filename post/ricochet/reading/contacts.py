@@ -150,8 +150,8 @@ def chains(found: ContactNetwork, above: float = 1.0, at_least: int = 3) -> list
 
     Parameters
     ----------
-    found : ContactNetwork
-        the contacts
+    found : ricochet.contacts.ContactNetwork
+        the contacts in a window of time
     above : float
         smallest impulse of a strong contact, divided by the mean impulse
     at_least : int

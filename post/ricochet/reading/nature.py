@@ -44,8 +44,7 @@ TRAITS = {
     "walls": "has walls",
     "mixture": "has disks of different mass or radius",
 }
-#: Physical properties (traits) of runs whose energy also changes for reasons other than dissipation
-#: in collisions.
+#: Traits of runs whose energy also changes for reasons other than dissipation in collisions.
 SOURCES = {
     "changed",
     "sheared",

@@ -436,8 +436,8 @@ class Frame:
 
     Parameters
     ----------
-    run : Run
-        the run
+    run : ricochet.Run
+        the run that contains the frame
     index : int
         number of the frame; the first frame has the number 0
 

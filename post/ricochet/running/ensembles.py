@@ -93,7 +93,8 @@ def sweep(
 
     Examples
     --------
-    >>> table = ricochet.sweep(small, {"contact.restitution": [1, 0.9]}, folder / "xi")
+    >>> restitutions = [1, 0.9]
+    >>> table = ricochet.sweep(small, {"contact.restitution": restitutions}, folder / "xi")
     >>> list(table["state"])
     ['finished', 'finished']
     >>> linked = [{"species.speed": v, "stop.collisions": 10 * v} for v in (1, 2)]
@@ -437,7 +438,7 @@ def ensemble(folder: str | Path) -> "pandas.DataFrame":
 
     Examples
     --------
-    >>> table = ricochet.sweep(small, {"run.seed": [1, 2]}, folder / "sweep")
+    >>> table = ricochet.sweep(small, {"run.seed": range(1, 3)}, folder / "sweep")
     >>> ricochet.ensemble(folder / "sweep").equals(table)
     True
     """

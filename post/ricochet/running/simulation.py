@@ -401,7 +401,8 @@ class Simulation(State):
         Parameters
         ----------
         values : mapping of str to object
-            values of variables by their full names, such as {"box.gravity": (0, -1)}
+            a dictionary with the new value of each variable, whose key is the full name of the
+        variable, such as "box.gravity"
 
         Returns
         -------
