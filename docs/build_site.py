@@ -2,9 +2,9 @@
 
     python docs/build_site.py build
 
-The command `make docs` runs this script.  The folder build/docs-sources receives a copy of all
-pages, in which links between pages of different folders are changed to links within the site; the
-site build/docs is made from this copy by Sphinx.  In each folder of docs/, the file README.md is
+The command `make docs` runs this script.  The script copies all pages to the folder
+build/docs-sources, and changes links between pages of different folders to links within the site;
+from this copy, Sphinx builds the site build/docs.  In each folder of docs/, the file README.md is
 the index page, and the site lists the pages of the folder in the order of the links in README.md.
 A page NAME.md beside a folder NAME is the index page of that folder.  The script ends with exit
 code 1 if Sphinx prints a warning, or if a link within the site leads nowhere.
@@ -290,7 +290,7 @@ def with_cards(text: str) -> str:
 
 
 class ParserFoundError(Exception):
-    """Raised when a script parses its command line."""
+    """Exception that stops a script when it parses its command line."""
 
 
 def parser_of(path: Path) -> argparse.ArgumentParser | None:

@@ -178,7 +178,7 @@ def title_of(group: str) -> str:
 
 
 def example_of(group: str) -> list[str]:
-    """Return the section with the example of a group, which is a part of an input file."""
+    """Return the section with the example of a group, which shows a part of an input file."""
     name = EXAMPLES[group]
     text = (ROOT / "input" / f"{name}.nml").read_text(encoding="utf-8")
     kind = "side" if group == LAW else group

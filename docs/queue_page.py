@@ -3,8 +3,8 @@
     python docs/queue_page.py build/tests/four_disks                   the queues
     python docs/queue_page.py build/tests/four_disks docs/tutorials/queue.png    and the figure
 
-The event queues come from the program docs/four_disks.f90, which `make test` builds.  This program
-performs a real simulation of four disks, one event at a time.
+The event queues come from the program docs/four_disks.f90, which `make test` builds.  The program
+four_disks performs a real simulation of four disks, one event at a time.
 """
 
 import json
@@ -24,7 +24,7 @@ BOX, RADIUS = 4.0, 0.3
 
 @dataclass(frozen=True)
 class Expected:
-    """The state of a disk at the time of its last event, and its predicted next event."""
+    """State of a disk at the time of its last event, and the predicted next event of the disk."""
 
     disk: int
     place: np.ndarray

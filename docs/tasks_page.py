@@ -99,7 +99,7 @@ def cooling() -> Numbers:
 
 
 def crater() -> Numbers:
-    """Return the size of the crater, and the exponents of its dependence on the parameters."""
+    """Return the size of the crater, and the exponents of its dependence on mass and speed."""
     rows = [row for row in table("crater_scan") if row["in_fit"] == "1"]
     (base,) = (row for row in rows if row["scan"] == "mass" and float(row["mass"]) == 25)
     found = {name: value(base, name) for name in ("hit", "displaced", "width", "depth")}

@@ -7,10 +7,10 @@ in the window of time; the disks are drawn at their positions in the frame that 
 middle of the window.  The width of a line is proportional to the mean force between the two disks,
 which is the sum of the impulses divided by the length of the window.  A line from the centre of a
 disk to its edge shows the contact of the disk with a side or an obstacle.  A contact of two disks
-is strong if its impulse is larger than the mean impulse times the value of --above.  Disks that are
-connected by strong contacts form a force chain; red lines show the chains of at least --at-least
-disks.  The second panel shows the distribution of the forces between two disks, in units of the
-mean force.  By default, the window of time is the last tenth of the run.  The option --contacts
+is called strong if its impulse is larger than the mean impulse times the value of --above.  Disks
+that are connected by strong contacts form a force chain; red lines show the chains of at least
+--at-least disks.  The second panel shows the distribution of the forces between disks, in units of
+the mean force.  By default, the window of time is the last tenth of the run.  The option --contacts
 FILE writes a table with a row for each contact, which contains the ids of the disks, the number of
 collisions, the impulse, the force, and the change of momentum.
 """

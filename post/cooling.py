@@ -5,8 +5,8 @@
 Runs with the same coefficient of restitution xi are combined, and lines show means over the runs.
 The panels of the first row, one for each xi, show the mean kinetic energy per disk against time in
 the units of the input.  The bands in the first row contain the results of 95 % of single runs.  The
-width of the bands in the first row is measured if there are at least four runs; otherwise the width
-is estimated from the numbers of disks.  The panels of the second row compare all values of xi on a
+width of the bands in the first row is measured if there are at least four runs, and is otherwise
+estimated from the numbers of disks.  The panels of the second row compare all values of xi on a
 logarithmic axis.  The second row shows the kinetic energy per disk of each species, divided by the
 initial mean over all disks; bands show the errors of the means.  The third row shows the ratio of
 the temperatures of the heaviest and the lightest species, which is 1 in equilibrium.  The third row
@@ -90,7 +90,7 @@ def randomised(run: Run, kind: Species, tau: np.ndarray) -> np.ndarray:
     """Return the variance of the energies in a species, divided by the squared mean energy.
 
     Collisions change the ratio of the variance to the squared mean from its initial value to 1,
-    which is the ratio for an exponential distribution.
+    which is the value for an exponential distribution.
     """
     first = run.kinetic_energy(0)[kind.disks]
     start = float(np.var(first) / np.mean(first) ** 2) if np.any(first) else 1.0
@@ -103,8 +103,8 @@ def expected_scatter(run: Run, energies: dict[str, np.ndarray], tau: np.ndarray)
     The keys of the returned dictionary are the names of the species, and "all" for all disks.
 
     The energies of the disks are assumed to be independent or, in an elastic gas, independent
-    except for their fixed sum.  Inelastic collisions correlate the energies, and therefore the true
-    standard deviation is smaller than the estimate of this function.
+    except for their fixed sum.  Inelastic collisions correlate the energies of the disks, and
+    therefore the true standard deviation is smaller than the estimate that the function returns.
     """
     counts = {kind.name: int(kind.disks.sum()) for kind in run.by_species}
     variances = {

@@ -3,8 +3,8 @@
     python post/crater.py runs/crater.h5 -o crater.png
     python post/crater.py runs/scan/*.h5 --csv craters.csv     sizes of many runs, no figure
 
-The projectile is the species 'projectile'.  Without a species of this name, the projectile is the
-only disk that moves at the start.  All other disks form the bed.  The script measures six
+The projectile is the species 'projectile'.  If no species is called 'projectile', the projectile is
+the only disk that moves at the start.  All other disks form the bed.  The script measures six
 quantities that describe the size of a crater: `hit`, `displaced`, `width`, `depth`, `hole_width`
 and `hole_depth`.  `hit` is the number of bed disks that collided at least once.  `displaced` is the
 number of bed disks whose displacement in the last frame is larger than their radius.  `width` and

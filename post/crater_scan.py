@@ -12,10 +12,10 @@ a collision dissipates.  The exponents are printed with chi^2 per degree of free
 not describe its points, a warning is printed.  If a point of a curve is the mean of fewer than four
 runs, all points of the curve have equal weights.  If the points of a curve have equal weights, the
 error of the exponent is determined from the deviations of the points from the fit.  Points with
-open symbols are not used in fits.  A point is not used if the number of collisions with walls
-exceeds 1 % of the number of disks, because the walls then affect the crater.  A point is also not
-used if some of its runs reached `stop.time` before the energy had fallen to the fraction
-`stop.energy_fraction` of its initial value.
+open symbols are not used in fits.  A point is not used in fits if the number of collisions with
+walls exceeds 1 % of the number of disks, because the walls then affect the crater.  A point is also
+not used in fits if some of its runs reached `stop.time` before the energy had fallen to the
+fraction `stop.energy_fraction` of its initial value.
 """
 
 from itertools import chain

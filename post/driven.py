@@ -11,9 +11,9 @@ box, the dashed line is the temperature at which driving and dissipation balance
 Ernst 1998).  If one side of the box moves at a constant velocity and the disks are equal and
 elastic, the dashed line shows the temperature on the adiabat.  The adiabat follows from the
 equation of state, including the layers at the walls (`hard_disks.adiabat`), and applies to slow
-compression and expansion.  A comparison with the adiabat requires several runs: while the side is
-at rest, the temperature of a single run is constant, and no error can be determined from its
-fluctuations.
+compression and expansion.  A comparison with the adiabat requires several runs, because the
+temperature of a single run is constant while the side is at rest, and no error can be determined
+from a constant temperature.
 
 --show width: width of a box with a piston (motion = 'piston').  For equal elastic disks, the dashed
 lines show the predicted mean width and the range of one standard deviation around it.  The
@@ -39,10 +39,10 @@ The figure contains a curve for each run; the colours denote inputs and species.
 average over 1/60 of the duration of the run, or with --show width over 1/1000 of the duration.  The
 script prints the mean over the second half of the run with its error, and the ratio of this mean to
 the theoretical value.  With --show share, the script prints the mean fraction of the disks in the
-half of the box that contains more disks.  For each frame, the half with more disks is determined
-from another part of the run, because the mean would otherwise be biased.  The pictures show the
-last frame of the first run of each input.  If all runs have the same input, the pictures show the
-first and the last frame.  Very small disks are drawn enlarged.
+half of the box that contains more disks.  To avoid a bias of the mean fraction, the half with more
+disks is determined for each frame from another part of the run.  The pictures show the last frame
+of the first run of each input.  If all runs have the same input, the pictures show the first and
+the last frame.  Very small disks are drawn enlarged.
 """
 
 from collections.abc import Callable
@@ -138,7 +138,7 @@ def widths(run: Run, side: int) -> np.ndarray:
 
 
 def adiabat(run: Run, side: int, widths: np.ndarray) -> np.ndarray:
-    """Return the temperatures on the adiabat, divided by the temperature at the first width."""
+    """Return the temperatures on the adiabat, divided by the temperature at the initial width."""
     height, walled = float(run.edges[1 - side // 2]), not run.periodic[1 - side // 2]
     return hard_disks.adiabat(widths, height, run.n_disks, float(run.radius[0]), walled)
 
@@ -199,9 +199,10 @@ def fuller(share: np.ndarray) -> np.ndarray:
 
     The argument `share` contains the fractions of the disks in the left half of the box.  For
     frames in the first third of the run, the half with more disks is determined from the last
-    third, and vice versa.  If the same frames determined the half with more disks and were
-    averaged, chance alone would make the mean fraction larger than 1/2.  The middle third is not
-    used, because the first and last third must be statistically independent.
+    third, and vice versa.  If the same frames were used both to determine the half with more disks
+    and to calculate the mean fraction, chance alone would make the mean fraction larger than 1/2.
+    The middle third is not used, because the first and last third must be statistically
+    independent.
     """
     third = max(1, len(share) // 3)
     ends = share[:third], share[-third:]
@@ -324,7 +325,7 @@ def draw_curves(
 def draw(
     groups: dict[str, list[Run]], tracks: dict, laws: dict, label: tuple[str, str], fine: bool
 ) -> plt.Figure:
-    """Draw the curves, and below them the pictures of the disks."""
+    """Draw the curves of a quantity, and below the curves the pictures of the disks."""
     runs = [run for own in groups.values() for run in own]
     pictures = [(own[0], -1, name) for name, own in groups.items()][:MOST_PICTURES]
     if len(groups) == 1:

@@ -2,12 +2,13 @@
 
     python post/energy.py runs/gravity/events.h5 runs/gravity/steps_*.h5 -o energy.png
 
-The panels of the first row show the total energy and its parts against time on linear axes.  There
-is one panel for the first run of each time step.  The second row shows the mean kinetic and
-potential energy per disk of each species in the first run, against linear and logarithmic time.
-For driven disks there is no panel with logarithmic time.  The lowest panel shows for each run the
-largest relative change of the conserved quantity between the start and each time.  The conserved
-quantity is the total energy or, if energy is exchanged, total + dissipated - heat - work - drive.
+The panels of the first row show the total energy and its parts against time on linear axes.  In the
+first row, there is one panel for each time step, which shows the first run with this time step.
+The second row shows the mean kinetic and potential energy per disk of each species in the first
+run, against linear and logarithmic time.  For driven disks there is no panel with logarithmic time.
+The lowest panel shows for each run the largest relative change of the conserved quantity between
+the start and each time.  The conserved quantity is the total energy or, if energy is exchanged,
+total + dissipated - heat - work - drive.
 
 The conservation of energy does not depend on the time step: between collisions the disks follow
 exact parabolas, and every collision conserves energy, so all changes are rounding errors.  The
@@ -18,8 +19,8 @@ The table contains three numbers for each run: the drift, the spread and the lar
 conserved quantity.  The drift is the change over the whole run of a straight line that is fitted to
 the conserved quantity.  The spread is the standard deviation of the conserved quantity from the
 fitted line.  The largest change is the largest difference of the conserved quantity from its
-initial value.  The drift, the spread and the largest change are divided by the total energy at the
-start or, if this energy is 0, by the largest total energy.
+initial value.  The drift, the spread and the largest change are given relative to the total energy
+at the start or, if the total energy at the start is 0, relative to the largest total energy.
 """
 
 from collections.abc import Callable
@@ -44,7 +45,7 @@ def method(run: Run) -> str:
 
 
 def balance(run: Run) -> tuple[np.ndarray, str]:
-    """Return the time series of the conserved quantity, and the names of its terms."""
+    """Return the time series of the conserved quantity, and the names of the energies in it."""
     energy, words = run.observable("total_energy").value, "total"
     size = 1e-9 * np.abs(energy).max()
     for sign, term in ((1, "dissipated_energy"), (-1, "heat"), (-1, "work"), (-1, "drive_energy")):

@@ -9,8 +9,8 @@ value of --equilibration, or by default when no observable drifts any longer.  E
 the autocorrelation of the pressure; in the table, `samples` is the effective number of independent
 samples of the virial. Runs with equal packing fraction are combined.  The disks must be elastic,
 and there must be no gravity.  Thermal walls and driving are allowed if all of them impose the same
-temperature; in this case kT is a measured mean, and its error is included.  Near walls there is a
-layer that the centres of disks cannot reach, and therefore the density in the interior is higher.
+temperature; the temperature kT is then a measured mean with an error.  Near walls there is a layer
+that the centres of disks cannot reach, and therefore the density in the interior is higher.
 Therefore Z from the wall pressure refers to the area that centres can reach, and differs from Z of
 the bulk by a fraction of about 1/sqrt(N).  For disks of many radii r, the curves show the equation
 of state of fluids derived by Santos, Yuste and Lopez de Haro (1999).  The equation of Santos, Yuste

@@ -11,11 +11,11 @@ T_therm is overestimated, because noise raises the energy difference above the l
 overestimate is 16 % on average for ten runs of 60 disks, and less than 1 % for 100 runs.  For a
 single run, the error of the relative energy difference is the fluctuation of the ratio of the two
 energies in the second half of the run.  For a single run, the error limits of T_therm are the
-values of T_therm for the energy difference minus its error and plus its error.  With 30 disks of
-each species, the error of the difference is 26 %, which is too large to determine T_therm; many
-runs or many disks are then required.  In the table, K_light and K_heavy are mean energies in
-equilibrium, which begins after the first X collisions per disk, where X is the value of
---equilibration, or by default when no observable drifts any longer.
+values of T_therm for the energy difference minus its error and plus its error.  In single runs with
+30 disks of each species, the error of the relative energy difference is 26 %, which is too large to
+determine T_therm; therefore many runs or many disks are required.  In the table, K_light and
+K_heavy are mean energies in equilibrium, which begins after the first X collisions per disk, where
+X is the value of --equilibration, or by default when no observable drifts any longer.
 """
 
 from collections.abc import Callable
@@ -86,8 +86,9 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
 def over_runs(of: Callable[[np.ndarray], float], both: list[np.ndarray]) -> Estimate:
     """Return the value of a function of the mean energies (2, W) of R runs, with a jackknife error.
 
-    `both` contains the energies (R, W) of the two species.  The result is NaN if the function is
-    NaN for the mean energies of all runs, or for the mean energies of all runs except one.
+    The argument `both` contains the energies (R, W) of the two species.  The result is NaN if the
+    function is NaN for the mean energies of all runs, or for the mean energies of all runs except
+    one.
     """
     tracks, count = np.array(both), len(both[0])
     whole = of(tracks.mean(axis=1))

@@ -11,8 +11,8 @@ rotate, kT_rot is the mean of I omega^2. The kinetic part of the stress is the s
 area, and the kinetic part of the heat flux is the sum of m c^2 c / 2 per area.  The collisional
 parts of stress and heat flux are not included.  Within a cell, u is interpolated linearly from the
 neighbouring cells.  The averages include the frames after the first X collisions per disk, where X
-is the value of --equilibration; by default they include the second half of each run.  Errors are
-determined from the differences between blocks of time, taken from all runs of one input
+is the value of --equilibration, or by default the frames in the second half of each run.  Errors
+are determined from the differences between blocks of time, taken from all runs of one input
 (docs/explanation/statistics.md).  If a cell contained disks in fewer than two blocks, only its
 density is calculated.  The table contains kT, stress and heat flux only for cells in which at least
 three disks remain if any one block of time is left out.  With --species, the fields of one species
@@ -110,7 +110,7 @@ def draw_fields(axes: plt.Axes, units: Units, x: np.ndarray, found: dict, *names
 
 
 def with_ends(run: Run, axis: int, x: np.ndarray) -> np.ndarray:
-    """Return x, extended at its ends by the smallest and largest possible centre position."""
+    """Return positions x, extended at both ends by the outermost possible centre positions."""
     reach = run.radius[0]
     return np.concatenate([[run.lower[axis] + reach], x, [run.upper[axis] - reach]])
 

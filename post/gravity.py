@@ -70,10 +70,10 @@ def samples(run: Run, kind: Species, frames: list[int]) -> Samples:
 def log_slope(values: np.ndarray, limits: tuple[float, float]) -> float:
     """Return the decay constant of values with an exponential distribution between two limits.
 
-    The result is the maximum-likelihood estimate of the decay constant: with this constant, the
-    truncated exponential distribution has the same mean as the values between the limits.  A line
-    fitted to the logarithm of a histogram would depend on its bins: nearly empty bins would make
-    the scatter larger by a third.
+    The result is the maximum-likelihood estimate of the decay constant, with which the truncated
+    exponential distribution has the same mean as the values between the limits.  A straight line
+    fitted to the logarithm of a histogram would be less accurate, because nearly empty bins would
+    make the scatter of the slope larger by a third.
     """
     inside = values[(values >= limits[0]) & (values <= limits[1])]
     reach = limits[1] - limits[0]
@@ -88,11 +88,12 @@ def log_slope(values: np.ndarray, limits: tuple[float, float]) -> float:
 
 
 def slope_of(values: np.ndarray, reach: tuple[float, float], laws: np.ndarray) -> Estimate:
-    """Return the ratio of the decay constant of values (F, n) to that of the law, with its error.
+    """Return the decay constant of values (F, n), divided by that of the law, with its error.
 
-    `reach` is the range of the fit in units of kT.  The error is determined by the jackknife
-    method.  The first element of `laws` (BLOCKS + 1,) is the slope of the law for the mean kT of
-    all frames; each other element is the slope for the mean kT without the frames of one block.
+    The argument `reach` is the range of the fit in units of kT.  The error is determined by the
+    jackknife method.  The first element of `laws` (BLOCKS + 1,) is the slope of the law for the
+    mean kT of all frames; each other element is the slope for the mean kT without the frames of one
+    block.
     """
 
     def over(law: float, own: np.ndarray) -> float:
@@ -114,7 +115,8 @@ def blocks_of(frames: int) -> list[np.ndarray]:
 def warmth(species: list[Samples]) -> np.ndarray:
     """Return ratios (BLOCKS + 1,) of kinetic energies to the mean kinetic energy of all frames.
 
-    The first ratio, for all frames, is 1; each other ratio leaves out the frames of one block.
+    The first ratio, for all frames, is 1; each other ratio is for the frames outside one block of
+    time.
     """
     energy = np.sum([0.5 * s.mass * s.square.sum(axis=1) for s in species], axis=0)
     rests = [np.delete(energy, own) for own in blocks_of(len(energy))]
@@ -140,9 +142,9 @@ def crowded_heights(
 ) -> list[np.ndarray]:
     """Return the densities at the heights (H,), corrected to first order for the excluded area.
 
-    `width` is the width of the area that the centres of disks can reach.  `share` is the number of
-    disks among which a fixed total energy is distributed, or infinity with a heat bath.  The area
-    that a disk excludes does not affect the disk itself.
+    The argument `width` is the width of the area that the centres of disks can reach.  The argument
+    `share` is the number of disks among which a fixed total energy is distributed, or infinity with
+    a heat bath.  The area that a disk excludes does not affect the disk itself.
     """
     numbers = [s.height.shape[1] for s in species]
     ideal = [sharing(s.mass * pull * height, kt, share) for s in species]
@@ -226,8 +228,8 @@ def draw(run: Run, species: list[Samples], result: list[dict], began: tuple) -> 
 
     The left panels have linear axes, and the right panels have logarithmic axes.
 
-    `began` contains the time of the first frame used, and the reason why the frames before this
-    time are not used.
+    The argument `began` contains the time of the first frame used, and the reason why earlier
+    frames are not used.
     """
     figure, panels = plt.subplots(2, 2, figsize=(11, 8), sharex="row")
     kt, g = result[0]["kT"], float(np.abs(run.gravity[1]))

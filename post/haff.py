@@ -10,9 +10,9 @@ Haff's law and the ratio of K to the exponential law.  Haff's law and the expone
 while the gas is homogeneous.  After the end of the homogeneous state, a part of K is the energy of
 flows in the gas, and K decreases more slowly.  The boxes must be periodic, and the total momentum
 must be 0. For equal disks the initial collision rate w0 is calculated from the equation of state.
-For unequal disks w0 is measured from the first collisions.  Haff's law and the exponential law
-assume that all species have the same temperature; this assumption is wrong if the masses are very
-different.
+For unequal disks the initial collision rate w0 is measured from the first collisions.  Haff's law
+and the exponential law assume that all species have the same temperature; this assumption is wrong
+if the masses are very different.
 
 The cooling rate is -d ln K / d tau, where tau is the number of collisions per disk.  The rate is
 averaged over two collisions per disk and over the runs.  If the measured cooling rate falls below
@@ -47,7 +47,7 @@ RATIO_TOP = 2.0  # largest upper limit of the axis of ratios
 
 
 def draw(runs: list[Run], groups: list, results: list) -> plt.Figure:
-    """Draw K against time and collisions per disk, and below it the ratios of K to both laws."""
+    """Draw K against time and collisions per disk, and the ratios of K to both laws below."""
     figure, panels = plt.subplots(
         2, 2, sharex="col", sharey="row", figsize=(10, 7), height_ratios=(2, 1)
     )

@@ -6,9 +6,9 @@
 On the page of the laboratory, the user chooses an input file and moves sliders, and the simulation
 responds at once.  The page of the laboratory also shows plots of speeds, energies and pressure.
 Several runs can be shown side by side.  The user can download a run as an input file, as a Python
-script that repeats it, or as an output file with which the simulation program can continue.  The
-script prints the address of the page.  The script serves the page until the user presses Ctrl-C,
-which also ends all simulations.
+script that repeats the run, or as an output file with which the simulation program can continue the
+run.  The script prints the address of the page.  The script serves the page until the user presses
+Ctrl-C, which also ends all simulations.
 """
 
 import asyncio

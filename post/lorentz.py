@@ -7,8 +7,8 @@ intervals of time.  The reduced density is n R^2, where n is the number of obsta
 area, and R the sum of the radii of disk and obstacle.  The diffusion coefficient D is a quarter of
 the slope of the mean square displacement between the two values of --lags, in units of the mean
 free time.  Between the two values of --lags the slope is nearly constant, because the velocity
-autocorrelation is small: it is negative and decays as 1/t^2. Runs with the same density are
-combined, and the error is the standard error of the mean.
+autocorrelation at these lags is small; the velocity autocorrelation is negative and decays as
+1/t^2. Runs with the same density are combined, and the error is the standard error of the mean.
 
 The figure shows D / D_0. The Boltzmann equation, which is exact in the limit of low density, yields
 the diffusion coefficient D_0 = 3 v / (16 n R).  The curves show the density expansion

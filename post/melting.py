@@ -7,8 +7,8 @@ from the virial. P* is averaged in equilibrium, which begins after the first X c
 where X is the value of --equilibration, or by default when no observable drifts any longer.  The
 disks must be equal and the box must be periodic.  In an infinite system, the liquid and the hexatic
 phase coexist at P* = 9.185 between the packing fractions 0.700 and 0.716. In a finite box the
-pressure is not constant between these packing fractions: the plot of the pressure contains a loop.
-The loop of the pressure is caused by the interface between the two phases, and becomes flatter for
+pressure is not constant in the coexistence region, and a plot of the pressure contains a loop.  The
+loop of the pressure is caused by the interface between the two phases, and becomes flatter for
 larger N.  Published values are from Engel and others, Physical Review E 87, 042134 (2013), and for
 N = 128^2 from Li and others, Journal of Chemical Physics 157, 234111 (2022).  Near melting, the
 warnings about errors are important, because correlation times are long.

@@ -26,7 +26,7 @@ formula:
 The probability density of the relative speeds of colliding pairs is proportional to g^2 exp(-mu g^2
 / 2 kT), where mu is the reduced mass.  The collision rate of disks of species i with disks of
 species j is proportional to N_i N_j / (h_i + h_j) / sqrt(mu), where h_i and h_j are scale heights.
-Here h_i = kT / (m_i a) is the scale height of species i in a gravitational field of acceleration a.
+In a gravitational field of acceleration a, species i has the scale height h_i = kT / (m_i a).
 """
 
 from itertools import combinations_with_replacement

@@ -70,7 +70,7 @@ def table(runs: list[Run], frames: list[list[int]], skip: float | None = None) -
 def speed_bins(start: np.ndarray, top: float) -> np.ndarray:
     """Return about 60 bins of speed up to `top`.
 
-    If all initial speeds are equal, this speed is the centre of a bin.
+    If all initial speeds are equal, their common value is the centre of a bin.
     """
     speed, width = float(np.mean(start)), top / BINS
     if 0 < speed < top and np.ptp(start) < 1e-9 * speed:

@@ -10,9 +10,9 @@ their exact paths between frames, and colours, energies and numbers of collision
 event.  Without an event log the film shows only the frames.  With the controls of the page the user
 can play the film, step to the next frame or event, change the speed of the film, and zoom.  Colours
 show the species, speed, displacement or number of collisions of each disk.  If the user clicks on a
-disk, the page shows its path and the picture follows the disk.  Plots show the speeds and the
-energies.  For up to 20 disks a list shows the next events.  Without --count, the film contains as
-many evenly spread frames as fit into 30 MB.
+disk, the page shows the path of the disk, and the picture follows the disk.  Plots show the speeds
+and the energies.  For up to 20 disks a list shows the next events.  Without --count, the film
+contains as many evenly spread frames as fit into 30 MB.
 
 With --live, the script starts a web server and prints its address.  The page at this address shows
 a running simulation on this computer until the run ends.  With --open, the script opens the film or
@@ -246,7 +246,8 @@ def curves(run: Run) -> dict:
 def scene(run: Run) -> tuple[dict, dict]:
     """Return the data of a film that do not change: box, obstacles, species and disks.
 
-    `run` is a `Run`, or another object with the attributes of `Run` that this function uses.
+    The argument `run` is a `Run`, or another object with those attributes of `Run` that the
+    function uses.
     """
     radii, own = radii_of(run)
     facts = {

@@ -15,9 +15,9 @@ each side.  The pressure on the sides is slightly larger than the pressure from 
 the distance of the centre of a disk from a side cannot be smaller than the radius.  If the run has
 an event log, the script also analyses the free paths, and the table contains the collision rates
 w_ij.  The rate w_ij is the rate at which a disk of species i collides with disks of species j.  The
-free path of a disk in a frame is the distance that it travels between its last collision before the
-frame and its first collision after the frame.  Because long paths occur in more frames than short
-paths, the weight of each path is the inverse of its duration.  The errors are determined from the
+free path of a disk in a frame is the distance between its last collision before the frame and its
+first collision after the frame.  Each free path is weighted with the inverse of its duration,
+because long paths occur in more frames than short paths.  The errors are determined from the
 scatter of the runs or, for a single run, from the scatter of blocks of frames.  The line shows the
 prediction for equal disks and molecular chaos (Boltzmann, Enskog).  Free paths are not defined for
 driven disks, whose velocities change between collisions.

@@ -22,7 +22,7 @@ from ricochet.script import command_line, launch, measured, report, spread
 
 
 def draw(runs: list[Run], law: tuple, exact: float | None, found: Curves) -> plt.Figure:
-    """Draw both temperatures on logarithmic axes, and the ratio of the temperatures."""
+    """Draw translational and rotational temperature on logarithmic axes, and their ratio."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 5))
     tau, start = found["collisions_per_disk"], (found["T"].mean[0], found["T_rot"].mean[0])
     expected = theory.rough_temperatures(tau, start, *law)

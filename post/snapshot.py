@@ -5,17 +5,18 @@
     python post/snapshot.py runs/gravity.h5 --count 12 --quiver        twelve frames, evenly spread
 
 The option --colour selects what the colours show.  The choices are species, speed, displacement,
-collisions, spin and psi6. The displacement is measured from the first frame.  With --colour
-collisions, colours show the number of collisions of each disk since the start.  The spin is the
-angular velocity of disks that can rotate.  With --colour psi6, colours show the phase of the
-bond-orientational order parameter of each disk relative to the phase of its mean over all disks.
-All frames have the same colour scale, which begins at 0, unless --per-frame is given.  With --log
-the colour scale is logarithmic.  If colours show a quantity other than the species, all disks
-except those of the first species have an outline.  A disk that overlaps a periodic side is drawn on
-both sides of the box.  If disks can rotate, a line from the centre of each disk shows its
-orientation.  If the run wrote frames after a fixed number of events or collisions, the title of
-each panel contains the number of events or collisions.  Disks that would be too small to be visible
-are drawn enlarged, and the title states the factor.
+collisions, spin and psi6. With --colour displacement, colours show the distance of each disk from
+its position in the first frame.  With --colour collisions, colours show the number of collisions of
+each disk since the start.  The spin is the angular velocity of disks that can rotate.  With
+--colour psi6, colours show the phase of the bond-orientational order parameter psi6 of each disk,
+relative to the phase of the mean of psi6 over all disks.  All frames have the same colour scale,
+which begins at 0, unless --per-frame is given.  With --log the colour scale is logarithmic.  If
+colours show a quantity other than the species, all disks except those of the first species have an
+outline.  A disk that overlaps a periodic side is drawn on both sides of the box.  If disks can
+rotate, a line from the centre of each disk shows its orientation.  If the run wrote frames after a
+fixed number of events or collisions, the title of each panel contains the number of events or
+collisions.  Disks that would be too small to be visible are drawn enlarged, and the title states
+the factor.
 """
 
 import argparse

@@ -6,10 +6,10 @@
 #   runs/bench.sh --check    numbers of instructions per collision, compared with their limits (needs valgrind)
 #
 # A rate is the number of collisions, in millions, per second of processor time. A rate is measured in runs on one core that also
-# sample observables, and the printed rate is the median of RUNS=5 runs. Before the measurement, the system is simulated until it
-# has lost all correlations to its initial state. No other program should run at the same time. The environment variable RICOCHET
-# names the measured program (default build/ricochet). The option --check requires a program that was compiled without AVX-512 code,
-# because valgrind cannot execute such code.
+# sample observables, and the printed rate is the median of RUNS=5 runs. Before the measurement, the system is simulated until the
+# state no longer depends on the initial state. No other program should run during the measurements. The environment variable
+# RICOCHET names the measured program (default build/ricochet). The option --check requires a program that was compiled without
+# AVX-512 code, because valgrind cannot execute such code.
 set -euo pipefail
 export LC_ALL=C # awk then reads and writes 0.5 with a point in every language
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."

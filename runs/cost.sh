@@ -6,8 +6,8 @@
 
 # The packing fraction is always 0.3, and no output is written during a run. The runs have 10 collisions per disk, or 5 collisions
 # per disk for a million disks. With at least 5 collisions per disk, the cost of the initial prediction of one event per disk is
-# negligible. The method `rescan` predicts the events of all disks after each collision; therefore a few hundred collisions in total
-# are sufficient for it.
+# negligible. The method `rescan` predicts the events of all disks after each collision; therefore runs with this method need only a
+# few hundred collisions in total.
 measure() { # columns: collisions, collisions per disk, power of N by which the collisions are divided, search, numbers of disks
   local collisions=$1 per_disk=$2 power=$3 search=$4 count number radius
   shift 4

@@ -331,7 +331,7 @@ failure() {
 }
 
 # announce TEXT: prints TEXT, followed by a summary of all member runs. If the script performs only a share of the member runs, it
-# prints no summary, because it has already printed a line for each of them.
+# prints no summary, because a line has already been printed for each member run.
 announce() {
   [[ -z $share ]] || return 0
   printf '%s: %s%d of %d members finished' "$folder" "$1" "$finished" "$total" >&2
@@ -398,7 +398,7 @@ run_parallel() {
 }
 
 # Checks the input before jobs are submitted, because an invalid input should not wait in the queue before it is reported. If
-# several member runs differ only in their seed, only the first of them is checked.
+# several member runs differ only in their seed, only the first of these member runs is checked.
 check_inputs() {
   local k kind reason arguments
   local -A seen=()

@@ -44,8 +44,8 @@ last_words() {
 is_finished=': is a finished run, ' # the answer to --resume if a stop rule is met already
 goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line in the log of a member that has not failed
 
-# Returns success if the member run NAME has a finished output file, or an output file from which it can continue. If a member run
-# has failed, its log file states the reason.
+# Returns success if the member run NAME has a finished output file, or an output file from which the member run can continue. If a
+# member run has failed, its log file states the reason.
 has_data() { [[ -e $folder/$1.h5 || -e $folder/$1.h5.part && $(last_words "$1") =~ $goes_on ]]; }
 
 # An output file is not regarded as finished if it is older than the input file, or if a run is extending the output file.
@@ -66,7 +66,7 @@ has_failed() {
 }
 
 # Opens the log file of a member run with the file descriptor `lock`. The log file must be an ordinary file with a single hard link,
-# and its path must still refer to the opened file.
+# and must not have been replaced since it was opened.
 open_log() {
   may_be_ours "$1" && { exec {lock}>>"$1"; } 2>/dev/null || return
   [[ ! -L $1 && $1 -ef /dev/fd/$lock && $(stat -L -c %h "/dev/fd/$lock") == 1 ]] && return

@@ -30,7 +30,8 @@ for system; do
   esac
 done
 
-# Writes a section of the page for each existing figure, with its name, its title, and the script that produces it.
+# For each existing figure, writes a section of the page with the name of the figure, its title, and the script that draws the
+# figure.
 section() {
   local name=$1 title=$2 script=$3 file
   for file in "$name".{png,mp4,gif}; do

@@ -6,8 +6,8 @@
 #   runs/memory.sh 490000 file only the kinds whose name contains a word
 #
 # The script measures the largest resident memory of the process, and compares it with the estimate that the option --check prints.
-# The runs need about 250 bytes of memory per disk, or 700 bytes with neighbour lists. Other programs may run at the same time. The
-# environment variable RICOCHET names the measured program (default build/ricochet).
+# The runs need about 250 bytes of memory per disk, or 700 bytes with neighbour lists. Other programs may run during the
+# measurements. The environment variable RICOCHET names the measured program (default build/ricochet).
 set -euo pipefail
 export LC_ALL=C # awk then reads and writes 0.5 with a point in every language
 case ${1:-} in -h | --help) sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"; exit 0 ;; esac

@@ -217,7 +217,8 @@ function pointerMoved(event) {
   look();
 }
 
-// Returns the disk nearest to a point of the canvas within a distance in CSS pixels of its rim, or null.
+// Returns the disk nearest to a point of the canvas, or null if the distance of the point from the rim of the disk exceeds a limit
+// in CSS pixels.
 function diskAt(px, py, distance) {
   let nearest = null, least = distance * page.dots;
   for (let i = 0; i < disks; i++) {

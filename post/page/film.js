@@ -59,8 +59,8 @@ function cross(frame, moved) {
 
 // Positions between two frames are calculated from the positions in the earlier frame and from the velocity changes in the event
 // log. Between collisions a disk moves along a straight line, or along a parabola under gravity. Without an event log, each disk is
-// shown at its position in the latest frame before the present time. Frames from a worker process follow each other so closely that
-// no event log is needed.
+// shown at its position in the latest frame before the present time. Frames from a worker process are so close in time that no
+// event log is needed.
 let ways;    // velocity changes: index of the first change after each frame (start); disk, fraction of the interval and new velocity of each change (turns)
 let events;  // events of the log: time (when), partners (i, j), number of collisions of two disks so far (pairs)
 

@@ -217,11 +217,10 @@ function drawHistogram() {
   pen.restore();
 }
 
-// Returns the data of this film that other films need in order to draw its histogram of speeds beside their own.
+// Returns the histogram of speeds of this film, for drawing in other films that are shown at the same time.
 const speedsOfFilm = () => ({ kinds, ...film.speeds, ...speedsNow() });
 
-// Draws the histogram of a compared run as a line above the bars, and writes the letter that denotes the compared run at its
-// highest bar.
+// Draws the histogram of speeds of a compared run as a line above the bars, and labels the line with the letter of the run.
 function drawOutline(pen, one, x, height, from) {
   one.kinds.forEach((kind, s) => {
     let best = [0, Infinity];

@@ -205,8 +205,9 @@ function inBox(brush, action) {
 // ---------- drawing of the disks ----------
 
 // The disks are drawn pixel by pixel into an array, which is much faster than drawing thousands of arcs on the canvas. Disks of
-// different species are distinguished by stripes if the disks are large enough. Pattern 0 is plain, 1 has horizontal stripes, 2
-// vertical stripes, and 3 both. Between the stripes of a disk, the background is visible.
+// different species are distinguished by stripes if the disks are large enough. Disks with pattern 0 are plain; pattern 1 has
+// horizontal stripes, pattern 2 has vertical stripes, and pattern 3 has horizontal and vertical stripes. Between the stripes of a
+// disk, the background is visible.
 const SMALLEST_PATTERN = 3.5, PATTERNS = [0, 1, 2, 3];
 const isStriped = (kind, radius) => PATTERNS[kind % PATTERNS.length] > 0 && radius >= SMALLEST_PATTERN * page.dots;
 const bare = share => share - Math.floor(share) > 0.66;  // the last third of each period of the stripes is transparent
@@ -270,8 +271,7 @@ function drawMarks() {
   if (state.arrows) drawArrowKey();
 }
 
-// Draws a line from the centre of each disk to its rim, which shows the orientation of the disk. In small disks no orientation line
-// is drawn.
+// Draws the orientation of each disk as a line from the centre of the disk to its rim. In small disks no orientation line is drawn.
 const LEAST_TO_TURN = 2;
 function drawRadii() {
   marks.strokeStyle = ink.stage;

@@ -2,8 +2,8 @@
 """Commands such as ricochet-player and ricochet-lab, one for each script in post/.
 
 For each command, `make install` makes a copy of this file with the name of the command.  A command
-that pip has installed calls the function `main`.  If the environment variable RICOCHET is not set
-and the folder of the command contains the simulation program, the scripts use this program.
+that pip has installed calls the function `main`.  Scripts use the simulation program in the folder
+of the command, unless the environment variable RICOCHET names another program.
 """
 
 import os
@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-#: Folder of the scripts, which is inside the package if pip installed it, and else around it.
+#: Folder of the scripts: inside the package if pip installed it, otherwise around the package.
 SCRIPTS = HERE / "post" if (HERE / "post").is_dir() else HERE.parent
 #: Commands that are not Python scripts, with their paths in a source tree.
 IN_CLONE = {"ricochet": "build/ricochet", "ricochet-ensemble": "runs/ensemble.sh"}

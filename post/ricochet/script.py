@@ -131,8 +131,8 @@ class Parser(argparse.ArgumentParser):
 def finished(paths: list[Path]) -> list[Path]:
     """Return the paths of finished runs, and print a warning about unfinished runs.
 
-    If no run has finished, all paths are returned.  If all files of a sweep are given, its member
-    runs without a file are also counted as unfinished.
+    If no run has finished, all paths are returned.  If all files of a sweep are given, member runs
+    without an output file are also counted as unfinished.
     """
     whole = [path for path in paths if path.suffix != ".part"]
     if not whole:
@@ -231,9 +231,9 @@ def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | No
 def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
     """Return the selected frames (--frames) in the steady state with the required separation.
 
-    If no frame of --frames is in the steady state, the last frame is returned.  A warning is added
-    to `args.notes` if some requested frames are not used, or if the speeds in the first used frame
-    may still depend on the initial speeds.
+    If no frame of --frames is in the steady state, the last frame is returned.  The function adds a
+    warning to `args.notes` if some requested frames are not used, or if the speeds in the first
+    used frame may still depend on the initial speeds.
     """
     frames, start = (
         chosen_frames(run, args.frames, None),

@@ -212,7 +212,7 @@ def haff(
     soft: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
     points: int = 200,
 ) -> tuple[Curves, Estimate, float, Estimate]:
-    """Compare the cooling of runs that have the same restitution with Haff's law.
+    """Compare the cooling of runs that have equal coefficients of restitution with Haff's law.
 
     Parameters
     ----------

@@ -21,13 +21,13 @@ Along axes where the velocity of the centre of mass is conserved, or changed onl
 Lags are spaced logarithmically: each power of ten is divided into twelve intervals, and from each
 interval the lag with the largest number of pairs of samples is used.  This choice of lags suits
 samples at equal intervals, samples at logarithmic intervals, samples in bursts, and combinations of
-these schedules.  A sample is used as the origin t0 for a lag if another sample is later than this
-sample by the lag.  If the sums over all origins would take too long, time is divided into intervals
-of one sixteenth of the lag, and only the first sample in each interval is an origin.  If fewer
-samples are origins, the correlations of displacements are equally accurate, but the correlations of
-velocities are less accurate at lags of many mean free times.  The method is the multiple-tau
-correlator of Ramirez et al., Journal of Chemical Physics 133, 154103 (2010), but without means over
-neighbouring samples, so that each lag is exact.
+these schedules.  For a given lag, each sample at a time t0 is used as an origin if there is also a
+sample at t0 plus the lag.  If the sums over all origins would take too long, time is divided into
+intervals of one sixteenth of the lag, and only the first sample in each interval is an origin.  If
+fewer samples are origins, the correlations of displacements are equally accurate, but the
+correlations of velocities are less accurate at lags of many mean free times.  The method is the
+multiple-tau correlator of Ramirez et al., Journal of Chemical Physics 133, 154103 (2010), but
+without means over neighbouring samples, so that each lag is exact.
 
 Errors follow from the scatter of the runs.  For a single run, errors follow from the scatter of
 sixteen parts of the run.  Lags above an eighth of the duration of a single run have no error (NaN).
@@ -111,8 +111,8 @@ def lags_of(times: np.ndarray) -> np.ndarray:
 def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
     """Return sampling times in bursts, which contain many pairs of samples at every lag.
 
-    In each burst, the times since the start of the burst range from `first` to `last`, with ten
-    samples per power of ten.
+    Each burst consists of samples at logarithmically spaced times after its start, with ten samples
+    per power of ten from `first` to `last`.
 
     Parameters
     ----------
@@ -151,8 +151,8 @@ class Correlator:
     """Time correlations of a run or a simulation, accumulated from samples one after the other.
 
     The required memory is bounded, because a sample is stored only until all its pairs have been
-    added.  In long runs, about 16 samples are stored for each lag.  A pickle contains the complete
-    state of a correlator, so that a measurement can be continued exactly.
+    added.  In long runs, about 16 samples are stored for each lag.  A pickled correlator contains
+    its complete state, so that a measurement can be continued exactly.
     """
 
     def __init__(

@@ -102,7 +102,7 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
 
 
 def explained_start(run: Run, skip: float | None = None) -> tuple[float, str]:
-    """Return the time after which a run is steady, and a text with the reason for this time."""
+    """Return the time after which a run is steady, and a text that explains this choice."""
     forgets = f"{SPEEDS_FORGET:g} collisions per disk, the relaxation time of speeds"
     if skip is not None:
         return after_start(run, skip), f"--equilibration {skip:g}"
@@ -256,8 +256,8 @@ def unforced(source: Run | Simulation) -> np.ndarray:
 def conserved_momentum(source: Run | Simulation) -> np.ndarray:
     """Return a mask (2,) of the axes along which no force except noise changes the momentum.
 
-    Unlike the function `unforced`, this function includes the tangential forces that walls with a
-    property in `ALONG_WALLS` exert.
+    Unlike the function `unforced`, the function `conserved_momentum` includes the tangential
+    forces that walls exert in runs with a property in `ALONG_WALLS`.
     """
     walls = "walls" in source.nature and source.nature & ALONG_WALLS
     return unforced(source) & (not walls)
@@ -358,7 +358,7 @@ def has_few_observables(run: Run) -> bool:
 
 
 def kt_in_time(run: Run) -> tuple[str, np.ndarray, np.ndarray]:
-    """Return the source of the data, "observables" or "frames", and times and kT from this source.
+    """Return the source of a time series, "observables" or "frames", with its times and its kT.
 
     The source is "frames" if the run contains few samples of the observables and more frames than
     such samples.

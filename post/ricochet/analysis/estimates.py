@@ -283,10 +283,10 @@ def rounded_to_error(mean: float, error: float) -> tuple[str, ...]:
 def kurtosis_noise(count: int) -> float:
     """Return the standard deviation of `excess_kurtosis` for Maxwellian speeds.
 
-    The square x = v^2 of a Maxwellian speed v has an exponential distribution, here with mean 1.
-    To first order in deviations of sample means, a2 equals the mean of x^2 / 2 - 2 x over the
-    sample minus the expected value of x^2 / 2 - 2 x.  The variance of x^2 / 2 - 2 x is 20 / 4 + 4 *
-    1 - 2 * 4 = 1.
+    The square x = v^2 of a Maxwellian speed v has an exponential distribution, whose mean is 1 in
+    suitable units. To first order in deviations of sample means, a2 equals the mean of x^2 / 2 - 2
+    x over the sample minus the expected value of x^2 / 2 - 2 x.  The variance of x^2 / 2 - 2 x is
+    20 / 4 + 4 * 1 - 2 * 4 = 1.
 
     Parameters
     ----------

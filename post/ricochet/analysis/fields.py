@@ -1,8 +1,8 @@
 """Fields of runs in a steady state on a grid of cells, and profiles between two walls.
 
 The docstring of post/fields.py defines the fields.  Errors are computed by the jackknife over
-blocks of time of all runs.  A block of time is so long that the states at its start and at its end
-are independent.  The jackknife also removes a bias of the temperature: if flow velocity and
+blocks of time of all runs.  Each block of time is so long that the states at its start and at its
+end are independent.  The jackknife also removes a bias of the temperature: if flow velocity and
 temperature are estimated from the velocities of the same n disks, the temperature is too small by
 the fraction 1 / n.  Blocks of unequal weight are treated as in Busing, Meijer and van der Leeden,
 Statistics and Computing 9, 3 (1999).  In the shapes of arrays, C is the number of cells and G the
@@ -63,7 +63,7 @@ class Block(NamedTuple):
 
     @property
     def start(self) -> float:
-        """The time of the first frame of the block."""
+        """Time of the first frame of the block."""
         return float(self.run.time[self.frames[0]])
 
 
@@ -89,17 +89,17 @@ class Members(NamedTuple):
             root = np.sqrt(self.share / (1 - self.share) / seen.sum(axis=0))
             return np.where(seen, root * (self.values - self.mean()), 0)
 
-    def estimate(self, kinship: np.ndarray | float = 0.0) -> Estimate:
+    def estimate(self, correlation: np.ndarray | float = 0.0) -> Estimate:
         """Return the mean of the pseudo-values with its error.
 
-        The argument `kinship` is the correlation of neighbouring blocks of time: twice the sum of
-        the products d_k d_(k+1), divided by the sum of the squares d_k^2, where d_k is the
+        The argument `correlation` is the correlation of neighbouring blocks of time: twice the sum
+        of the products d_k d_(k+1), divided by the sum of the squares d_k^2, where d_k is the
         deviation of block k from the mean.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             error = np.sqrt(np.sum(self.rests() ** 2, axis=0))
             samples = 1 / np.sum(self.share**2, axis=0)
-            wider = np.sqrt((1 + kinship) / (1 - kinship / (len(self.values) - 1)))
+            wider = np.sqrt((1 + correlation) / (1 - correlation / (len(self.values) - 1)))
         return Estimate(self.mean(), wider * student(samples) * error)
 
 
@@ -166,11 +166,11 @@ def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
 
 
 def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[Block], float]:
-    """Return the blocks of time of all runs, and an upper bound of the result of `kinship`.
+    """Return the blocks of time of all runs, and an upper bound of their correlation.
 
-    The upper bound is the correlation of neighbouring blocks that would be expected if the
-    autocorrelation function were exponential; the function `kinship` defines this correlation.  If
-    there are too few blocks for an error, the upper bound is NaN.
+    The upper bound is the correlation of neighbouring blocks of time that would be expected if the
+    autocorrelation function were exponential.  If there are too few blocks for an error, the upper
+    bound is NaN.
     """
     refuse_others(runs)
     steady = [steady_frames(run, skip) for run in runs]
@@ -189,7 +189,7 @@ def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[B
     return blocks, float(np.sum(alike * (counts - 1)) / size)
 
 
-def kinship(members: Members, blocks: list[Block], most: float) -> np.ndarray:
+def block_correlation(members: Members, blocks: list[Block], most: float) -> np.ndarray:
     """Return, for each of F fields (G, F, C), the correlation (F,) of neighbouring blocks of time.
 
     A correlation is twice the sum of products of neighbouring deviations, divided by the sum of
@@ -348,7 +348,7 @@ class Fields(NamedTuple):
     values: dict[str, np.ndarray]  # (G, C) pseudo-values of the blocks
     disks: np.ndarray  # (C,) number counted in each cell
     blocks: list[Block]
-    kinship: dict[str, float]  # correlation of neighbouring blocks by name; NaN without errors
+    correlation: dict[str, float]  # of neighbouring blocks, by field; NaN without errors
 
 
 def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | None = None) -> Fields:
@@ -397,7 +397,7 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     for axis, name in enumerate(("kT_x", "kT_y")):
         values[:, NAMES.index(name)] *= run.n_disks / (run.n_disks - comoving(run)[axis])
     members = Members(values, share)
-    near = kinship(members, blocks, most)
+    near = block_correlation(members, blocks, most)
     mean, error = members.estimate(near[:, None])
     frames, disks = parts[:, :2].sum(axis=0)
     room = np.max(areas, axis=0)
@@ -448,8 +448,8 @@ def expected(
 
     The flow u is parallel to the walls, and the pressure is uniform.  The equations dT/dx =
     -(energy - shear u) / conductivity and du/dx = -shear / viscosity are integrated, where `energy`
-    and `shear` are fluxes.  If no gas can have the given fluxes, because its temperature would be
-    negative or its density above close packing, ValueError is raised.
+    and `shear` are fluxes.  If no gas can have the given fluxes, ValueError is raised; for such
+    fluxes the temperature would become negative, or the density would exceed close packing.
     """
     diameter, mass = 2 * run.radius[0], run.mass[0]
     per_disk = np.pi * diameter**2 / 4
@@ -552,7 +552,7 @@ def prediction(
     flux = fluxes(measured.blocks, axis)
     share = flux.share[:, :1]
     given = Members(np.hstack([flux.values, middle]), np.tile(share, 5))
-    near = [measured.kinship[name] for name in names]
+    near = [measured.correlation[name] for name in names]
     mean, error = given.estimate(np.array([0 * near[0]] * 3 + near))
     rest = given.rests()
     with np.errstate(divide="ignore", invalid="ignore"):

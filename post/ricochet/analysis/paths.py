@@ -11,7 +11,7 @@ BENT = "the driving bends the paths between"  # reason why paths between frames 
 
 
 class Turns(NamedTuple):
-    """Velocities after collisions, sorted by frame, then by disk, then by time."""
+    """Velocities of disks after their collisions, sorted by frame, then by disk, then by time."""
 
     frame: np.ndarray  # (M,) index of the previous frame
     disk: np.ndarray  # (M,) indices

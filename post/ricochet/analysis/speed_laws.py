@@ -135,9 +135,9 @@ def chance(found: float, drawn: np.ndarray) -> float:
     """Return the probability that a random statistic exceeds the measured statistic `found`.
 
     The argument `drawn` (S,) contains random statistics in increasing order.  The probability is
-    the fraction of the values in `drawn` that are larger than `found`.  If `found` is above the 95
-    % quantile of the random statistics, the probability follows instead from an exponential
-    distribution that is fitted to the random statistics above this quantile.
+    the fraction of the values in `drawn` that are larger than `found`.  Above the 95 % quantile of
+    the random statistics, the probability follows from an exponential distribution that is fitted
+    to the random statistics above this quantile.
     """
     first = int(len(drawn) * (1 - TAIL))
     if found <= drawn[first]:
@@ -194,8 +194,8 @@ def p_value(
     """Return the probability that a random statistic exceeds the measured statistic `found`.
 
     The argument `drawn` (DRAWN,) contains statistics of random samples of independent frames.
-    `own` is the statistical inefficiency of the measured frames, and `sizes` are the numbers of
-    frames of the runs in increasing order.
+    The argument `own` is the statistical inefficiency of the measured frames, and `sizes` contains
+    the numbers of frames of the runs in increasing order.
     """
     true = float(f"{max(1, own):.2g}")
     estimates = np.tile(noise(sizes, true, cumulative), DRAWN // NOISES)

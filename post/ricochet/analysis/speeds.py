@@ -107,8 +107,8 @@ def moment(members: Sequence[np.ndarray], power: int, independent: float) -> Est
 
     `members` contains the speeds (F, n) of n disks in F frames of each run.  The error follows from
     the time series of the mean of u^power over the disks of each frame, corrected for the scaling
-    of the speeds.  If a single run has too few frames for a time series, the error is that of a
-    sample of independent speeds, whose number is the argument `independent`.
+    of the speeds.  If a single run has too few frames for a time series, the error is calculated
+    for a sample of `independent` uncorrelated speeds.
     """
     u = np.concatenate([one.ravel() for one in members])
     mean = np.mean(u**power)

@@ -182,8 +182,8 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
 
     The means over parts of the series are transformed by a discrete cosine transform.  The squared
     standard error is the mean square of the first coefficients except the constant coefficient,
-    divided by the number of parts.  This estimate of the error is from Lazarus, Lewis, Stock and
-    Watson, Journal of Business and Economic Statistics 36, 541 (2018).  Only cosine waves whose
+    divided by the number of parts.  The error is estimated by the method of Lazarus, Lewis, Stock
+    and Watson, Journal of Business and Economic Statistics 36, 541 (2018).  Only cosine waves whose
     period is longer than the correlation length of the series are used.  Let a be the first
     coefficient of the cosine transform after the constant one, and b the root mean square of the
     following coefficients.  If the series does not drift, -a / b has Student's distribution.  The
@@ -191,9 +191,9 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
 
     The correlation length is the estimated statistical inefficiency plus the standard deviation of
     this estimate (Madras and Sokal, Journal of Statistical Physics 50, 109 (1988)).  The standard
-    deviation is added because the statistical inefficiency may be underestimated by chance; the
-    error would then be too small, and the number of degrees of freedom too large.  For an
-    anticorrelated series, the function `periodic_waves` computes the error.
+    deviation of the estimate is added, because an inefficiency that is underestimated by chance
+    would lead to an error that is too small.  For an anticorrelated series, the function
+    `periodic_waves` computes the error.
     """
     parts = cells(series, FINE)
     per_sample, lag = inefficiency_and_lag(parts, LEAST_INEFFICIENCY)

@@ -244,9 +244,9 @@ def steps(run: Run, skip: float | None = None) -> Steps:
 def over_kt(amount: np.ndarray, s: Steps, power: float) -> tuple[np.ndarray, np.ndarray]:
     """Return two series; the ratio of their means is the rate of `amount` divided by kT^power.
 
-    The factor kT^power is included in the second series, expanded to first order in the deviations
-    of kT from its mean.  If the error of the ratio of the means is estimated from both series, the
-    error therefore includes the correlation between `amount` and kT.
+    The second series includes the factor kT^power, expanded to first order in the deviations of kT
+    from its mean.  If the error of the ratio of the means is estimated from both series, it
+    includes the correlation between `amount` and kT.
     """
     kt = float(np.average(s.kt, weights=s.time))
     return amount * kt**-power, s.time * (1 + power * (s.kt / kt - 1))

@@ -133,11 +133,11 @@ def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean
 def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     """Return the sampling interval and the Helfand moments after a given time.
 
-    Each moment is reduced by its mean growth in time, so that its first and last values are 0.  The
-    moments (T, C) for the viscosity are the momentum moments xy and (xx - yy) / 2, the moment for
-    the bulk viscosity is (xx + yy) / 2, and the moments for the conductivity are the energy moments
-    x and y.  All Helfand moments are relative to the centre of mass.  If the run contains no
-    moments at equal intervals, RunError is raised.
+    The mean growth of each moment in time is subtracted, so that the first and the last value of
+    the moment are 0.  The moments (T, C) for the viscosity are the momentum moments xy and (xx -
+    yy) / 2, the moment for the bulk viscosity is (xx + yy) / 2, and the moments for the
+    conductivity are the energy moments x and y.  All Helfand moments are relative to the centre of
+    mass.  If the run contains no moments at equal intervals, RunError is raised.
     """
     allow(run, TAKES, "mixture")
     if "helfand_heat" not in run.observables:
@@ -169,9 +169,10 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
 def squares(moment: np.ndarray, lag: int) -> np.ndarray:
     """Return squares (T - lag,) of the increments of a moment (T, C) over `lag` samples.
 
-    The squares are averaged over the C components of the moment.  Because the subtracted mean
-    growth was estimated from the same series, the squares are too small by the fraction lag / (T -
-    1).  The returned squares are corrected for this fraction.
+    The squares are averaged over the C components of the moment.  The mean growth that is
+    subtracted from a moment was estimated from the same series; therefore the squares are too small
+    by the fraction lag / (T - 1).  The returned squares are corrected for the subtraction of the
+    mean growth.
     """
     gain = moment[lag:] - moment[: len(moment) - lag]
     return np.mean(gain**2, axis=1) / (1 - lag / (len(moment) - 1))

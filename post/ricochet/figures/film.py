@@ -12,7 +12,7 @@ class Film:
     """A film of a run, which a notebook displays and `save` writes to a file."""
 
     def __init__(self, run: Run, colour: str | None = None, height: int = 700):
-        """Make a film whose colours show the quantity `colour`; its height is in pixels."""
+        """Make a film with a height in pixels, whose colours show the quantity `colour`."""
         if str(SCRIPTS) not in sys.path:
             sys.path.append(str(SCRIPTS))
         import player

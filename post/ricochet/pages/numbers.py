@@ -112,8 +112,8 @@ def means(run: Run, samples: Sequence[tuple[float, ...]], energy: float) -> list
     """Return mean, error and theory of the temperature, the mean speeds and the pressure.
 
     The means are over the samples in equilibrium, and their errors include the autocorrelation.
-    Means are missing if the run does not relax to equilibrium or has too few samples yet;
-    theoretical values are missing if no theory is known.  `energy` is the present energy of all
+    Means are omitted if the run does not relax to equilibrium, or has too few samples so far;
+    theoretical values are omitted if no theory is known.  `energy` is the present energy of all
     disks.
     """
     titles = ["temperature"]

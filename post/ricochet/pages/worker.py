@@ -345,7 +345,8 @@ class Session:
             for when, what, values, _ in self.actions
             for name, value in (values.items() if what == "change" else [("", words(what, values))])
         ]
-        # Successive changes with the same description, such as drags of a side, are sent only once.
+        # If successive changes have the same description, as while the user drags a side, the
+        # description is sent only once.
         changes = [
             one
             for k, one in enumerate(changes)
@@ -491,7 +492,8 @@ def requests(wait: float | None) -> list[dict]:
 def scan(request: dict) -> None:
     """Simulate several values of an input variable, and send the result for each value.
 
-    If the simulation of a value fails, the error message is sent instead of a result.
+    If the simulation with a value of the variable fails, the error message is sent instead of a
+    result.
     """
     for index, value in enumerate(request["values"]):
         try:

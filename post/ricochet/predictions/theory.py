@@ -32,8 +32,8 @@ RELAXATION = np.transpose(
 )
 # Relaxation of a dilute mixture, from Monte Carlo solutions of the Boltzmann equation: half of the
 # disks have the mass m, and half the mass 4 m. The first list of `EQUIPARTITION` contains numbers
-# of collisions per disk. The second list contains the temperature of the heavy disks divided by the
-# temperature of the light disks, after each of these numbers of collisions.
+# of collisions per disk. The second list of `EQUIPARTITION` contains the temperature of the heavy
+# disks divided by the temperature of the light disks, after each of these numbers of collisions.
 EQUIPARTITION = np.transpose(
     [(0, 1, 2, 3, 4, 5, 6, 8), (4, 2.02, 1.455, 1.228, 1.115, 1.062, 1.031, 1.005)]
 )

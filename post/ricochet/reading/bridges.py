@@ -30,7 +30,7 @@ TOLERANCE = 1e-6  # largest |z| of a system in two dimensions, relative to the l
 CLOSED = "ff"  # word of a LAMMPS dump for an axis with walls
 #: Columns of a LAMMPS dump that have other names in Ricochet.
 NAMES = {"angular_velocity": "omegaz"}
-#: Items of a LAMMPS dump whose names are followed by further words.
+#: Items of a LAMMPS dump file in whose first lines further words follow the name of the item.
 ITEMS = ("ATOMS", "BOX BOUNDS")
 #: Columns of a LAMMPS dump that are read and that contain numbers.
 NUMBERS = {f"{axis}{end}" for axis in "xyz" for end in ("", "u", "s", "su")}
@@ -131,9 +131,9 @@ def write_gsd(
 ) -> Path:
     """Write frames to a GSD file in the schema of HOOMD-blue; the package gsd must be installed.
 
-    A GSD file has its origin at the centre of the box, stores the edges of the box in single
-    precision, and contains no walls.  Therefore the time, the corners of the box and the periodic
-    axes are also written, as the logged quantities "ricochet/time", "ricochet/lower",
+    A GSD file has the origin of the coordinates at the centre of the box, stores the edges of the
+    box in single precision, and contains no walls.  Therefore the time, the corners of the box and
+    the periodic axes are also written, as the logged quantities "ricochet/time", "ricochet/lower",
     "ricochet/upper" and "ricochet/periodic".  In the file, the step of each frame is the number of
     the frame in the run.  The programs freud, OVITO and HOOMD-blue read GSD files.
 

@@ -23,8 +23,8 @@ class ContactNetwork(NamedTuple):
     """Contacts of disks with each other and with boundaries, from collisions in a window of time.
 
     All arrays of a `ContactNetwork` have one row for each of the E contacts.  The number `j` has
-    the same meaning as in `EventLog`.  Positive values of `j` are ids of disks, and then i < j.
-    The values 0, -1, -2, ... of `j` denote boundaries.
+    the same meaning as in `EventLog`.  Positive values of `j` are ids of disks, which are larger
+    than `i`.  The values 0, -1, -2, ... of `j` denote boundaries.
     """
 
     i: np.ndarray  # (E,) id of a disk, counted from 1

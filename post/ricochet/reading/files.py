@@ -32,7 +32,7 @@ class Unsound(Exception):
 
 
 def optional_package(module: str, user: str) -> Any:
-    """Import an optional module, or raise an ImportError that tells how to install it."""
+    """Import an optional module, or raise an ImportError that states how to install the module."""
     try:
         return import_module(module)
     except ImportError:
@@ -151,7 +151,7 @@ class TemporaryFolder:
 def received(path: Path, sent_by_worker: bool) -> TemporaryFolder | None:
     """Return the folder of a run that a worker process has sent.
 
-    For a run that the parent process sent to this process, the function returns None, because the
-    parent process will remove the folder.
+    The function returns None for a run that the parent process sent to this process, because the
+    parent process will remove the folder of the run.
     """
     return TemporaryFolder(path) if sent_by_worker else None

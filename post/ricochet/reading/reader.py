@@ -507,8 +507,8 @@ def read_run(path: str | Path) -> Run:
 def open_run(path: Path, folder: object = None) -> Run:
     """Open the output file of a run.
 
-    If `folder` is given, every object that reads the file keeps a reference to `folder`, which is
-    removed only after all references have disappeared.
+    Every object that reads the file keeps a reference to `folder`, so that a temporary folder is
+    not removed while it is needed.
     """
     with open_file(path) as file:
         if DISKS not in file or "h5md" not in file:

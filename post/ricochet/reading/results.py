@@ -58,7 +58,7 @@ class Results:
         return len(self.time)
 
     def parameter(self, group: str, variable: str, default: Any = None) -> Any:
-        """Return the value of an input variable in this run, which may be its default.
+        """Return the value of an input variable in the run, or its default value if it was not set.
 
         Parameters
         ----------
@@ -109,7 +109,7 @@ class Results:
 
     @cached_property
     def _samples(self) -> int:
-        """Number of samples of the observables, counted when the run was first read."""
+        """Number of samples of the observables in the file when the run was first read."""
         with open_file(self.path) as file:
             return committed(file, "observables")
 

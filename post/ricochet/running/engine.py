@@ -30,7 +30,7 @@ def opened(make: Callable[..., int], *arguments: object) -> int:
 
 
 def called(function: Callable[..., int], *arguments: object) -> bool:
-    """Call a library function, raise an error if it fails, and return whether to call it again."""
+    """Call a library function, raise an error after a failure, and return whether to repeat it."""
     message = ctypes.create_string_buffer(ROOM)
     code = function(*arguments, message, ROOM)
     if code > 1:

@@ -56,8 +56,8 @@ def sweep(
 ) -> "pandas.DataFrame":
     """Run an input with all combinations of the given values of variables.
 
-    Finished member runs are not repeated, and interrupted member runs are continued.  A sweep that
-    was interrupted is continued by a repetition of the call with the same arguments.
+    Finished member runs are not repeated, and interrupted member runs are continued.  If a sweep
+    was interrupted, a call of `sweep` with the same arguments continues it.
 
     If the input has changed only in variables that may change when a run is resumed, such as the
     end of the run or the sampling schedule, finished member runs are extended.
@@ -68,8 +68,8 @@ def sweep(
         the input, as for `ricochet.run`
     values : mapping of str to object, or list of them
         a dictionary that contains, for each variable, a list of values or a single value; the value
-        None stands for the default value of the variable.  In the order of the member runs, the
-        first variable varies slowest.  If `values` is a list of dictionaries, `sweep` runs the
+        None stands for the default value of the variable.  The member runs are ordered such that
+        the first variable varies slowest.  If `values` is a list of dictionaries, `sweep` runs the
         combinations of values in each dictionary, so that several variables can be varied together
     folder : str or Path
         folder for the files of the member runs
@@ -285,8 +285,8 @@ def put(path: Path, text: str) -> None:
 def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
     """Return the paths of the finished and the unfinished output of a member run, or None.
 
-    While a finished run is being extended, the finished and the unfinished output exist; the member
-    run is then regarded as unfinished.
+    While a finished run is being extended, both its finished output and an unfinished output exist,
+    and the member run is regarded as unfinished.
     """
     whole, part = folder / f"{name}.h5", folder / f"{name}.h5.part"
     unfinished = part if part.is_file() else None

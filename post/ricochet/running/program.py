@@ -170,9 +170,9 @@ def whole_threads(threads: int | None) -> int:
 def find_program() -> str:
     """Return the path of the program.
 
-    If the environment variable RICOCHET is set, its value is the path of the program.  Otherwise
-    the function searches for the program in the installed package, in the folder `build` of this
-    clone, and on PATH.
+    If the environment variable RICOCHET is set, its value is the path of the program.  If RICOCHET
+    is not set, the function searches for the program in the installed package, in the folder
+    `build` of this clone, and on PATH.
     """
     root = HERE.parents[1]
     if wish := os.environ.get("RICOCHET"):

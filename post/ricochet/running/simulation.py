@@ -244,10 +244,10 @@ class Simulation(State):
             number of events (collisions of any kind); `advance` never ends between simultaneous
             events
         on_event : callable, optional
-            function that is called with an `Event` after each event.  The function may read and
-            change the simulation, which is in the state just after the event.  If the function
-            returns a true value, `advance` ends after all events that are simultaneous with this
-            event.  If `on_event` is given, each event takes about 20 microseconds
+            function that is called with an `Event` after each event.  The function `on_event` may
+            read and change the simulation, which is in the state just after the event.  If
+            `on_event` returns a true value, `advance` ends after all events that are simultaneous
+            with this event.  If `on_event` is given, each event takes about 20 microseconds
 
         Returns
         -------

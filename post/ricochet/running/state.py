@@ -183,8 +183,8 @@ class State(Session):
     def image(self) -> np.ndarray:
         """Number of box lengths that each disk has moved across periodic sides, (N, 2).
 
-        If the box lengths that a disk has moved across periodic sides are added to its positions,
-        the positions form a continuous path.  If no side is periodic, AttributeError is raised.
+        To obtain a continuous path of a disk, add to its positions the box lengths that it has
+        moved across periodic sides.  If no side is periodic, AttributeError is raised.
         """
         return self._column("image")
 
@@ -337,7 +337,7 @@ class State(Session):
 
 
 def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return a table of all obstacles or walls if a row of the input defines several of them.
+    """Return a table of all obstacles or walls if one row of the input defines several of them.
 
     A row defines several obstacles or walls if the row contains the variable `file` or `points`.
     In a row that defines several obstacles or walls, the coordinates are replaced by NaN.  If each
