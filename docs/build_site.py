@@ -80,7 +80,7 @@ def sources() -> dict[str, str]:
 
 
 class Stage:
-    """The folder with the sources of the site."""
+    """Folder that receives the sources of the documentation site."""
 
     def __init__(self, folder: Path) -> None:
         """Store the folder for the sources; its earlier files remain until `tidy` is called."""
@@ -325,7 +325,7 @@ def escaped(text: str) -> str:
 
 
 def prose(description: str) -> str:
-    """Return the description of a script as Markdown; indented lines are code."""
+    """Convert the description of a script to Markdown; indented lines become code."""
     paragraphs = re.split(r"\n\s*\n", description.strip())
     code = [paragraph.startswith("    ") for paragraph in paragraphs]
     return "\n\n".join(

@@ -58,7 +58,7 @@ def mathml(self: Any, node: Any, display: str) -> None:
 
 
 def without_aliases(app: Any, kind: str, name: str, *rest: Any) -> None:
-    """Remove the text "Alias for field number" of fields of named tuples."""
+    """Remove the generated text "Alias for field number" from the pages about named tuples."""
     lines = rest[-1]
     if lines and lines[0].startswith("Alias for field number"):
         lines[:] = []

@@ -39,12 +39,13 @@ agree.  `D_time` is the time in which sound crosses the box, but at most an eigh
 of the run.  D is calculated only for a periodic box and equally spaced frames.
 
 The second Sonine coefficient is a2 = <v^4> / (2 <v^2>^2) - 1, where the speeds v of each species
-are divided by the thermal speed of the species.  The coefficient a2 is 0 in equilibrium, and -1/2 if all speeds are
-equal. The structure factor is S(k) = <|sum of exp(i k x)|^2> / N.  The bond-orientational order
-parameter psi6 of a disk is the mean of exp(6 i theta) over its Delaunay neighbours.  In the table,
-`local` is the mean modulus of psi6, and `global` is the modulus of the mean of psi6; `global` is 1
-in a perfect triangular crystal. The correlation function g6(r) = <psi6*(0) psi6(r)> decays
-exponentially in a fluid and as a power of r in a hexatic phase, and does not decay in a crystal.
+are divided by the thermal speed of the species.  The coefficient a2 is 0 in equilibrium, and -1/2
+if all speeds are equal. The structure factor is S(k) = <|sum of exp(i k x)|^2> / N.  The
+bond-orientational order parameter psi6 of a disk is the mean of exp(6 i theta) over its Delaunay
+neighbours.  In the table, `local` is the mean modulus of psi6, and `global` is the modulus of the
+mean of psi6; `global` is 1 in a perfect triangular crystal. The correlation function g6(r) =
+<psi6*(0) psi6(r)> decays exponentially in a fluid and as a power of r in a hexatic phase, and does
+not decay in a crystal.
 """
 
 from itertools import combinations_with_replacement, cycle
@@ -124,7 +125,7 @@ def bins(run: Run) -> dict[str, np.ndarray]:
 
 
 def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Curve]]:
-    """Return psi6 of each run, and the structure of all disks and of each pair of species."""
+    """Return psi6 of each run, and structure functions of all disks and of pairs of species."""
     some = [evenly(run, own) for run, own in zip(runs, frames, strict=True)]
     psi = {(r.path, k): bond_order(r, k) for r, own in zip(runs, some, strict=True) for k in own}
     each = [[psi[run.path, k] for k in own] for run, own in zip(runs, some, strict=True)]

@@ -3,10 +3,11 @@
     python post/cost.py runs/cost/*.h5 -o cost.png --csv cost.csv
 
 Each output file contains the number of collisions per second of processor time.  If several runs
-are equal, the script uses the fastest run.  The lines are power laws, which are fitted to the
-points with numbers of disks N in the range of --fit.  Below the range of --fit, the cost of the
-collision itself is not small compared with the cost of the search for the next event.  Above the
-range of --fit, the data of the disks do not fit into the caches of the processor.
+have the same method and number of disks, the script uses the fastest of them.  The lines are power
+laws, which are fitted to the points with numbers of disks N in the range of --fit.  Below the range
+of --fit, the cost of the collision itself is not small compared with the cost of the search for the
+next event.  Above the range of --fit, the data of the disks do not fit into the caches of the
+processor.
 """
 
 from ricochet import Run

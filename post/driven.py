@@ -30,7 +30,8 @@ by a hole (after Eggers 1999).  The floor moves with a sawtooth motion.
 
 --show viscosity: viscosity of a sheared box (box.shear_rate), which is -P_xy divided by the shear
 rate.  The component P_xy of the pressure tensor includes the kinetic and the collisional part, and
-is averaged over the time between two samples of the observables.  The disks may be inelastic.
+is averaged over the time between two samples of the observables.  The viscosity is also measured if
+the disks are inelastic.
 
 --show cluster: fraction of the disks in the largest cluster.  Two disks belong to the same cluster
 if the gap between them is smaller than a tenth of the mean diameter.

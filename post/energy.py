@@ -11,8 +11,8 @@ the start and each time.  The conserved quantity is the total energy or, if ener
 total + dissipated - heat - work - drive.
 
 The conservation of energy does not depend on the time step: between collisions the disks follow
-exact parabolas, and every collision conserves energy, so all changes are rounding errors.  The
-error of large time steps is that collisions are missed; the script missed.py counts missed
+exact parabolas, and every collision conserves energy, so all changes are rounding errors.  With
+large time steps, the error is that collisions are missed, and the script missed.py counts missed
 collisions.
 
 The table contains three numbers for each run: the drift, the spread and the largest change of the

@@ -9,14 +9,14 @@ can reach).  The flow velocity u is the mass-weighted mean of v.  With the relat
 u, kT is the mean of m c^2 / 2, and kT_x and kT_y are the means of m c_x^2 and m c_y^2. If disks can
 rotate, kT_rot is the mean of I omega^2. The kinetic part of the stress is the sum of m c_a c_b per
 area, and the kinetic part of the heat flux is the sum of m c^2 c / 2 per area.  The collisional
-parts of stress and heat flux are not included.  Within a cell, u is interpolated linearly from the
-neighbouring cells.  The averages include the frames after the first X collisions per disk, where X
-is the value of --equilibration, or by default the frames in the second half of each run.  Errors
-are determined from the differences between blocks of time, taken from all runs of one input
-(docs/explanation/statistics.md).  If a cell contained disks in fewer than two blocks, only its
-density is calculated.  The table contains kT, stress and heat flux only for cells in which at least
-three disks remain if any one block of time is left out.  With --species, the fields of one species
-are calculated, relative to the mean flow of that species.
+parts of stress and heat flux are not included.  Within a cell, the flow velocity u is interpolated
+linearly from the neighbouring cells.  The averages include the frames after the first X collisions
+per disk, where X is the value of --equilibration, or by default the frames in the second half of
+each run.  Errors are determined from the differences between blocks of time, taken from all runs of
+one input (docs/explanation/statistics.md).  If a cell contained disks in fewer than two blocks,
+only its density is calculated.  The table contains kT, stress and heat flux only for cells in which
+at least three disks remain if any one block of time is left out.  With --species, the fields of one
+species are calculated, relative to the mean flow of that species.
 
 With --grid, the script also draws the stream function psi of the particle flux j = n u, where j_x =
 d psi / dy and j_y = -d psi / dx.  The contour lines of psi are the streamlines of the mean flow.
@@ -26,13 +26,13 @@ alone causes a chi^2 above 5.99 in 5 % of the cells.
 
 For equal disks between two walls, dashed lines show predicted profiles without fitted parameters.
 A profile is calculated from the measured temperature and flow in the middle of the box, and from
-the measured fluxes of momentum and energy at the walls.  The calculation uses Enskog's viscosity
-and thermal conductivity (Gass 1971) and the equation of state.  The band shows the error of the
-predicted profile, which follows from the errors of the measured values.  At a packing fraction of
-0.2 the true viscosity is 0.98 to 1.00 times Enskog's viscosity, and the true thermal conductivity
-is 1.03 to 1.05 times Enskog's conductivity.  Squares show the temperatures and velocities of the
-walls.  The table contains the predicted differences of temperature and velocity between each wall
-and the gas next to the wall.
+the measured fluxes of momentum and energy at the walls.  The predicted profiles are calculated with
+Enskog's viscosity and thermal conductivity (Gass 1971) and with the equation of state.  The band
+shows the error of the predicted profile, which follows from the errors of the measured values.  At
+a packing fraction of 0.2 the true viscosity is 0.98 to 1.00 times Enskog's viscosity, and the true
+thermal conductivity is 1.03 to 1.05 times Enskog's conductivity.  Squares show the temperatures and
+velocities of the walls.  The table contains the predicted differences of temperature and velocity
+between each wall and the gas next to the wall.
 """
 
 import argparse

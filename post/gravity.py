@@ -18,9 +18,9 @@ near the floor.  If sum_j pi s_ij^2 n_j(h), calculated for point particles, exce
 floor, no dashed line is drawn for the heights.
 
 The slopes are maximum-likelihood estimates of the decay constants of exponential distributions.
-The fits use kinetic energies between 0 and 5 kT, and values of m g h between 1 and 5 kT.  The
-heights below 1 kT are left out, because the finite size of the disks flattens the distribution
-there.  The errors of the slopes follow from the jackknife over ten blocks of time.
+The fits use kinetic energies between 0 and 5 kT, and values of m g h between 1 and 5 kT.  Heights
+with m g h below 1 kT are left out, because the finite size of the disks flattens the distribution
+near the floor.  The errors of the slopes follow from the jackknife over ten blocks of time.
 """
 
 from typing import NamedTuple
@@ -108,7 +108,7 @@ def slope_of(values: np.ndarray, reach: tuple[float, float], laws: np.ndarray) -
 
 
 def blocks_of(frames: int) -> list[np.ndarray]:
-    """Return the frames of each block of time."""
+    """Return the frames that belong to each block of time."""
     return np.array_split(np.arange(frames), BLOCKS)
 
 
@@ -182,7 +182,7 @@ def crowding(run: Run, species: list[Samples], kt: float) -> float:
 
 
 def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Return the accessible heights and the corrected densities, or NaN at large excluded area."""
+    """Return the heights that centres can reach, and densities (NaN at large excluded area)."""
     free = run.edges - 2 * species[0].radius
     grid = np.linspace(0, free[1], 4001)
     if crowding(run, species, kt) > CROWDED:

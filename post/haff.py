@@ -14,15 +14,15 @@ For unequal disks the initial collision rate w0 is measured from the first colli
 and the exponential law assume that all species have the same temperature; this assumption is wrong
 if the masses are very different.
 
-The cooling rate is -d ln K / d tau, where tau is the number of collisions per disk.  The rate is
-averaged over two collisions per disk and over the runs.  If the measured cooling rate falls below
-90 % of the predicted rate at some tau and stays below this limit, the homogeneous state is assumed
-to end at this tau.  The curves are pale at values of tau after the end of the homogeneous state.
-For several runs, the tau at the end of the homogeneous state is printed with an error.  The column
-`rate` is the rate determined by a linear fit to ln K.  The fit to ln K begins at tau = 2, and ends
-at half of the tau at which the homogeneous state ends.  If the gas stays homogeneous until the end
-of the run, the fit includes all data later than tau = 2.  The error of `rate` is determined from
-the scatter of the runs.
+The cooling rate is -d ln K / d tau, where tau is the number of collisions per disk.  The cooling
+rate is averaged over two collisions per disk and over the runs.  If the measured cooling rate falls
+below 90 % of the predicted rate at some tau and stays below this limit, the homogeneous state is
+assumed to end at this tau.  The curves are pale at values of tau after the end of the homogeneous
+state.  For several runs, the tau at the end of the homogeneous state is printed with an error.  The
+column `rate` contains the cooling rate, determined by a linear fit to ln K.  The fit to ln K begins
+at tau = 2, and ends at half of the tau at which the homogeneous state ends.  If the gas stays
+homogeneous until the end of the run, the fit includes all data later than tau = 2.  The error of
+`rate` is determined from the scatter of the runs.
 
 If the restitution depends on velocity (contact.restitution_law), K is compared with another law,
 which assumes a Maxwell distribution of velocities (docs/explanation/laws.md).  If the restitution

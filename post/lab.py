@@ -66,7 +66,7 @@ async def open_lab(lab: Lab, port: int, visit: bool) -> None:
 
 
 def port(text: str) -> int:
-    """Convert a text to a port number."""
+    """Convert a text on the command line to a port number."""
     if not text.isdecimal() or int(text) > 65535:
         raise ArgumentTypeError(f"'{text}' is not a port: allowed are 0 (any free port) to 65535")
     return int(text)

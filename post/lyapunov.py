@@ -50,8 +50,8 @@ def distance(one: Run, other: Run) -> np.ndarray:
 def divergence(time: np.ndarray, apart: np.ndarray, largest: float, begin: float) -> Divergence:
     """Fit straight lines to the logarithms of the distances of P pairs of runs at T times.
 
-    The fits end at the time at which the first distance reaches `largest`.  `begin` is the ratio of
-    the start time to the end time of the fits.
+    The fits end at the time at which the first distance reaches `largest`.  The argument `begin` is
+    the ratio of the start time to the end time of the fits.
     """
     with np.errstate(divide="ignore"):
         logarithm = np.log(apart)

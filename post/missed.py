@@ -82,8 +82,8 @@ def rate_and_temperature(run: Run, skip: float | None) -> tuple[SeriesMean, floa
 def missed_of_pairs(rates: list[SeriesMean], exact: list[SeriesMean]) -> Estimate:
     """Return the fraction of missed collisions, determined from pairs of runs with equal seeds.
 
-    The error is determined from the scatter of the pairs.  For a single pair of runs, the error is
-    determined from the fluctuations of the collision rates of both runs.
+    The error is determined from the scatter of the results of the pairs of runs.  For a single pair
+    of runs, the error is determined from the fluctuations of the collision rates of both runs.
     """
     shares = [1 - one.mean / other.mean for one, other in zip(rates, exact, strict=True)]
     if rates == exact:

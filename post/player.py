@@ -153,10 +153,10 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
 def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[str, np.ndarray]]:
     """Return collisions per disk in each frame and, unless the log is too long, events and paths.
 
-    For each event, the function returns the time and the two partners.  The paths are described by
-    the number of velocity changes in each interval between frames.  For each velocity change, the
-    description of the paths contains the disk, the time as a fraction of the interval, and the new
-    velocity.
+    For each event in the log, the function returns the time and the two partners of the collision.
+    Paths of disks are described by the number of velocity changes in each interval between frames.
+    For each velocity change, the description of the paths contains the disk, the time as a fraction
+    of the interval, and the new velocity.
     """
     exact, facts = run.n_disks <= FEW_DISKS, {"known": False, "events": False}
     try:
@@ -244,7 +244,7 @@ def curves(run: Run) -> dict:
 
 
 def scene(run: Run) -> tuple[dict, dict]:
-    """Return the data of a film that do not change: box, obstacles, species and disks.
+    """Return the constant data of a film: the box, the obstacles, the species and the disks.
 
     The argument `run` is a `Run`, or another object with those attributes of `Run` that the
     function uses.
@@ -392,7 +392,7 @@ def filled(name: str, fillings: dict[str, str]) -> str:
 
 
 def text_of(name: str) -> str:
-    """Return the text of a file that is a part of the page."""
+    """Return the text of a style, script or template file from which pages are made."""
     return (PAGE / name).read_text(encoding="utf-8")
 
 

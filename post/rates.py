@@ -18,9 +18,9 @@ w_ij.  The rate w_ij is the rate at which a disk of species i collides with disk
 free path of a disk in a frame is the distance between its last collision before the frame and its
 first collision after the frame.  Each free path is weighted with the inverse of its duration,
 because long paths occur in more frames than short paths.  The errors are determined from the
-scatter of the runs or, for a single run, from the scatter of blocks of frames.  The line shows the
-prediction for equal disks and molecular chaos (Boltzmann, Enskog).  Free paths are not defined for
-driven disks, whose velocities change between collisions.
+scatter of the runs or, for a single run, from the scatter of blocks of frames.  In the panel of
+free paths, the line shows the prediction for equal disks and molecular chaos (Boltzmann, Enskog).
+Free paths are not defined for driven disks, whose velocities change between collisions.
 
 If the disks lose energy, or if the walls have different temperatures, the script analyses only the
 free paths.  The analysis of free paths uses the frames after the first X collisions per disk, where
@@ -134,10 +134,11 @@ def mean_and_density(
 ) -> tuple[Estimate, Estimate] | None:
     """Return the mean free path and the probability density of reduced free paths.
 
-    The result is None if the run has no event log.
+    The function returns None if the run has no event log.
 
-    A reduced path is the length of a path divided by the mean free path.  Errors are determined
-    from the scatter of the runs or, for a single run, from the scatter of blocks of frames.
+    A reduced free path is the length of a free path divided by the mean free path.  Errors are
+    determined from the scatter of the runs or, for a single run, from the scatter of blocks of
+    frames.
     """
     parts = [free_paths(run, skip) for run in runs if td.has_log(run)]
     if not parts or sum(len(path) for path, _ in parts) == 0:

@@ -3,10 +3,11 @@
     python post/scatterers.py 100000 0.01 --radius 0.9 --seed 1 -o scatterers.txt
 
 The file can be used as `obstacle.file` of an input.  The centres are independent and uniformly
-distributed in a square from (0, 0) to (L, L); therefore circles can overlap.  The density n is the
-number of circles per unit of area.  The script prints L = sqrt(number / density), which must be
-used for both components of `box.upper`; all sides of the box must be periodic.  The theory of the
-Lorentz gas uses the reduced density n R^2, where R is the sum of the radii of tracer and circle.
+distributed in a square from (0, 0) to (L, L); therefore circles can overlap.  The density n of the
+obstacles is the number of circles per unit of area.  The script prints L = sqrt(number / density),
+which must be used for both components of `box.upper`; all sides of the box must be periodic.  The
+theory of the Lorentz gas uses the reduced density n R^2, where R is the sum of the radii of tracer
+and circle.
 """
 
 import argparse

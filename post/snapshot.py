@@ -68,7 +68,7 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
         beyond = {"psi6": "neither", "spin": "both"}.get(colour, "both" if args.log else "max")
         bar = {"label": drawing.label_of(run, colour), "extend": beyond}
     longest = max(float(np.max(run.speed(frame))) for frame in frames) or 1.0
-    # The longest arrow is as long as a tenth of the box.
+    # The longest velocity arrow is as long as a tenth of the box.
     arrows = {"angles": "xy", "scale_units": "xy", "scale": longest / (0.1 * run.edges.max())}
     arrows |= {"width": 0.005, "zorder": 4, "color": "0.2"}
     if colour == "species":  # darker shades of the colours of the disks, for contrast
@@ -83,7 +83,7 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
             style = {"facecolors": drawing.species_colours(run)}
         else:
             norm = scale(values[k], args.log, colour) if args.per_frame else whole
-            # A logarithmic scale cannot show 0.
+            # A logarithmic colour scale cannot show the value 0.
             seen = np.maximum(values[k], norm.vmin) if args.log else values[k]
             style = {"array": seen, "norm": norm, "cmap": drawing.colour_map(colour)}
         disks = drawing.disk_collection(axes, run, run.position[frames[k]], **style)

@@ -148,7 +148,7 @@ def pooled(
 
 
 class Scale(NamedTuple):
-    """Axis of speeds: the thermal speed in the units of the axis, and the label of the axis."""
+    """Axis of speeds, with its label and with the thermal speed in units of the axis."""
 
     thermal: float = 1.0  # sqrt(2 kT / m), or 1
     label: str = "speed $u = v\\,/\\,\\sqrt{2kT/m}$"

@@ -5,18 +5,18 @@
 The disks must be elastic, and the box must be periodic.  Runs with equal packing fraction are
 combined.  The output files must contain the Helfand moments of momentum and energy
 (output.helfand).  About four samples of the observables are required per mean free time
-(output.observables_every_time).  For D the frames must be equally spaced in time.  For mixtures the
-script computes only the viscosities, because the diffusion of the species also transports energy,
-and because D differs between species (see correlations.py).
+(output.observables_every_time).  For the diffusion coefficient D, the frames must be equally spaced
+in time.  For mixtures the script computes only the viscosities, because the diffusion of the
+species also transports energy, and because D differs between species (see correlations.py).
 
 The small panels show the coefficients as functions of the lag, divided by Enskog's coefficients.  A
 viscosity or the conductivity is half of the slope, between neighbouring lags, of the mean square
-change of a Helfand moment against the lag.  D is half the integral of <v(0) v(s)> from 0 to the
-lag.  Bands show the errors, determined from the scatter of the runs.  The right panel and the table
-contain means over the lags from t/2 to t; their errors account for the autocorrelation.  For
-viscosities and conductivity, the lag t is 20 mean free times, or longer if heavy disks decorrelate
-slowly, but at most an eighth of the duration of the run.  For D, the lag t is the time in which
-sound crosses the box, as in correlations.py.
+change of a Helfand moment against the lag.  The diffusion coefficient D is half the integral of
+<v(0) v(s)> from 0 to the lag.  Bands show the errors, determined from the scatter of the runs.  The
+right panel and the table contain means over the lags from t/2 to t; their errors account for the
+autocorrelation.  For viscosities and conductivity, the lag t is 20 mean free times, or longer if
+heavy disks decorrelate slowly, but at most an eighth of the duration of the run.  For D, the lag t
+is the time in which sound crosses the box, as in correlations.py.
 
 Enskog's coefficients are calculated after Gass (1971), and for mixtures after Lopez de Haro, Cohen
 and Kincaid (1983).  The value of the pair correlation function at contact is taken from Henderson

@@ -33,8 +33,8 @@ TABLE
 "$python" post/transport.py "${transport[@]}" -o "$figures/transport.png" \
   --csv "$figures/transport.csv"
 
-# The arguments of the function are the system, the quantity that the figure shows, the name of the run for the film, and the
-# options of ensemble.sh that define the runs.
+# The arguments of the function are the system, the quantity that the figure shows, the name of the run for the film, and options of
+# ensemble.sh that define the runs.
 while read -r system show film scan; do
   runs/ensemble.sh "input/$system.nml" -d "$data/$system" --seeds 1-4 ${scan:+--scan "$scan"} "$@"
   "$python" post/driven.py "$data/$system"/*.h5 --show "$show" -o "$figures/$system.png" \

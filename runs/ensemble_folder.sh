@@ -24,8 +24,8 @@ put() {
   fi
 }
 
-# Sets `last_line` to the last line of the log of member NAME. The function starts no other process, because a process for each of
-# up to 100 000 member runs would take too much time.
+# Sets `last_line` to the last line in the log file of the member run NAME. The function starts no other process, because a process
+# for each of up to 100 000 member runs would take too much time.
 read_last_line() {
   local lines=()
   last_line=''
@@ -34,7 +34,7 @@ read_last_line() {
   ((${#lines[@]} == 0)) || last_line=${lines[-1]}
 }
 
-# Prints the last line of the log of member NAME.
+# Prints the last line in the log file of the member run NAME.
 last_words() {
   local last_line
   read_last_line "$1"

@@ -3,8 +3,8 @@
 # each.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# Frames are written every half collision per disk, which is frequent enough to show the relaxation. The histogram uses every tenth
-# frame.
+# Frames are written every half collision per disk, which is frequent enough to show the relaxation. The histogram contains the
+# speeds of every tenth frame.
 for count in 1000 2000; do
   runs/ensemble.sh input/gas.nml -d "$data" --scan "species.gas.count=$count" --seeds 1-4 \
     --set stop.collisions_per_disk=65 --set "output.frames_every_collisions=$((count / 4))" \

@@ -3,11 +3,11 @@
 #
 # Between the packing fractions 0.70 and 0.72, crystals melt and liquids freeze very slowly. Therefore the runs of 64^2 disks start
 # from a crystal of which about half has melted at a packing fraction of 0.66. There are two starting states: slightly less than
-# half of the crystal has melted in one, and slightly more than half in the other. If the starting state affects the results, the
-# runs from the two starting states yield different results. The runs of 128^2 disks start from four copies of the final state of
-# 64^2 disks, with new velocities. The script takes several minutes. The pressure P* near melting is then correct to 0.1, and
-# warnings name the packing fractions at which the two starting states yield different results. With FULL=1 the script performs
-# longer runs, and also runs of 256^2 disks, which takes about eight hours of processor time.
+# half of the crystal has melted in one, and slightly more than half in the other. The two starting states reveal whether the
+# results depend on the starting state. The runs of 128^2 disks start from four copies of the final state of 64^2 disks, with new
+# velocities. Without FULL=1, the script takes several minutes. The pressure P* near melting is then correct to 0.1, and warnings
+# name the packing fractions at which the two starting states yield different results. With FULL=1 the script performs longer runs,
+# and also runs of 256^2 disks, which takes about eight hours of processor time.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 if [[ -n ${FULL:-} ]]; then

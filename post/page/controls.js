@@ -231,7 +231,7 @@ function diskAt(px, py, distance) {
   return nearest;
 }
 
-// Shows the trace of the disk nearest to a point of the canvas, or no trace if no disk is near.
+// Shows the path of the disk nearest to a point of the canvas, or no path if no disk is near.
 function pick(px, py) {
   const i = diskAt(px, py, 12);
   trace(i === null ? [] : [i]);

@@ -152,8 +152,8 @@ function flights(i, from, to) {
   return result;
 }
 
-// Calls `action` for the speed of each disk in each frame received so far. If there are very many frames, only a part of the frames
-// is used. Returns the number of frames whose speeds were passed to `action`.
+// Calls `action` for the speed of each disk in each frame received so far. If there are very many frames, the speeds of only a part
+// of the frames are used. Returns the number of frames whose speeds were passed to `action`.
 function eachSpeed(action) {
   const some = Math.ceil((moment.frame + 1) * disks / 2e6);
   let samples = 0;

@@ -116,8 +116,8 @@ function round(low, high) {
   return values;
 }
 
-// Plots curves { time, values, colour, dash, letter } against time. The vertical axis includes 0. The part of each curve after the
-// time `now` is pale, and null values leave gaps. The function returns another function, which converts times to pixels.
+// Plots the curves { time, values, colour, dash, letter } against time. The vertical axis includes 0. The part of each curve after
+// the time `now` is pale, and null values leave gaps. The function returns another function, which converts times to pixels.
 function plotLines(canvas, lines, now) {
   const range = lines.map(({ time }) => [time[0], time.at(-1)]), start = Math.min(...range.map(([t]) => t));
   const end = Math.max(...range.map(([, t]) => t)), plot = prepare(canvas), { pen } = plot;
@@ -159,8 +159,8 @@ function setBins(most, resting) {
   film.speeds = { rest, edges: Array.from({ length: 41 }, (_, k) => rest ? most * 10 ** (k / 10 - 4) : most * k / 40) };
 }
 
-// Returns the fraction of the disks of each species in each bin of the histogram. The fractions are calculated for the time shown,
-// or as means over all frames received so far.
+// Returns the fraction of the disks of each species in each bin of the histogram. The fractions of disks are calculated for the
+// time shown, or as means over all frames received so far.
 function speedsNow() {
   const { edges, rest } = film.speeds, bins = edges.length - 1, width = edges[1] - edges[0];
   const bin = speed => rest ? speed > 0 ? Math.max(1, upTo(edges, speed)) : 0 : Math.floor(speed / width);

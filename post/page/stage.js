@@ -242,9 +242,9 @@ function drawDisk(x, y, radius, colour, stripes, [left, top, right, bottom]) {
   }
 }
 
-// Returns the new value of a pixel at the rim of a disk. The argument `covered` is the fraction of the pixel that the disk covers,
-// expressed by a number from 0 to 255. If several disks cover parts of the pixel, their colours are mixed and the covered fractions
-// are added.
+// Returns the new colour of a pixel at the rim of a disk, which the disk covers partly. The argument `covered` is the fraction of
+// the pixel that the disk covers, expressed by a number from 0 to 255. If several disks cover parts of the pixel, their colours are
+// mixed and the covered fractions are added.
 function painted(old, colour, covered) {
   const there = old >>> 24;
   if (there === 0) return colour & 0xffffff | covered << 24;

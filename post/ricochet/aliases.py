@@ -17,7 +17,7 @@ FOLDERS = ("reading", "running", "predictions", "analysis", "figures", "pages")
 
 
 def modules() -> dict[str, str]:
-    """Return the full name of each module; the keys of the dictionary are the short names."""
+    """Return a dictionary from the short name of each module to its full name."""
     paths = (path for folder in FOLDERS for path in sorted((HERE / folder).glob("[!_]*.py")))
     return {path.stem: f"{__package__}.{path.parent.name}.{path.stem}" for path in paths}
 

@@ -100,7 +100,7 @@ OPTIONS = {
 }
 
 
-#: Option names of earlier versions, with the present names.
+#: Option names of earlier versions, each with the present name of the option.
 RENAMED = {"--skip": "--equilibration", "--apart": "--min-separation", "--wave": "--wavenumber"}
 #: Alternative spellings of option names.
 SPELLINGS = {"colour": ["--color"]}
@@ -180,11 +180,12 @@ def command_line(
 ) -> Parser:
     """Return a command-line parser, whose help text is the docstring `doc` of the script.
 
-    The script accepts a single run if `one` is true, and any number of runs otherwise.  `output` is
-    the default name of the output file.  Duplicate runs are ignored unless `repeated` is true.
-    Unfinished runs are ignored, except in a script that sets the parser default `paired` to true.
-    If `csv` is true, the script has the option --csv.  Each further keyword argument names one of
-    the `OPTIONS` and specifies its default.  None means that the option has no default.
+    The script accepts a single run if `one` is true, and any number of runs otherwise.  The
+    argument `output` is the default name of the output file.  Duplicate runs are ignored unless
+    `repeated` is true.  Unfinished runs are ignored, except in a script that sets the parser
+    default `paired` to true.  If `csv` is true, the script has the option --csv.  Each further
+    keyword argument names one of the `OPTIONS` and specifies its default.  The default None means
+    that the option has no default value.
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
@@ -229,7 +230,7 @@ def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | No
 
 
 def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
-    """Return the selected frames (--frames) in the steady state with the required separation.
+    """Return the selected frames (--frames) that are in the steady state and far enough apart.
 
     If no frame of --frames is in the steady state, the last frame is returned.  The function adds a
     warning to `args.notes` if some requested frames are not used, or if the speeds in the first
@@ -303,9 +304,9 @@ def report(
 ) -> None:
     """Print the tables, save the figure, and write a table to the file of --csv.
 
-    The file of --csv contains the table `data` or, if `data` is None, the first table.  `notes` are
-    warnings about the numbers.  All warnings are written to stderr and on the figure, including
-    warnings about runs that ended early.
+    The file of --csv contains the table `data` or, if `data` is None, the first table.  The
+    argument `notes` contains warnings about the numbers.  All warnings are written to stderr and on
+    the figure, including warnings about runs that ended early.
     """
     if any(tables):
         print("\n\n".join(text_of(table) for table in tables if table), flush=True)

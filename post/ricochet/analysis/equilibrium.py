@@ -318,13 +318,13 @@ def free_disks(run: Run) -> float:
 
 
 def drift(run: Run) -> np.ndarray:
-    """Return the velocity (2,) of the centre of mass; components that vary are set to 0."""
+    """Return the velocity (2,) of the centre of mass; components that vary in time are set to 0."""
     centre = np.average(run.velocity[0], axis=0, weights=run.mass)
     return np.where(comoving(run), centre, 0.0)
 
 
 def kt_of(run: Run, energy: np.ndarray) -> np.ndarray:
-    """Return kT for total kinetic energies `energy`, an array of any shape.
+    """Convert total kinetic energies `energy`, an array of any shape, to kT.
 
     The page docs/explanation/laws.md explains when to divide the energy by N and when by N - 1.
     """

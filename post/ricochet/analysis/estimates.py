@@ -47,7 +47,7 @@ class Curve(NamedTuple):
 
 
 class LawTest(NamedTuple):
-    """Result of comparing a sample with a distribution."""
+    """Result of a test that compares a sample with a distribution."""
 
     n: int  # number of independent values
     ks: float  # Kolmogorov-Smirnov distance, the largest between the two distribution functions

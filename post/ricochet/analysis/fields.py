@@ -192,12 +192,12 @@ def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[B
 def block_correlation(members: Members, blocks: list[Block], most: float) -> np.ndarray:
     """Return, for each of F fields (G, F, C), the correlation (F,) of neighbouring blocks of time.
 
-    A correlation is twice the sum of products of neighbouring deviations, divided by the sum of
-    squared deviations.  The correlation of a field is computed from sums over all cells together,
-    because the blocks are too few for an estimate in a single cell.  The correlations are limited
-    to the range from 0 to `most`.  For the flow, the lower limit of the range is `FLOW_LEAST`
-    instead of 0, because neighbouring blocks of the flow can be anticorrelated: the flow is the
-    rate of change of a bounded displacement.
+    The correlation is twice the sum of products of the deviations of neighbouring blocks from the
+    mean, divided by the sum of squared deviations.  The correlation of a field is computed from
+    sums over all cells together, because the blocks are too few for an estimate in a single cell.
+    The correlations are limited to the range from 0 to `most`.  For the flow, the lower limit of
+    the range is `FLOW_LEAST` instead of 0, because neighbouring blocks of the flow can be
+    anticorrelated: the flow is the rate of change of a bounded displacement.
     """
     least = np.array([FLOW_LEAST if name.startswith("flow") else 0.0 for name in NAMES])
     size, same = len(blocks), [a.run is b.run for a, b in pairwise(blocks)]

@@ -29,7 +29,7 @@ def why_unknown(run: Run, log: EventLog) -> str:
 
 
 def seen(run: Run, log: EventLog, frames: list[int]) -> np.ndarray:
-    """Return the number of events in the event log before each frame, (T,)."""
+    """Return the number (T,) of events in the event log before each frame."""
     if run.event_count is None:
         return np.searchsorted(log.time, run.time[frames], "right")
     # The number of events before a frame follows from the event counts of all disks, even if

@@ -38,7 +38,7 @@ TAIL = 0.05  # fraction of the samples that an exponential tail replaces
 
 
 class SpeedTest(NamedTuple):
-    """Result of comparing speeds with the expected distribution."""
+    """Result of a test that compares speeds with the expected distribution."""
 
     law: str  # "fixed_energy" (N disks share a fixed energy), or "Maxwell"
     independent: float  # number of independent speeds
@@ -110,8 +110,8 @@ def sample_of(run: Run, name: str, frames: int) -> Sample:
 def statistics_of(values: np.ndarray) -> np.ndarray:
     """Compare S samples (S, n) with the uniform distribution; return n D^2 and chi^2, (2, S).
 
-    The uniform distribution is over the interval from 0 to 1.  D is the Kolmogorov-Smirnov
-    distance.
+    The uniform distribution is over the interval from 0 to 1.  D is the Kolmogorov-Smirnov distance
+    between a sample and the uniform distribution.
     """
     samples, n = values.shape
     ranks, ordered = np.arange(n) / n, np.sort(values, axis=1)
@@ -149,9 +149,10 @@ def chance(found: float, drawn: np.ndarray) -> float:
 def inefficiency(counts: Sequence[np.ndarray], cumulative: bool) -> float:
     """Return the statistical inefficiency of the numbers of disks in bins, averaged over runs.
 
-    `counts` contains the numbers (F, B) of disks in B bins in each of the F frames of a run.  If
-    `cumulative` is true, the numbers are first summed over bins, as in the Kolmogorov-Smirnov
-    distance.  For a run with fewer than three frames, the statistical inefficiency is set to 1.
+    The argument `counts` contains the numbers (F, B) of disks in B bins in each of the F frames of
+    a run.  If `cumulative` is true, the numbers are first summed over bins, as in the
+    Kolmogorov-Smirnov distance.  For a run with fewer than three frames, the statistical
+    inefficiency is set to 1.
     """
     series = [np.cumsum(own, axis=1)[:, :-1] if cumulative else own for own in counts]
     found = [statistical_inefficiency(own, LEAST) if len(own) > 2 else 1.0 for own in series]
@@ -162,10 +163,10 @@ def inefficiency(counts: Sequence[np.ndarray], cumulative: bool) -> float:
 def noise(sizes: tuple[int, ...], true: float, cumulative: bool) -> np.ndarray:
     """Return random estimates (NOISES,) of a statistical inefficiency, divided by its true value.
 
-    For 20 frames the relative noise of an estimated inefficiency is about a third.  `sizes`
-    contains the numbers of frames of the runs.  The function draws random series of the numbers of
-    disks in bins.  The autocorrelation of the random series decays exponentially, with the
-    statistical inefficiency `true`.
+    For 20 frames the relative noise of an estimated inefficiency is about a third.  The argument
+    `sizes` contains the numbers of frames of the runs.  The function draws random series of the
+    numbers of disks in bins.  The autocorrelation of the random series decays exponentially, with
+    the statistical inefficiency `true`.
     """
     if sum(sizes) > LONG:
         return np.ones(NOISES)
@@ -180,7 +181,8 @@ def correlated(values: np.ndarray, keep: float) -> np.ndarray:
 
     Each frame is `keep` times the previous frame plus independent noise.
 
-    The values of the B bins in a frame add up to zero, because the total number of disks is fixed.
+    The values of the B bins in a frame add up to zero, because they represent deviations of the
+    numbers of disks, whose total is fixed.
     """
     values = values - values.mean(axis=-1, keepdims=True)
     for k in range(1, len(values)):

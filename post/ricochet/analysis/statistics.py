@@ -234,7 +234,7 @@ def periodic_waves(parts: np.ndarray, per_sample: float) -> tuple[float, int]:
 def equilibration(series: np.ndarray) -> int:
     """Return the number of samples before a series becomes stationary.
 
-    The returned number is twice the number of initial samples that White's rule (MSER) discards
+    The function returns twice the number of initial samples that White's rule (MSER) discards
     (White, Simulation 69, 323 (1997)).  White's rule minimises the standard error of the mean of
     the remaining samples.
 

@@ -1,4 +1,4 @@
-"""The stream function of a measured flow on a grid of cells.
+"""Stream function of a measured flow on a grid of cells.
 
 In a steady state the flux of disks j = n u has no divergence.  Therefore a stream function psi
 exists, with j_x = d psi / dy and j_y = -d psi / dx.  The contour lines of psi are the streamlines

@@ -31,7 +31,7 @@ MOST_TERMS = 3e8  # largest number of terms of S(k) in a frame
 
 
 def periods(run: Run) -> np.ndarray:
-    """Return the displacements (M, 2) of the periodic images of the box, including 0."""
+    """Return the displacements (M, 2) of the periodic images of the box; one of them is 0."""
     along = [(-1, 0, 1) if periodic else (0,) for periodic in run.periodic]
     return run.edges * np.array([(i, j) for i in along[0] for j in along[1]])
 

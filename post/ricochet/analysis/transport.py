@@ -13,16 +13,16 @@ square of a Helfand moment grows linearly in time.  Let s be the slope of the me
 function of time, and A the area of the box.  The viscosities are s / (2 A kT), and the conductivity
 is s / (2 A kT^2).  See Helfand, Physical Review 119, 1 (1960), and Alder, Gass and Wainwright,
 Journal of Chemical Physics 53, 3813 (1970).  If `output.helfand` is true, the program accumulates
-the moments exactly and writes the moments as observables.
+the Helfand moments exactly, and writes them as observables.
 
 The viscosities of a mixture follow from the stress of all disks together.  The conductivity of a
 mixture does not follow from the energy moment alone, because diffusing species transport their
 enthalpy.  If disks dissipate energy, or if noise supplies energy, fluctuations do not determine the
 transport coefficients.  In the theory of a cooling gas, the moments are correlated with other
 quantities that depend on the unknown distribution of states of the gas (Baskaran, Dufty and Brey,
-Physical Review E 77, 031311 (2008)).  Noise violates the fluctuation-dissipation theorem.  Rough
-disks are refused, because the moments do not include the rotational energy that rough disks
-transport.
+Physical Review E 77, 031311 (2008)).  If noise drives the disks, the fluctuation-dissipation
+theorem does not hold.  An error is raised for rough disks, because the moments do not include the
+rotational energy that rough disks transport.
 """
 
 from typing import NamedTuple
@@ -169,10 +169,10 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
 def squares(moment: np.ndarray, lag: int) -> np.ndarray:
     """Return squares (T - lag,) of the increments of a moment (T, C) over `lag` samples.
 
-    The squares are averaged over the C components of the moment.  The mean growth that is
-    subtracted from a moment was estimated from the same series; therefore the squares are too small
-    by the fraction lag / (T - 1).  The returned squares are corrected for the subtraction of the
-    mean growth.
+    The squared increments are averaged over the C components of the moment.  The mean growth that
+    is subtracted from a moment was estimated from the same series; therefore the squares are too
+    small by the fraction lag / (T - 1).  The returned squares are corrected for the subtraction of
+    the mean growth.
     """
     gain = moment[lag:] - moment[: len(moment) - lag]
     return np.mean(gain**2, axis=1) / (1 - lag / (len(moment) - 1))

@@ -46,7 +46,7 @@ COLOURINGS = {
 
 
 def caption(runs: list[Run]) -> str:
-    """Return a caption: number of disks, restitution, seeds, parameters that differ among runs."""
+    """Return a caption with the number of disks, restitution, seeds, and differing parameters."""
     parts = [f"N = {listed({run.n_disks for run in runs})}"]
     restitutions = {run.restitution for run in runs}
     if all(map(np.isfinite, restitutions)):
@@ -321,9 +321,9 @@ def note_on_size(axes: Axes, run: Run) -> str:
 def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) -> EllipseCollection:
     """Draw disks at `position` (N, 2), and their periodic images, with enlarged small disks.
 
-    In `style`, `array` (N,) contains values that a colour map converts to colours, and `facecolors`
-    contains colours.  If disks are coloured by value, all species except the first have a black
-    outline.
+    The keyword argument `array` (N,) contains values that a colour map converts to colours, and
+    `facecolors` contains colours.  If disks are coloured by value, all species except the first
+    have a black outline.
     """
     which, places = with_images(run, position)
     diameters = drawn_diameters(axes, run)

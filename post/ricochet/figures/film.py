@@ -9,7 +9,7 @@ from ..reading.reader import Run
 
 
 class Film:
-    """A film of a run, which a notebook displays and `save` writes to a file."""
+    """Film of a run, which a notebook displays, and which `save` writes to a file."""
 
     def __init__(self, run: Run, colour: str | None = None, height: int = 700):
         """Make a film with a height in pixels, whose colours show the quantity `colour`."""

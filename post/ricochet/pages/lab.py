@@ -62,7 +62,7 @@ def setting(value: object) -> str:
 
 
 class Lab:
-    """The input files, the table of input variables, and the worker processes of the laboratory."""
+    """Server of the laboratory, with the input files, the table of variables, and the workers."""
 
     def __init__(self, inputs: list[Path], folders: list[Path], command: list[str]) -> None:
         """Store the input files, the folders that they may refer to, and the worker command."""

@@ -132,7 +132,7 @@ def page_of(text: str) -> Callable:
 
 
 class Live:
-    """Film of a run that may still continue.
+    """Film of a run that may still be in progress.
 
     Requests do not disturb the running simulation, because the output file is opened without a lock
     for each request, and only completely written data are read.
@@ -214,9 +214,9 @@ def serve(
 ) -> str:
     """Show a run until it ends or a signal arrives, and return why the server stopped.
 
-    The server stops when the run has ended, or after Ctrl-C or the signal TERM.  The function calls
-    `open_page` with the address of the page.  The function raises RunError if the file cannot be
-    shown, or if the simulation program was killed.
+    The server stops when the run has ended, or after Ctrl-C or the signal TERM.  When the page is
+    available, the function calls `open_page` with the address of the page.  The function raises
+    RunError if the file cannot be shown, or if the simulation program was killed.
     """
     if run.path.suffix != ".part":
         raise RunError(f"{run.path}: has finished; leave out --live")

@@ -24,7 +24,7 @@ KEPT = 4  # quantities at the start of a sample from which pressures follow
 
 @dataclass(frozen=True)
 class SnapshotRun(Run):
-    """The present state of a simulation as a run with one frame and the present observables."""
+    """Present state of a simulation, in the form of a run with one frame and its observables."""
 
     simulation: Simulation
 
@@ -48,7 +48,7 @@ class SnapshotRun(Run):
 
 
 def snapshot_run(simulation: Simulation) -> SnapshotRun:
-    """Return the present state of a simulation as a run."""
+    """Return the present state of a simulation in the form of a run with one frame."""
     parameters = simulation.parameters
     box, kinds = parameters["box"], parameters["species"]
     lower, upper = (np.asarray(box[name], dtype=float) for name in ("lower", "upper"))
@@ -113,8 +113,8 @@ def means(run: Run, samples: Sequence[tuple[float, ...]], energy: float) -> list
 
     The means are over the samples in equilibrium, and their errors include the autocorrelation.
     Means are omitted if the run does not relax to equilibrium, or has too few samples so far;
-    theoretical values are omitted if no theory is known.  `energy` is the present energy of all
-    disks.
+    theoretical values are omitted if no theory is known.  The argument `energy` is the present
+    energy of all disks.
     """
     titles = ["temperature"]
     titles += [f"mean speed of {name}" for name in run.names] if run.names[1:] else ["mean speed"]

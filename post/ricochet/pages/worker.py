@@ -61,7 +61,7 @@ SCAN_SAMPLES = 160  # samples of a value in a scan
 SCAN_EVENTS = 1000  # smallest number of events in four intervals of samples
 SCAN_SECONDS = 4.0  # s that a value in a scan may take
 COUNTED = ("collisions", "dissipated_energy")  # observables that are counts since the start
-#: Variables of the motion of a side.
+#: Names of the input variables that define the motion of a side.
 MOTION = ("motion", "velocity", "start_time", "end_time", "amplitude", "period", "phase")
 MOTION += ("mass", "force")
 HOLD = 0.15  # time in which a dragged side reaches the pointer [s]
@@ -71,7 +71,7 @@ PR_SET_PDEATHSIG = 1  # option PR_SET_PDEATHSIG of prctl
 
 
 class Session:
-    """The simulation that a page shows, and the pace at which the simulation advances."""
+    """Simulation that a page shows, and the pace at which the simulation advances."""
 
     def __init__(self, describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
         """Store the function that converts the constant part of a picture to values and arrays."""
@@ -91,7 +91,7 @@ class Session:
     # --- requests ---
 
     def start(self, request: dict) -> None:
-        """Replace the present simulation by a new one if the new input is valid."""
+        """Replace the present simulation by a simulation of the new input if the input is valid."""
         pace = max(0.0, float(request["pace"] or 0.0))
         try:
             other = Simulation._of(request["text"], setting_lines(request["settings"]))

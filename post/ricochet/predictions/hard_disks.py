@@ -194,15 +194,16 @@ def adiabat(
 ) -> np.ndarray:
     """Return temperatures (W,) of a gas between two walls, one of which moves slowly.
 
-    `widths` (W,) are distances between the two walls.  The returned temperatures are relative to
-    the temperature at the distance `widths[0]`.  If `walled` is true, the two sides parallel to the
-    motion are walls, too.  If `walled` is false, the momentum along the moving wall is conserved,
-    and the kinetic energy is (N - 1/2) kT instead of N kT.  If F is the force of the gas on the
-    moving wall, a change dw of the width changes the kinetic energy by -F dw.  The force F is P h
-    minus the tension of the two walls parallel to the motion, where h is the height.  The pressure
-    P follows from Z of the function `simulated`.  According to scaled particle theory a wall has
-    the tension kT n r / (1 - eta) and a deficit of n r (1 - eta) / (1 + eta) disks per length
-    (Helfand, Frisch and Lebowitz, Journal of Chemical Physics 34, 1037 (1961)).
+    The argument `widths` (W,) contains distances between the two walls.  The returned temperatures
+    are divided by the temperature at the distance `widths[0]`.  If `walled` is true, all four sides
+    of the box are walls, including the two sides parallel to the motion.  If `walled` is false, the
+    momentum along the moving wall is conserved, and the kinetic energy is (N - 1/2) kT instead of N
+    kT.  If F is the force of the gas on the moving wall, a change dw of the width changes the
+    kinetic energy by -F dw.  The force F is P h minus the tension of the two walls parallel to the
+    motion, where h is the height.  The pressure P follows from Z of the function `simulated`.
+    According to scaled particle theory a wall has the tension kT n r / (1 - eta) and a deficit of n
+    r (1 - eta) / (1 + eta) disks per length (Helfand, Frisch and Lebowitz, Journal of Chemical
+    Physics 34, 1037 (1961)).
     """
     area = count * math.pi * radius**2
     eta = np.geomspace(1e-12, FREEZING[-1, 0], 50001)  # far from the walls
@@ -508,8 +509,8 @@ def contact_values(z: float, density: np.ndarray, diameter: np.ndarray) -> np.nd
     The returned pair correlations have errors of about 1 %. The argument `z` is the compressibility
     factor Z of a system of equal disks that has the same packing fraction as the mixture.  The
     formula is from Jenkins and Mancini, Journal of Applied Mechanics 54, 27 (1987).  The formula
-    requires chi of equal disks, for which the more accurate value that follows from `z` is used, as
-    in Santos, Yuste and Lopez de Haro, Journal of Chemical Physics 117, 5785 (2002).
+    requires chi of equal disks; here chi follows from `z`, which is more accurate, as in Santos,
+    Yuste and Lopez de Haro, Journal of Chemical Physics 117, 5785 (2002).
     """
     eta = math.pi / 4 * np.sum(density * diameter**2)
     mean = np.sum(density * diameter) / np.sum(density * diameter**2)

@@ -1,6 +1,6 @@
 """Theoretical results: speed distributions, scattering, relaxation, rough disks, two chambers.
 
-All results are two-dimensional; u = v / sqrt(2 kT / m) is the reduced speed.
+All results are for two dimensions; u = v / sqrt(2 kT / m) is the reduced speed.
 """
 
 from collections.abc import Callable
@@ -173,9 +173,9 @@ def scattering_angle(
 
 
 # Steady temperature ratio T_rot / T of cooling rough disks for pairs (xi, beta) of normal and
-# tangential restitution. The disks have the moment of inertia m r^2 / 2 and no Coulomb limit. The
-# ratios are from direct simulations of the Boltzmann equation with 10^5 disks and have errors of
-# 0.002.
+# tangential restitution. The rough disks have the moment of inertia m r^2 / 2 and no Coulomb limit
+# of the tangential impulse. The ratios are from direct simulations of the Boltzmann equation with
+# 10^5 disks and have errors of 0.002.
 ROUGH_RATIOS = {(0.9, 0.0): 0.4439, (0.9, 0.8): 1.0055, (0.85, 0.3): 0.708}
 
 

@@ -177,7 +177,7 @@ def write_gsd(
 
 
 def gsd_frame(package: Any, run: Run, frame: int) -> Any:
-    """Return a frame of a run as a frame of the package gsd."""
+    """Convert a frame of a run to a frame of the package gsd."""
     lower, upper = run.corners_at(run.time[frame])
     found, disks = package.Frame(), run[frame]
     found.configuration.step, found.configuration.dimensions = frame, 2
@@ -343,7 +343,7 @@ def write_lammps(
 
 
 def lammps_frame(run: Run, frame: int, time: bool) -> str:
-    """Return the lines of a frame in a dump file of LAMMPS."""
+    """Convert a frame of a run to the lines of a LAMMPS dump file."""
     lower, upper = run.corners_at(run.time[frame])
     sides = np.array([[*lower, -0.5], [*upper, 0.5]]).T.tolist()
     disks, zero = run[frame], [0] * run.n_disks

@@ -18,14 +18,14 @@ PRIORITY = 10  # order of the removal of folders among the actions at the end of
 
 
 class RunError(Exception):
-    """Error for a file that cannot be used.
+    """Error that is raised for a file that cannot be used.
 
-    The message contains the path of the file and the reason.
+    The error message contains the path of the file and the reason.
     """
 
 
 class Unsound(Exception):
-    """Error for invalid contents of a file.
+    """Error that is raised for invalid contents of a file.
 
     The function `open_file` adds the path of the file to the error message.
     """
@@ -102,8 +102,8 @@ def plain(value: object) -> object:
 def destination(path: Path) -> Path:
     """Create the folder of a result, and check whether the result may be written.
 
-    The function returns `path`.  An existing file may be replaced only if it is an ordinary file
-    that contains no HDF5 data.
+    The function returns the argument `path`.  An existing file may be replaced only if it is an
+    ordinary file that contains no HDF5 data.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.is_symlink() or (path.exists() and not path.is_file()):
@@ -129,7 +129,7 @@ class TemporaryFolder:
         self.removal = Finalize(self, shutil.rmtree, (self.path, True), exitpriority=PRIORITY)
 
     def remove(self) -> None:
-        """Remove the folder immediately."""
+        """Remove the temporary folder immediately."""
         self.removal()
 
     def keep(self) -> None:

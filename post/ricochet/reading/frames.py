@@ -19,14 +19,14 @@ WHOLE = (type(None), type(...), bool, np.bool_)  # a first index of these does n
 
 
 class NoSuchFrame(RunError, IndexError):
-    """Error for the number of a frame that does not exist."""
+    """Error that is raised for the number of a frame that does not exist."""
 
 
 class Values(NDArrayOperatorsMixin):
     """Base class that implements arithmetic with NumPy arrays as results."""
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        """Return all values as an array."""
+        """Return all values of the quantity or time series as an array."""
         raise NotImplementedError
 
     def __array_ufunc__(self, function: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
@@ -41,7 +41,7 @@ class Values(NDArrayOperatorsMixin):
         return np.asarray(self).mean(axis, **options)
 
     def std(self, axis: Any = None, **options: Any) -> Any:
-        """Return the standard deviation of all values, or along an axis; see `numpy.std`."""
+        """Return the standard deviation of all values, or those along an axis; see `numpy.std`."""
         return np.asarray(self).std(axis, **options)
 
     def sum(self, axis: Any = None, **options: Any) -> Any:

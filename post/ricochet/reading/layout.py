@@ -33,7 +33,8 @@ def series_of(file: h5py.File, name: str, count: int) -> Series:
 def committed(file: h5py.File, group: str) -> int:
     """Return the number of samples in a group that have been written completely.
 
-    An unfinished file has space for further samples, which are not valid.
+    An unfinished file contains space for further samples, and the numbers in this space are not
+    valid.
     """
     return int(file[group]["committed"][()])
 

@@ -70,14 +70,14 @@ SETTLED = TRAITS.keys() - UNSETTLED
 
 
 class Refused(RunError):
-    """Error for a run to which a theory does not apply.
+    """Error that is raised for a run to which a theory does not apply.
 
     The error message contains the reason why the theory does not apply.
     """
 
 
 class Nature(frozenset[str]):
-    """Set of all traits of a run; the traits are keys of `TRAITS`."""
+    """Set of all traits of a run; the possible traits are the keys of `TRAITS`."""
 
     @property
     def closed(self) -> bool:
@@ -120,9 +120,9 @@ def nature_of(
 ) -> Nature:
     """Return the traits of a run, determined from its parameters and its energy balance.
 
-    `lost` is the ratio of the dissipated energy to the largest kinetic energy of the run.
-    `turning` is true if the disks can rotate, and `collapsed` is true if an inelastic collapse
-    occurred.
+    The argument `lost` is the ratio of the dissipated energy to the largest kinetic energy of the
+    run. The argument `turning` is true if the disks can rotate, and `collapsed` is true if an
+    inelastic collapse occurred.
     """
     contact, drive = parameters.get("contact", {}), parameters.get("drive", {})
     box, kind = parameters.get("box", {}), drive.get("kind", "none")
@@ -224,7 +224,7 @@ def known(value: Any) -> bool:
 
 
 def allow(run: Any, law: str, *traits: str) -> None:
-    """Raise an error if the run has a trait that is not in the list `traits`.
+    """Raise an error if the run has a trait that is not listed in `traits`.
 
     The error message ends with the text `law`.
     """

@@ -112,7 +112,7 @@ class Obstacle(NamedTuple):
 
 
 class Species(NamedTuple):
-    """The disks of one species.
+    """One species of disks, with the properties of its disks.
 
     Masses and radii can differ within a species if a starting file specifies them.
     """

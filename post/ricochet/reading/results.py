@@ -122,9 +122,9 @@ class Results:
     def to_dataframe(self) -> "pandas.DataFrame":
         """Return the observables as a pandas DataFrame, which has one row for each sample.
 
-        The index of the table is the time.  The columns have the names of the observables, such as
-        `all/kinetic_energy`.  Each component of a vector or tensor has its own column, such as
-        `momentum_x` or `virial_tensor_xy`.
+        The index of the DataFrame is the time.  The columns of the DataFrame have the names of the
+        observables, such as `all/kinetic_energy`.  Each component of a vector or tensor has its own
+        column, such as `momentum_x` or `virial_tensor_xy`.
 
         Returns
         -------

@@ -21,7 +21,7 @@ def c_text(text: str | Path) -> bytes:
 
 
 def opened(make: Callable[..., int], *arguments: object) -> int:
-    """Return the handle of a simulation that a library function creates, or raise its error."""
+    """Return the simulation handle from a library function, or raise the error of the function."""
     message, code = ctypes.create_string_buffer(ROOM), ctypes.c_int()
     handle = make(*arguments, message, ROOM, ctypes.byref(code))
     if not handle:

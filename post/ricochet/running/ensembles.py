@@ -218,7 +218,7 @@ def read_manifest(folder: Path) -> dict[str, str]:
 
 
 def remember(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
-    """Write input.nml and manifest.txt; refuse new settings for member runs that have data."""
+    """Write input.nml and manifest.txt; raise an error if member runs with data change settings."""
     door = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(door, fcntl.LOCK_EX)  # one command at a time, as in runs/ensemble.sh
@@ -345,7 +345,7 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
 
 
 def is_older(path: Path, other: Path) -> bool:
-    """Return whether the file `path` was written before the file `other`."""
+    """Return whether the file `path` was last written before the file `other`."""
     return path.stat().st_mtime_ns < other.stat().st_mtime_ns
 
 

@@ -159,7 +159,7 @@ def example(name: str) -> Path:
 
 
 def whole_threads(threads: int | None) -> int:
-    """Check and return the number of threads; 0 stands for the number given in the input."""
+    """Check and return the number of threads; 0 means the number that the input states."""
     if threads is None:
         return 0
     if not isinstance(threads, Integral) or not 1 <= threads <= 1024:

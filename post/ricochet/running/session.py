@@ -13,7 +13,7 @@ ALIVE: "weakref.WeakSet[Session]" = weakref.WeakSet()
 
 
 class Session:
-    """A session with the engine, which belongs to one simulation in memory."""
+    """Session with the engine, which owns one simulation in memory."""
 
     __slots__ = ("__weakref__", "_handle", "_lock")
     _handle: int | None

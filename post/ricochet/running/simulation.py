@@ -142,9 +142,9 @@ class Simulation(State):
     def save(self, path: str | Path, force: bool = False, input: str | Path | None = None) -> Path:
         """Write an output file that the command `ricochet INPUT -o path --resume` can continue.
 
-        The output file contains samples of the initial state and of the present state.  If
-        variables have been changed with `change`, INPUT must be a file with the changed values;
-        `save` writes this file if the argument `input` is given.
+        The output file that `save` writes contains samples of the initial state and of the present
+        state.  If variables have been changed with `change`, INPUT must be a file with the changed
+        values; `save` writes this file if the argument `input` is given.
 
         Parameters
         ----------
@@ -228,11 +228,11 @@ class Simulation(State):
     ) -> Self:
         """Advance the simulation until one of the limits is reached.
 
-        All limits are counted from the start of the run.  Without limits, the stop rules of the
-        input apply.  As in a run of the program, the simulation ends before a limit if no further
-        event can occur, or if a gas that only loses energy has cooled to 1e-25 of its initial
-        temperature.  After an interrupt (Ctrl-C), the simulation is in the state at the time of the
-        interrupt and can be continued.
+        The limits of `advance` are times and numbers since the start of the run.  Without limits,
+        the stop rules of the input apply.  As in a run of the program, the simulation ends before a
+        limit if no further event can occur, or if a gas that only loses energy has cooled to 1e-25
+        of its initial temperature.  After an interrupt (Ctrl-C), the simulation is in the state at
+        the time of the interrupt and can be continued.
 
         Parameters
         ----------
@@ -370,7 +370,7 @@ class Simulation(State):
         return self.parameters.get("stop", {}).keys() <= {"wall_clock"}
 
     def _go_on(self, limits: tuple[float, int, int], patience: float) -> bool:
-        """Advance for at most `patience` [s]; return whether no limit has been reached yet."""
+        """Advance for at most `patience` [s]; return True if no limit has been reached so far."""
         with self._open() as handle:
             return called(library().ricochet_advance, handle, *limits, patience)
 
@@ -401,8 +401,8 @@ class Simulation(State):
         Parameters
         ----------
         values : mapping of str to object
-            a dictionary with the new value of each variable, whose key is the full name of the
-        variable, such as "box.gravity"
+            a dictionary with the new value of each variable; the keys are the full names of the
+            variables, such as "box.gravity"
 
         Returns
         -------

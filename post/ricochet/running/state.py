@@ -31,7 +31,7 @@ COLUMNS = {
 
 
 class State(Session):
-    """The present state of a simulation in memory."""
+    """Present state of a simulation in memory."""
 
     __slots__ = ("_start_energy",)
     _start_energy: float
@@ -109,7 +109,7 @@ class State(Session):
 
     @property
     def collisions(self) -> int:
-        """Number of collisions of two disks since the start."""
+        """Number of collisions between disks since the start."""
         return self._counts()[1]
 
     @property
