@@ -105,7 +105,9 @@ def main() -> None:
     parser = command_line(
         __doc__, "RUN.mp4", one=True, csv=False, frames=None, count=300, colour=None
     )
-    parser.add_argument("--fps", type=positive, metavar="N", default=25, help="per second [25]")
+    parser.add_argument(
+        "--fps", type=positive, metavar="N", default=25, help="frames per second [25]"
+    )
     args = parser.parse_args()
     (run,) = args.runs
     path = film_path(args.output, run)

@@ -87,11 +87,22 @@ def draw_forces(axes: plt.Axes, force: np.ndarray) -> None:
 
 def main() -> None:
     parser = command_line(__doc__, "contacts.png", one=True)
-    parser.add_argument("--from", type=float, dest="start", help="start of the window of time")
-    parser.add_argument("--until", type=float, help="end of the window [end of the run]")
-    parser.add_argument("--above", type=float, default=1.0, help="impulse / mean impulse [1]")
-    parser.add_argument("--at-least", type=int, default=3, help="disks of a chain [3]")
-    parser.add_argument("--contacts", type=Path, metavar="FILE", help="CSV file of all contacts")
+    parser.add_argument(
+        "--from", type=float, dest="start", help="start of the window of time [0.9 times the end]"
+    )
+    parser.add_argument("--until", type=float, help="end of the window of time [end of the run]")
+    parser.add_argument(
+        "--above",
+        type=float,
+        default=1.0,
+        help="smallest impulse of a strong contact, divided by the mean impulse [1]",
+    )
+    parser.add_argument(
+        "--at-least", type=int, default=3, help="smallest number of disks of a chain [3]"
+    )
+    parser.add_argument(
+        "--contacts", type=Path, metavar="FILE", help="CSV file for a table of all contacts"
+    )
     args = parser.parse_args()
     (run,) = args.runs
     until = float(run.time[-1]) if args.until is None else args.until

@@ -76,7 +76,12 @@ def draw(
 def main() -> None:
     parser = command_line(__doc__, "cost.png", repeated=True)
     parser.add_argument(
-        "--fit", type=float, nargs=2, default=[128, 1e4], metavar="N", help="[128 1e4]"
+        "--fit",
+        type=float,
+        nargs=2,
+        default=[128, 1e4],
+        metavar="N",
+        help="smallest and largest number of disks in the fits [128 1e4]",
     )
     args = parser.parse_args()
     measured = costs(args.runs)

@@ -357,7 +357,9 @@ def draw(
 
 def main() -> None:
     parser = command_line(__doc__, "driven.png")
-    parser.add_argument("--show", choices=QUANTITIES, default="temperature", help="[temperature]")
+    parser.add_argument(
+        "--show", choices=QUANTITIES, default="temperature", help="quantity to show [temperature]"
+    )
     args = parser.parse_args()
     for run in args.runs:
         if run.n_frames < 2 or not run.time[-1] > run.time[0]:

@@ -137,8 +137,15 @@ def draw(groups: list, results: list[Approach], until: float, within: float) -> 
 
 def main() -> None:
     parser = command_line(__doc__, "equipartition.png", equilibration=None)
-    parser.add_argument("--window", type=float, default=0.5, help="time averaged over [0.5]")
-    parser.add_argument("--within", type=float, default=0.1, help="relative difference [0.1]")
+    parser.add_argument(
+        "--window", type=float, default=0.5, help="duration of each window of time [0.5]"
+    )
+    parser.add_argument(
+        "--within",
+        type=float,
+        default=0.1,
+        help="largest relative difference of equal energies [0.1]",
+    )
     parser.add_argument("--until", type=float, default=20, help="end of the time axis [20]")
     args = parser.parse_args()
     for run in args.runs:

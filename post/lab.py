@@ -75,7 +75,13 @@ def port(text: str) -> int:
 def main() -> None:
     raw = RawTextHelpFormatter
     parser = Parser(description=__doc__, formatter_class=raw, allow_abbrev=False)
-    parser.add_argument("inputs", nargs="*", type=Path, metavar="INPUT.nml", help="more inputs")
+    parser.add_argument(
+        "inputs",
+        nargs="*",
+        type=Path,
+        metavar="INPUT.nml",
+        help="further input files to choose from",
+    )
     opened = "open the page in your browser [no]"
     parser.add_argument("--open", action=BooleanOptionalAction, help=opened)
     parser.add_argument(

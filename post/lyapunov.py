@@ -98,7 +98,7 @@ def main() -> None:
         type=float,
         default=0.2,
         metavar="SHARE",
-        help="fraction of that time at which the fit begins [0.2]",
+        help="start of the fit, divided by the end of the fit [0.2]",
     )
     args = parser.parse_args()
     if len(args.runs) % 2:

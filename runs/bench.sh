@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Benchmarks: cost of collisions, of the start of a run and of the output. docs/explanation/performance.md explains the results.
 #
 #   runs/bench.sh            1e3 to 1e5 disks at four packings; gravity, restitution, sizes, samples
@@ -353,5 +354,5 @@ case ${1:-} in
     processes
     threads
     ;;
-  *) sed -n '2,11s/^# \{0,1\}//p' "$0"; exit 2 ;;
+  *) sed -n '3,13s/^# \{0,1\}//p' "$0"; exit 2 ;;
 esac

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Exercise L3, circular walls and unequal disks: paths in the billiards of Sinai and Lorentz, divergence of initially close paths, a
 # round container, and Brownian motion.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"

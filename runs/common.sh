@@ -1,4 +1,5 @@
 # shellcheck shell=bash
+
 # Definitions that are common to all scripts in this folder that simulate a system; each of these scripts sources this file. The
 # file defines the variables `python` (the Python interpreter), `data` (folder of the output files) and `figures` (folder of the
 # figures), and the function `replace`. Options such as -j 4 are passed to ensemble.sh.

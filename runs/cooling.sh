@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Exercise S4: kinetic energies of a mixture with the coefficients of restitution 1, 0.9 and 0.8, with eight seeds and with elastic
 # or inelastic walls.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"

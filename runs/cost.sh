@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Exercise L2: time per collision against the number of disks, for the three methods of finding the next event. Only one run is
 # performed at a time, because simultaneous runs would affect the measured times. To repeat the measurement, remove the folder
 # runs/cost.

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Fraction of error bars that contain the true value, determined from 200 short runs of a gas, of a liquid, and of a liquid near
 # freezing.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Exercise S5: pictures of one crater, and crater size against mass, speed and radius of the projectile and against restitution.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Simulations of gases that walls heat or shear, of rough disks, of transport coefficients in equilibrium, and of driven disks. The
 # driven systems are the Leidenfrost effect, Maxwell's demon, the Brazil nut effect, compression by a piston, white-noise driving
 # and active disks. Each system is simulated with four seeds.

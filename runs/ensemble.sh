@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Performs the runs of a sweep, one run for each combination of seeds and values of variables, on all cores. After an interruption,
 # the same command continues the sweep.
 set -euo pipefail

@@ -1,5 +1,6 @@
 # shellcheck shell=bash
 # shellcheck disable=SC2154,SC2034 # ensemble.sh assigns `folder` and other variables, and reads variables that this file assigns
+
 # Functions of ensemble.sh for the files of a sweep. The functions of ensemble_folder.sh determine from the files in `folder` which
 # member runs are finished, have failed or can continue, and store the settings of the member runs. The functions never write
 # through links, into FIFOs, or into files that ensemble.sh did not create. Errors are reported by the functions `fail` and `die` of

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Produces the figures of all systems, and a page runs/figures/index.html that shows all figures.
 #
 #   runs/figures.sh                 all

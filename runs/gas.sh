@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Exercise S2: speed distributions of 1000 and 2000 disks, which relax from equal speeds to the Maxwell distribution; four seeds
 # each.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Exercises G1 to G4 about disks in a box with gravity: energies, equipartition, exponential laws, pictures and a film.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 

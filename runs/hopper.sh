@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Discharge rate of a hopper against the width of its mouth, compared with Beverloo's law in two dimensions. The mouth is the gap
 # between the lower ends of two walls, which are inclined by 45 degrees. Each width is simulated with two seeds. Films and pictures
 # show the hopper, a rotating drum, a dragged intruder and a stirrer. The script takes about five minutes of processor time.

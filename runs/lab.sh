@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Exercise L1: 10 x 10 disks that start on a grid. The script draws frames and the distribution of speeds, and makes a film. After
 # the simulation of equal disks, the script simulates disks of different masses in the same way.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"

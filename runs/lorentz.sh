@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # The random Lorentz gas: one tracer moves among 100 000 scatterers, which may overlap, at six densities. The diffusion coefficient
 # of the tracer is compared with kinetic theory. The scatterers are placed differently in each run. The environment variable N sets
 # the number of scatterers, for example N=1000000. EVENTS sets the number of events of each run, for example EVENTS=10000000.

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Melting of hard disks: pressure against packing fraction, and pictures of the bond-orientational order.
 #
 # Between the packing fractions 0.70 and 0.72, crystals melt and liquids freeze very slowly. Therefore the runs of 64^2 disks start

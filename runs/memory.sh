@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Memory per disk in different kinds of runs, compared with the estimate of the program (src/start/memory.f90).
 #
 #   runs/memory.sh             490 000 disks, on one core without domains, and 10^6 with domains

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Exercise S3: speeds and energies of a mixture of light and heavy disks, at the start and in equilibrium.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 

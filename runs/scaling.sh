@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Speedup of a simulation that uses several cores of this computer. The script takes about five minutes, and no other program should
 # run during this time. `make figures` does not call this script. The simulated systems are gases in a box with walls at a packing
 # fraction of 0.5. Each run has 6 million collisions, or 15 million collisions for a million disks. Each system is simulated three

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # A sequence of runs of one system. Each run starts from the last frame of the previous run. The system is compressed in two steps,
 # relaxed, cooled, heated and expanded.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"

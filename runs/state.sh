@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+
 # Properties of hard disks in a periodic box: equation of state, time correlations, order, and Haff's law; four seeds each.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
