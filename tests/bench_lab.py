@@ -1,7 +1,8 @@
 """Measure response times and pictures per second of the laboratory in a browser: `make bench-lab`.
 
-Headless Chromium draws without a graphics card, so that a screen is faster rather than slower.
-Fails where a goal is missed; say so only of a machine that does nothing else.
+Headless Chromium draws without a graphics card; a browser on a screen is therefore not slower.  The
+script fails if a measured value misses its goal, which is meaningful only if the computer executes
+no other program.
 """
 
 import statistics
@@ -44,7 +45,7 @@ return new Promise(done => requestAnimationFrame(function look() {
 
 
 def opened(browser, address):
-    """Open the page after a pause, as users do; return the milliseconds until disks move."""
+    """Open the page after a pause, as a user would, and return the time until disks move [ms]."""
     time.sleep(2)
     browser.open(address)
     for _ in range(LONGEST // 16):

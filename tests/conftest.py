@@ -20,7 +20,7 @@ ROOM = 4e9  #: for the files of the tests [bytes]
 
 
 def pytest_configure():
-    """Keep the files of the tests in memory if possible, so that the disk does not matter."""
+    """Keep the files of the tests in memory if possible, so that a slow disk does not matter."""
     memory = Path("/dev/shm")
     if os.access(memory, os.W_OK):
         disk = os.statvfs(memory)
@@ -30,14 +30,14 @@ def pytest_configure():
 
 
 def pytest_terminal_summary(terminalreporter, config):
-    """Print how to repeat the order of the tests, also in quiet mode."""
+    """Print the option that repeats the random order of the tests, also in quiet mode."""
     if seed := config.getoption("randomly_seed", None):
         terminalreporter.write_line(f"the same order again: --randomly-seed={seed}")
 
 
 @pytest.fixture(scope="session")
 def program() -> Path:
-    """Return the program that RICOCHET names, else build/ricochet; a missing one is a failure."""
+    """Return the path of the program (RICOCHET or build/ricochet); fail if it does not exist."""
     path = Path(os.environ.get("RICOCHET", ROOT / "build" / "ricochet")).resolve()
     if not os.access(path, os.X_OK):
         pytest.fail(f"no program at {path}: run make first, or set RICOCHET")
@@ -48,7 +48,7 @@ def program() -> Path:
 def ricochet(program, tmp_path) -> Callable[..., subprocess.CompletedProcess]:
     """Return a function that runs the program in `tmp_path` and returns its status and output.
 
-    With `seconds` it is killed when it has used so much processor time.
+    If `seconds` is given, the program is killed after this processor time.
     """
 
     def run(*arguments, seconds=None, **options) -> subprocess.CompletedProcess:

@@ -3,13 +3,14 @@
     python tests/coverage_tables.py            writes coverage.json and validation.md
                                                in docs/explanation
     python tests/coverage_tables.py --only gravity         repeats the rows of some systems
-    python tests/coverage_tables.py --seeds 40 --print     a quick look
+    python tests/coverage_tables.py --seeds 40 --print     prints less accurate tables
 
-The systems and the quantities were listed before any of them was run.  An error bar is half of the
-interval that should hold the true value in 68 of 100 runs that differ by their seed alone: 61 to 75
-are allowed.  The true value is exact, or the mean over all runs.  p-values of valid runs are
-uniform: the p-value of their Kolmogorov-Smirnov test should not be below 0.001.  The exit status is
-0 if all systems have published rows and all rows are within these limits.
+The systems and the quantities were chosen before any system was simulated.  For each quantity, 100
+runs that differ only by their seed yield 100 confidence intervals.  The true value should be inside
+68 of the intervals, and 61 to 75 are allowed.  The true value is known exactly, or is the mean over
+all runs.  The p-values of valid runs should be uniformly distributed; the p-value of a
+Kolmogorov-Smirnov test of their uniformity must be at least 0.001.  The exit status is 0 if all
+systems have published rows and all rows are within these limits.
 """
 
 import argparse
@@ -69,7 +70,7 @@ def gas(count: int, eta: float = 0.1, mass: float = 1, name: str = "a") -> str:
 def text(
     box: str, groups: str, length: float, frames: float, unit: str = "time", more: str = ""
 ) -> str:
-    """Return an input; `frames` is the time or the number of collisions per disk between frames."""
+    """Return an input, where `frames` is the time or the collisions per disk between frames."""
     stop, each = ("time", "time") if unit == "time" else (unit, unit)
     samples = f"&output frames_every_{each} = {frames} observables_every_{each} = {frames}"
     samples += f" {more} /"
@@ -164,7 +165,7 @@ def of_transport(run: Run) -> Found:
 
 
 def at(x: np.ndarray, curve: statistics.Estimate, place: float) -> tuple[float, float]:
-    """Return a point of a curve and its error at a place that is the same for all groups."""
+    """Return a point of a curve, with its error, at the same abscissa for all groups of runs."""
     mean, error = (float(np.interp(place, x, part)) for part in curve)
     return mean, error
 
@@ -198,7 +199,7 @@ def of_equipartition(*runs: Run) -> Found:
 
 
 def of_pairs(*runs: Run) -> Found:
-    """lyapunov.py; a run and the following one are a pair."""
+    """lyapunov.py, where successive runs form pairs."""
     apart = np.array([lyapunov.distance(*pair) for pair in batched(runs, 2)])
     return {"exponent": lyapunov.divergence(runs[0].time, apart, 0.01, 0.2).exponent}
 
@@ -224,12 +225,12 @@ def of_craters(*runs: Run) -> Found:
 
 
 def batched(runs: tuple[Run, ...], size: int) -> list[tuple[Run, ...]]:
-    """Return the runs in groups of a size."""
+    """Divide the runs into groups of the given size."""
     return [runs[k : k + size] for k in range(0, len(runs), size)]
 
 
 def billiard(shift: float, seed: int) -> str:
-    """Return the input of a Sinai billiard, whose disk starts at a place that the seed draws."""
+    """Return the input of a Sinai billiard, whose disk starts at a random position."""
     x, y, angle = np.random.default_rng(seed).uniform((0.02, 0.02, 0), (0.22, 0.98, 2 * np.pi))
     place, v = f"{x + shift:.17g}, {y:.17g}", f"{np.cos(angle):.17g}, {np.sin(angle):.17g}"
     disk = f"&species name = 'a' radius = 0.01 position = {place} velocity = {v} /"
@@ -256,7 +257,7 @@ STEPPED += "&output observables_every_time = 0.5 /"
 
 
 class Group(NamedTuple):
-    """Runs from which a script derives its quantities."""
+    """Runs from which a script calculates the measured quantities."""
 
     inputs: tuple[Input, ...]  # of the runs of one seed
     of: Callable[..., Found]

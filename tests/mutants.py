@@ -3,24 +3,27 @@
     python tests/mutants.py [NAME...] [--jobs 2] [--commit HEAD]
     python tests/mutants.py --check
 
-It works in build/mutants, on a copy of the last commit, and goes on where it was stopped:
-`results` there has a line for each mutant of each commit. The copy is tested without a fault first.
-Then for each mutant: the unit tests and all others, up to the first that fails. Some minutes each
-on two quiet cores, as long as `make test` for one that survives. Run it with `nice` beside other
-work; what waits too long on a busy machine is no catch, and `NAME.log` there shows it. `--check`
-only looks whether each text is found once.
+The test works in build/mutants, on a copy of the last commit.  A repeated call continues an
+interrupted test, because the file `results` in this folder contains a line for each tested mutant
+(source with one fault) of each commit.  First, the copy is tested without a fault.  For each
+mutant, the unit tests and all other tests are then executed up to the first failure.  A mutant
+takes several minutes on two cores; a mutant that no test detects takes as long as `make test`.  Use
+`nice` if other programs run at the same time.  On a busy machine a test can fail because it has
+waited too long, which does not count as a detection; the file `NAME.log` shows the reason of the
+failure.  With `--check` the script only checks that each text to be replaced occurs exactly once.
 
-In mutants.diff a fault is a sentence, and a change that expresses it in the sources as they are
-now. Whoever rebuilds the code expresses the same sentence anew; the former ones are in git, and are
-tried by a clone that is set to the commit that has them.
+The file mutants.diff describes each fault by a sentence and by a change of the present sources.  If
+the sources are rewritten, the sentence is kept and the change is expressed in the new sources.
+Earlier changes are in the history of mutants.diff, and can be tested in a clone at an old commit.
 
-The 24 were drawn from commit 67f9503 by `random.Random(20261124)`: two from each folder of src/,
-one from run.f90, three from post/. A draw takes a kind of fault (a sign; a comparison, which may
-be `.and.`, `.not.` or `min` as well; a dropped line that changes the state; a number or index off
-by one), a line of the folder that such a fault fits, and a place in it. Of twenty draws for each
-folder the first ones count, if they are of different subjects. Passed over were those that change
-nothing that can be seen, or only how long it takes; that every run of the program shows; whose
-effect no compiler promises, beyond an array; and those in what was to go.
+The 24 faults were drawn from commit 67f9503 by `random.Random(20261124)`: two from each folder of
+src/, one from run.f90, and three from post/.  Each draw selects a kind of fault, a line of the
+folder to which this kind can be applied, and a place in the line.  The kinds of faults are a wrong
+sign; another comparison, or another of `.and.`, `.not.` and `min`; a missing line that changes the
+state; and a number or an index that is wrong by one.  From twenty draws for each folder, the first
+draws on different subjects were used.  Faults were not used if they change no result, if they only
+change the computing time, if every run of the program would reveal them, if their effect depends on
+the compiler (access beyond an array), or if they are in code that was to be removed.
 """
 
 import argparse

@@ -36,7 +36,7 @@ class Film:
     """A client with one run that uses its socket as the page of a browser does."""
 
     def __init__(self, session, socket, address):
-        """Take what is open."""
+        """Store the open connection."""
         self.session, self.socket, self.address = session, socket, address
         self.frames, self.last = 0, {}
 

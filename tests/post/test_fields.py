@@ -19,7 +19,7 @@ SHEARED = """&box upper = 20, 10 boundary = 'wall', 'periodic' /
 
 
 def test_fields_are_those_of_the_disks_in_each_cell(tmp_path):
-    """Two disks in the left half move together, two disks in the right half separate."""
+    """Two disks in the left half have equal velocities; two disks in the right half separate."""
     position = np.array([[[0.1, 0.2], [0.2, 0.8], [0.7, 0.2], [0.8, 0.8]]] * 8)
     velocity = np.array([[[1.0, 2.0], [1.0, 2.0], [3.0, 2.0], [-1.0, 2.0]]] * 8)
     run = written(tmp_path / "a.h5", position, velocity, periodic=PERIODIC, radius=0.1)
@@ -40,7 +40,7 @@ def test_fields_are_those_of_the_disks_in_each_cell(tmp_path):
 def test_fields_of_few_values_have_no_bias_and_their_errors_hold(tmp_path, rng, cells, shear):
     """Random velocities and positions between walls: kT = 2 and a uniform accessible density.
 
-    The flow, of equal disks and of the few in a cell, is no heat, and takes none.
+    The mean flow does not contribute to the temperature, even in cells with few disks.
     """
     place = rng.uniform(0.1, [3.9, 2.9], (300, 60, 2))
     v = rng.normal(size=place.shape) + shear * np.stack([place[..., 1], 0 * place[..., 1]], axis=-1)

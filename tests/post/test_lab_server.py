@@ -112,7 +112,7 @@ def children(pid):
 
 
 def alive(pids):
-    """Return those of the processes that are alive."""
+    """Return the processes in a list that are still running."""
     found = []
     for pid in pids:
         try:
@@ -138,7 +138,7 @@ def alive(pids):
     ],
 )
 def test_nothing_is_left_behind(program, tmp_path, at, signs):
-    """This holds for running simulations, for one that places disks, and for unfinished files."""
+    """All processes end, also while disks are placed and while files are unfinished."""
     hard = {"species.gas.packing_fraction": "0.545", "species.gas.radius": "", "run.seed": "7"}
 
     async def act(process, address):

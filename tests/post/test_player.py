@@ -68,7 +68,7 @@ def test_speeds_are_counted_at_the_moment_and_so_far(playing, tmp_path, rng):
 
 
 def test_speeds_beside_disks_at_rest_are_counted_by_factors(playing, tmp_path, rng):
-    """As in a crater: a bar of disks at rest beside Maxwell's curve would hide all others."""
+    """In a linear histogram, the bar of resting disks in a crater would hide all other bars."""
     velocity = maxwell_velocities(rng, 5, 60) * np.array([1e-2, 1.0, 1.0])[np.arange(60) % 3, None]
     velocity[:, ::4] = 0
     observables = {"collisions": np.zeros(5)}
@@ -347,7 +347,7 @@ def test_paths_energies_and_colours_follow_the_log(simulated, playing, box, exac
 
 @pytest.mark.parametrize("box", BOXES)
 def test_events_to_come_are_those_of_the_log(simulated, playing, box):
-    """The events are listed, and each one can be stepped to."""
+    """The page lists the events, and the film can be moved to each of them."""
     run = simulated(BOXES[box] + FEW, *LOGGED)
     browser, events = playing(run.path), run.event_log()
     times = events.time[:40]

@@ -127,7 +127,7 @@ def temporary(tmp_path, monkeypatch):
 
 
 def test_a_temporary_file_lives_as_long_as_something_reads_it(temporary):
-    """Of a run, of its frames, or of a copy; with an output there is none."""
+    """A run, its frames and its copies use a temporary folder, unless an output is given."""
     run = package.run(GROUPS)
     again, frames = copy.deepcopy(run), run.velocity
     place = run.path
@@ -165,7 +165,7 @@ def refused(seed):
 
 
 def test_worker_processes_leave_no_temporary_folders(temporary):
-    """Whether they return numbers or runs, take runs, or fail."""
+    """Worker processes remove temporary folders if they return numbers or runs, or fail."""
     here = package.run(GROUPS)
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
         assert len(list(pool.map(number, range(1, 4)))) == 3 and len(left(temporary)) == 1
@@ -181,7 +181,7 @@ def test_worker_processes_leave_no_temporary_folders(temporary):
 
 
 class Notebook(io.StringIO):
-    """A terminal whose user interrupts Python as soon as progress is shown."""
+    """In a terminal, the user interrupts Python as soon as progress is shown."""
 
     def isatty(self) -> bool:
         return True
