@@ -80,7 +80,7 @@ from ricochet.script import by_packing, command_line, launch, measured, over_run
 import numpy as np
 
 PLAIN = {"walls"}  # the only special property allowed for Enskog's D
-#: Traits (physical properties) of runs without an equilibrium whose structure can be calculated.
+#: Traits of a run that exclude equilibrium, but not the calculation of structure functions.
 RESTLESS = (
     "inelastic",
     "soft_contacts",

@@ -162,7 +162,7 @@ class Scale(NamedTuple):
 
 
 def scale_of(run: Run, kt: float, unscaled: bool) -> Scale:
-    """Return the axis of speeds at a temperature: v if `unscaled` is true, and u otherwise."""
+    """Return the axis of speeds at a temperature, for v if `unscaled` is true, otherwise for u."""
     if not unscaled:
         return Scale()
     return Scale(float(np.sqrt(2 * kt / run.mass[0])), run.units.label("speed v", "speed"))

@@ -2,15 +2,17 @@
 
 # Benchmarks: cost of collisions, of the start of a run and of the output. docs/explanation/performance.md explains the results.
 #
-#   runs/bench.sh            1e3 to 1e5 disks at four packings; gravity, restitution, sizes, samples
-#   runs/bench.sh --full     1e6 disks as well: rates, random start, memory; runs and threads on two cores
-#   runs/bench.sh --check    numbers of instructions per collision, compared with their limits (needs valgrind)
-#
 # A rate is the number of collisions, in millions, per second of processor time. A rate is measured in runs on one core that also
 # sample observables, and the printed rate is the median of RUNS=5 runs. Before the measurement, the system is simulated until the
 # state no longer depends on the initial state. No other program should run during the measurements. The environment variable
 # RICOCHET names the measured program (default build/ricochet). The option --check requires a program that was compiled without
 # AVX-512 code, because valgrind cannot execute such code.
+#
+# Examples of calls:
+#
+#   runs/bench.sh            measures 1e3 to 1e5 disks at four packing fractions, also with gravity and other features
+#   runs/bench.sh --full     also measures 1e6 disks, the random start, the memory, and runs on two cores
+#   runs/bench.sh --check    compares the numbers of instructions per collision with their limits (requires valgrind)
 set -euo pipefail
 export LC_ALL=C # awk then reads and writes 0.5 with a point in every language
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
@@ -354,5 +356,5 @@ case ${1:-} in
     processes
     threads
     ;;
-  *) sed -n '3,13s/^# \{0,1\}//p' "$0"; exit 2 ;;
+  *) sed -n '3,15s/^# \{0,1\}//p' "$0"; exit 2 ;;
 esac

@@ -2,9 +2,11 @@
 
 # Produces the figures of all systems, and a page runs/figures/index.html that shows all figures.
 #
-#   runs/figures.sh                 all
-#   runs/figures.sh gas crater      some
-#   runs/figures.sh -j 4 gas        options before the names go to ensemble.sh
+# Examples of calls:
+#
+#   runs/figures.sh                 draws the figures of all systems
+#   runs/figures.sh gas crater      draws the figures of two systems
+#   runs/figures.sh -j 4 gas        passes the option -j 4 to ensemble.sh
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 known=(scattering gas mixture cooling crater lab cost billiards lorentz gravity state stages melting driven hopper)
 

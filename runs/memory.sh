@@ -2,13 +2,15 @@
 
 # Memory per disk in different kinds of runs, compared with the estimate of the program (src/start/memory.f90).
 #
-#   runs/memory.sh             490 000 disks, on one core without domains, and 10^6 with domains
-#   runs/memory.sh 10000000    this number of disks, only the kinds of run with domains
-#   runs/memory.sh 490000 file only the kinds whose name contains a word
-#
 # The script measures the largest resident memory of the process, and compares it with the estimate that the option --check prints.
 # The runs need about 250 bytes of memory per disk, or 700 bytes with neighbour lists. Other programs may run during the
 # measurements. The environment variable RICOCHET names the measured program (default build/ricochet).
+#
+# Examples of calls:
+#
+#   runs/memory.sh                measures 490 000 disks on one core, and 10^6 disks with domains
+#   runs/memory.sh 10000000       measures 10^7 disks, and only the kinds of runs with domains
+#   runs/memory.sh 490000 file    measures only the kinds of runs whose names contain the word "file"
 set -euo pipefail
 export LC_ALL=C # awk then reads and writes 0.5 with a point in every language
 case ${1:-} in -h | --help) sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"; exit 0 ;; esac

@@ -5,10 +5,12 @@
 # fraction of 0.5. Each run has 6 million collisions, or 15 million collisions for a million disks. Each system is simulated three
 # times, alternately with 1, 2, 4, ... threads up to the number of cores.
 #
+# The script post/scaling.py draws the figure. To repeat the measurement, remove the folder runs/scaling.
+#
+# Examples of calls:
+#
 #   runs/scaling.sh
 #   SIZES="10000 100000" THREADS="1 2 3" RUNS=5 runs/scaling.sh
-#
-# The script post/scaling.py draws the figure. To repeat the measurement, remove the folder runs/scaling.
 set -euo pipefail
 if (($# > 0)); then
   sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"

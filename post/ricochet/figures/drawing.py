@@ -62,7 +62,7 @@ def caption(runs: list[Run]) -> str:
 
 
 def count_at(run: Run, frame: int) -> dict[str, int]:
-    """Return the events or collisions before a frame, if frames are written after a number of them.
+    """Return a dictionary with the number of events or collisions before a frame, if it is known.
 
     The returned dictionary is empty if the number of frames shows that the schedule was changed
     during the run.

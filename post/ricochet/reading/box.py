@@ -1,4 +1,4 @@
-"""The box of a run: its sides, which may move, its accessible area, obstacles and walls."""
+"""Properties of the box of a run: sides, which may move, accessible area, obstacles, walls."""
 
 from collections.abc import Mapping
 from functools import cached_property

@@ -79,9 +79,10 @@ def mdanalysis_universe(run: Run) -> "MDAnalysis.Universe":
 class ImportedFrame(NamedTuple):
     """State of disks at one time, read from a file that another program has written.
 
-    The arrays in `disks` have the names of the parameters of `ricochet.write_start`: "position",
-    "velocity" (N, 2), "radius", "mass", "angular_velocity", "orientation" (N,) as far as the file
-    contains them, and "species" (N,), the names of the species.
+    The dictionary `disks` can be passed to `ricochet.write_start` as keyword arguments.  It
+    contains the arrays "position" and "velocity" (N, 2), and the arrays "radius", "mass",
+    "angular_velocity" and "orientation" (N,), except arrays that the file does not contain.  The
+    array "species" (N,) contains the name of the species of each disk.
     """
 
     time: float
