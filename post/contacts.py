@@ -6,7 +6,7 @@ The run needs an event log (output.event_log = .true.).  Each line connects two 
 in the window of time; the disks are drawn at their positions in the frame that is nearest to the
 middle of the window.  The width of a line is proportional to the mean force between the two disks,
 which is the sum of the impulses divided by the length of the window.  A line from the centre of a
-disk to its edge shows the contact of the disk with a side or an obstacle.  A contact of two disks
+disk to the edge of the disk shows its contact with a side or an obstacle.  A contact of two disks
 is called strong if its impulse is larger than the mean impulse times the value of --above.  Disks
 that are connected by strong contacts form a force chain; red lines show the chains of at least
 --at-least disks.  The second panel shows the distribution of the forces between disks, in units of

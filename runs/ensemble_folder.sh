@@ -1,10 +1,10 @@
 # shellcheck shell=bash
 # shellcheck disable=SC2154,SC2034 # ensemble.sh assigns `folder` and other variables, and reads variables that this file assigns
 
-# Functions of ensemble.sh for the files of a sweep. The functions of ensemble_folder.sh determine from the files in `folder` which
-# member runs are finished, have failed or can continue, and store the settings of the member runs. The functions never write
-# through links, into FIFOs, or into files that ensemble.sh did not create. Errors are reported by the functions `fail` and `die` of
-# ensemble.sh.
+# This file contains the functions with which ensemble.sh reads and writes the files of a sweep. The functions in this file
+# determine from the files in `folder` which member runs are finished, have failed or can continue, and store the settings of the
+# member runs. The functions never write through links, into FIFOs, or into files that ensemble.sh did not create. Errors are
+# reported by the functions `fail` and `die` of ensemble.sh.
 
 # may_be_ours FILE: returns success if FILE does not exist or is an ordinary file.
 may_be_ours() { [[ ! -L $1 && (! -e $1 || -f $1) ]]; }

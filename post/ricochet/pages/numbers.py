@@ -186,7 +186,7 @@ def equilibrium_temperature(run: Run, energy: float) -> float | None:
 
 
 def conserved_drift(run: Run) -> tuple[float, int]:
-    """Return the energy of the conserved motion of the centre of mass, and its number of axes."""
+    """Return the energy of the centre of mass along axes of conserved momentum; count the axes."""
     free = conserved_momentum(run)
     momentum = np.sum(run.mass[:, None] * run.velocity[0], axis=0)
     return float(np.sum(momentum[free] ** 2) / 2 / np.sum(run.mass)), int(np.sum(free))

@@ -252,7 +252,7 @@ class Simulation(State):
         Returns
         -------
         Simulation
-            this simulation
+            the simulation itself, so that further methods can be called
 
         Raises
         ------
@@ -326,7 +326,7 @@ class Simulation(State):
         Returns
         -------
         Simulation
-            this simulation
+            the simulation itself, so that further methods can be called
 
         Raises
         ------
@@ -407,7 +407,7 @@ class Simulation(State):
         Returns
         -------
         Simulation
-            this simulation
+            the simulation itself, so that further methods can be called
 
         Raises
         ------
