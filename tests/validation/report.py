@@ -16,11 +16,12 @@ lists all physics cases with their reference values, measured values and verdict
 program on an input of its own and compares the result with an exact value, a derived formula or
 published numbers.
 
-The values of a case share a row, which shows the value that is closest to its tolerance. The
-*verdict* is the deviation from the reference divided by the tolerance: a value passes if its
-verdict is at most 1. A reference with ≤ or ≥ is a bound, and the verdict is 0 if the bound is
-satisfied. Values that must agree to rounding (1e-9 or better) are only counted, in the row of their
-topic. The file `validation.json` beside this page contains all values with tolerances and sources.
+The table has one row for each case. If a case has several values, the row contains the value that
+is closest to its tolerance. The *verdict* is the deviation from the reference divided by the
+tolerance: a value passes if its verdict is at most 1. A reference with ≤ or ≥ is a bound, and the
+verdict is 0 if the bound is satisfied. Values that must agree to rounding (1e-9 or better) have no
+rows; the row of their topic contains their number. The file `validation.json` contains all values
+with tolerances and sources.
 
 """
 
@@ -48,37 +49,39 @@ TOPICS = {
 NOTES = """
 ## Notes on single cases
 
-Some references need a remark: they are approximate, or differ from a publication, or hold under
-conditions. A number in parentheses is the standard error of the last digit.
+The notes concern references that are approximate, that differ from a publication, or that hold only
+under certain conditions. A number in parentheses is the standard error of the last digit.
 
 - **P6-03, relaxation of a mixture.** A published ratio of energies, 1.39(1) after 2 collisions per
-  disk, is too low. The program finds 1.468(6), with time steps 1.485(11), and in a dilute gas
-  1.449(8). The Boltzmann equation gives 1.455.
+  disk, is too low. The ratio measured here is 1.468(6), or 1.485(11) with time steps, and 1.449(8)
+  in a dilute gas. The Boltzmann equation gives 1.455.
 - **P7-07, collision rates of a mixture.** The reference contains approximate contact values. To
   first order in the density their errors at packing 0.1 are +0.26, +0.16 and -0.29 % for the pairs
   11, 12 and 22. The measured deviations are +0.11(5), +0.14(7) and -0.45(6) %.
-- **P8-03, pressure of a dense fluid.** This number has no case in the table. Up to packing 0.70 the
-  program agrees with Li et al. (2022) within 0.03 to 0.2 %, which are the errors of the program.
+- **P8-03, pressure of a dense fluid.** The table contains no case P8-03. Up to packing 0.70 the
+  measured pressure agrees with Li et al. (2022) within its errors of 0.03 to 0.2 %.
 - **P8-05, pressure of the crystal.** The formula of the reference is accurate to 0.2 %.
-- **P9-07, TC model.** The fractions of elastic collisions hold to 0.01 up to packing 0.1. At higher
-  packing the same disks collide repeatedly: at packing 0.2 the fraction is 0.850 for w t_c = 1
-  (0.86 at low packing) and 0.612 for w t_c = 0.5 (0.62 at low packing). Here w is the collision
-  rate of a disk.
-- **P10-04, craters without the TC model.** A collapse does not occur in every run before a tenth of
-  the energy is left. It occurred in 14 of 18 runs.
+- **P9-07, TC model.** The theoretical fractions of elastic collisions are accurate to 0.01 up to
+  packing 0.1. At higher packing the same disks collide repeatedly: at packing 0.2 the fraction is
+  0.850 for w t_c = 1 (0.86 at low packing) and 0.612 for w t_c = 0.5 (0.62 at low packing). The
+  collision rate of a disk is denoted by w.
+- **P10-04, craters without the TC model.** Without the TC model a collapse occurred in 14 of 18
+  runs before a tenth of the energy was left.
 - **P11-01, energy under gravity.** In the published table the centres of the disks start between R
-  and 8. Here a disk lies completely inside its starting region, so the region ends at 8 + R.
+  and 8. In this program a disk lies completely inside its starting region, so the region ends at 8 +
+  R.
 - **P11-10, time steps.** The fraction of collisions that time steps miss is P(q) with q = g Δt / s,
-  where g is the relative speed, Δt the time step and s the sum of the radii. It is not P(q / 2):
-  two disks overlap along a chord, but a collision is detected only while they approach each other,
-  on the first half of the chord.
+  where g is the relative speed, Δt the time step and s the sum of the radii. The argument is q and
+  not q / 2, because a collision is detected only while the disks approach each other, which is the
+  first half of the path on which they overlap.
 - **P12-06, diffusion in a Lorentz gas.** The density expansion of D_0/D has the coefficients -4/3,
   -0.8775 and 4.519, which are quoted from memory: the papers of van Leeuwen and Weijland could not
   be consulted, and no published simulation was found. Two references are exact: the limit of low
   density, D_0 = 3v/(16nR) from the Boltzmann equation, and the mean free time of P12-05. The table
-  below compares the expansion with `runs/lorentz.sh`, which simulates 100 000 scatterers (four
-  runs of 10^6 events for each density). The first two terms agree with the measured values within
-  their errors up to n R^2 = 0.005. From 0.01 on, the omitted terms matter.
+  below compares the expansion with `runs/lorentz.sh`, which simulates 100 000 scatterers (four runs
+  of 10^6 events for each density). The first two terms agree with the measured values within their
+  errors up to n R^2 = 0.005. At n R^2 = 0.01 and above, the omitted terms are larger than the
+  errors.
 
   | n R^2 | 0.0025 | 0.005 | 0.01 | 0.02 | 0.04 | 0.08 |
   |---|---|---|---|---|---|---|
@@ -87,28 +90,28 @@ conditions. A number in parentheses is the standard error of the last digit.
   | expansion without its last term | 0.983 | 0.970 | 0.950 | 0.920 | 0.880 | 0.834 |
 
 - **P12-09, Lyapunov exponent of the stadium.** The value 0.43 is quoted from memory, because the
-  papers of Benettin and Strelcyn and of Dellago and Posch could not be consulted. The estimator is
-  confirmed by the exact exponent of an unstable path (P12-08). An independent program for points
-  (4000 paths of 2000 collisions) found 0.4292(5).
+  papers of Benettin and Strelcyn and of Dellago and Posch could not be consulted. Case P12-08
+  confirms the estimator: the exponent of an unstable path is known exactly. An independent program
+  for points (4000 paths of 2000 collisions) found 0.4292(5).
 - **P15-09, sheared inelastic gas.** The theory is linear in the stress, and its error grows with
-  the inelasticity. The table has the reduced shear rate, -P_xy and P_yy.
+  the inelasticity. The columns contain the reduced shear rate, -P_xy and P_yy.
 
   | restitution ξ | theory | measured |
   |---|---|---|
   | 0.95 | 0.2276, 0.2142, 0.9518 | 0.2275(6), 0.2168(6), 0.9494(6) |
   | 0.8 | 0.475, 0.379, 0.826 | 0.490(1), 0.386(1), 0.818(1) |
 
-- **P15-13, Maxwell's demon.** The threshold, here a floor velocity of 0.73, is derived for many
-  dilute grains. The 120 disks of the case distribute evenly from about 0.65 on. 600 disks with a
-  fifth of the diameter are still separated at this velocity.
-- **P15-20, effusion.** The rate of the reference holds for an opening that is much narrower than
-  the mean free path and than the chamber. It is 1.9(6) % higher for an opening of 0.05 of the
-  chamber, and 5.4(6) % higher if the opening is 0.2 mean free paths wide besides.
-- **P15-21, discharge of a hopper.** The tolerance is that of the literature, k between 1 and 2. The
-  values of k and of the exponent were each fitted with the other one fixed, because they are
-  strongly correlated. Smooth grains do not obey the law: 2000 of them have an exponent of 1.29(3)
-  with k = 1.3(2).
-"""
+- **P15-13, Maxwell's demon.** The theoretical threshold, a floor velocity of 0.73, is derived for
+  many dilute grains. The 120 disks of this case distribute evenly between the chambers if the
+  velocity is about 0.65 or more. With 600 disks of a fifth of the diameter, most disks are still in
+  one chamber at 0.65.
+- **P15-20, effusion.** The theoretical rate applies to an opening that is much narrower than the
+  mean free path and than the chamber. The measured rate is 1.9(6) % higher if the opening is as
+  wide as 0.05 of the chamber, and 5.4(6) % higher if it is also 0.2 mean free paths wide.
+- **P15-21, discharge of a hopper.** The tolerance allows the values of the literature, k between 1
+  and 2. The values of k and of the exponent were each fitted with the other one fixed, because they
+  are strongly correlated. Smooth grains do not obey Beverloo's law: for 2000 smooth grains the
+  fitted exponent is 1.29(3), with k = 1.3(2). """
 
 
 def number(value: float, digits: int = 9) -> str:
@@ -187,12 +190,12 @@ def outcome(cases: list[dict], seconds: float) -> str:
 BARS = """
 ## Error bars and p-values
 
-The tables of this section show how often the error bars of the scripts contain the true value. They
-are written by `python tests/coverage_tables.py`. The systems and quantities were chosen before the
-first run. The seeds of the tables were not used to improve the estimators, with two exceptions.
-These seeds showed that the errors of the flow and of the slopes under gravity were wrong. The rows
-of these two quantities were measured again with corrected estimators. Curves against
-time of cooling gases are compared at one time for all groups.
+The tables of this section show how often the error bars of the scripts contain the true value. The
+command `python tests/coverage_tables.py` writes these tables. The systems and quantities were
+chosen before the first run. The seeds of the tables were not used to improve the estimators, with
+two exceptions: the first tables showed that the errors of the flow and of the slopes under gravity
+were wrong. The rows of these two quantities were measured again with corrected estimators. Curves
+of cooling gases against time are compared at one fixed time.
 
 An error bar belongs to a single run, or to a group of runs if the name of the system states a
 number of runs. The columns are:
@@ -242,7 +245,7 @@ def statistics_tables(base: Path) -> str:
         for row in tables["p_values"]
     ]  # fmt: skip
     missing = ", ".join(f"*{name}*" for name in tables.get("missing", []))
-    rest = f"\nThese systems of the lists have not been measured yet: {missing}.\n" * bool(missing)
+    rest = f"\nThe script lists further systems that have not been measured yet: {missing}.\n" * bool(missing)
     return BARS + "\n".join(bars) + "\n" + P_VALUES + "\n".join(p_values) + "\n" + rest
 
 
