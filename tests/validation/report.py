@@ -68,8 +68,8 @@ under certain conditions. A number in parentheses is the standard error of the l
 - **P10-04, craters without the TC model.** Without the TC model a collapse occurred in 14 of 18
   runs before a tenth of the energy was left.
 - **P11-01, energy under gravity.** In the published table the centres of the disks start between R
-  and 8. In this program a disk lies completely inside its starting region, so the region ends at 8 +
-  R.
+  and 8. In this program a disk lies completely inside its starting region, which therefore ends at
+  8 + R.
 - **P11-10, time steps.** The fraction of collisions that time steps miss is P(q) with q = g Δt / s,
   where g is the relative speed, Δt the time step and s the sum of the radii. The argument is q and
   not q / 2, because a collision is detected only while the disks approach each other, which is the
@@ -245,7 +245,10 @@ def statistics_tables(base: Path) -> str:
         for row in tables["p_values"]
     ]  # fmt: skip
     missing = ", ".join(f"*{name}*" for name in tables.get("missing", []))
-    rest = f"\nThe script lists further systems that have not been measured yet: {missing}.\n" * bool(missing)
+    rest = (
+        f"\nThe script lists further systems that have not been measured yet: {missing}.\n"
+        * bool(missing)
+    )
     return BARS + "\n".join(bars) + "\n" + P_VALUES + "\n".join(p_values) + "\n" + rest
 
 
