@@ -308,9 +308,9 @@ def test_the_code_that_the_page_on_output_shows_runs_the_program(program, tmp_pa
     ran(program, *again.split(), cwd=tmp_path, check=True)
 
 
-def test_the_code_that_the_page_on_output_shows_finds_how_disks_move(program, tmp_path):
+def test_the_code_on_time_correlations_of_the_page_on_output_works(program, tmp_path):
     """The example is executed with a tenth of the disks and a twentieth of the time."""
-    page = section("output", "## How disks move and are arranged")
+    page = section("output", "## Time correlations and structure")
     blocks = [textwrap.dedent(one) for one in re.findall(r"(?:^    .*\n)+", page, re.M)]
     assert len(blocks) == 3
     text = (ROOT / "input" / "glass.nml").read_text()
@@ -332,9 +332,9 @@ def test_the_code_that_the_page_on_output_shows_finds_how_disks_move(program, tm
     assert (said.returncode, said.stderr) == (0, "")
 
 
-def test_the_code_that_the_page_on_output_shows_finds_what_disks_carry(program, tmp_path):
+def test_the_code_on_transport_of_the_page_on_output_works(program, tmp_path):
     """The example is executed with two seeds and a thousandth of the time."""
-    page = section("output", "## What disks carry")
+    page = section("output", "## Transport coefficients")
     blocks = [textwrap.dedent(one) for one in re.findall(r"(?:^    .*\n)+", page, re.M)]
     (tmp_path / "runs").mkdir()
     (tmp_path / "input").symlink_to(ROOT / "input")
