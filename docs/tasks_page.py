@@ -30,19 +30,22 @@ with ⟨v⟩ = {v_light} and {v_heavy} (theory {v_light_theory} and {v_heavy_the
 """,
     "cooling": """\
 After 20 collisions per disk the ratio of the temperatures, heavy over light, is {ratio_1} for ξ =
-1, {ratio_0.9} for ξ = 0.9 and {ratio_0.8} for ξ = 0.8 (eight seeds): there is no equipartition.
+1, {ratio_0.9} for ξ = 0.9 and {ratio_0.8} for ξ = 0.8 (eight seeds). There is no equipartition for
+ξ < 1.
 """,
     "crater": """\
 - In a bed of 2000 grains {hit} are hit, and {displaced} move by more than their radius. They come
   from a region that is {width} wide and {depth} deep (eight beds).
 - *Mass.* The number of hit grains grows with the mass of the projectile to the power {hit_mass}.
-- *Speed.* The exponent is {hit_speed}: the crater does not depend on the speed.
-- *Radius.* In a bed that is large enough the crater decreases slowly with the radius of the
-  projectile. In a smaller bed it grows with the radius instead, because a small projectile
-  reaches the floor and leaves its energy there: with 1000 grains 537, 610 and 663 are hit for the
-  radii 2, 5 and 10; with 5000 grains 1043, 951 and 905.
-- *How large is large enough?* About 7.5 M (1/f - 1)/(1 - ξ²) grains, where M is the ratio of the
-  masses and f the fraction of the energy that is left at the end. Here these are 2250.
+- *Speed.* The number of hit grains grows with the speed to the power {hit_speed}. The crater does
+  not depend on the speed.
+- *Radius.* In a sufficiently large bed the crater becomes slowly smaller with the radius of the
+  projectile: with 5000 grains 1043, 951 and 905 grains are hit for the radii 2, 5 and 10. In a
+  smaller bed the crater becomes larger with the radius, because a small projectile reaches the
+  floor and loses its energy there: with 1000 grains 537, 610 and 663 grains are hit.
+- *Size of the bed.* A bed of about 7.5 M (1/f - 1)/(1 - ξ²) grains is sufficiently large, where M
+  is the ratio of the masses and f the fraction of the energy that is left at the end. For the
+  values of this problem the estimate is 2250 grains.
 - *Restitution.* As ξ approaches 1 the crater grows to the whole bed.
 """,
     "energy": """\
