@@ -17,32 +17,35 @@ ROOT = Path(__file__).resolve().parents[1]
 FOLDER = "docs/reference/input"
 LAW = "Collision rules of boundaries"
 GROUPS = {
-    "run": "Seed, method and number of threads of the run.",
-    "box": "Size of the box, its boundaries, gravity and shear "
+    "run": "The group contains the seed, the method and the number of threads of the run.",
+    "box": "The group contains the size of the box, its boundaries, gravity and shear "
     "([theory](../../explanation/theory.md#sheared-boxes)).",
-    "side": "A side of the box that is a wall, with its motion "
-    "([theory](../../explanation/theory.md#sides-that-move)); one group for each side that is "
-    "described. Its collision rule is described under [boundaries](boundaries.md).",
-    "obstacle": "A circular obstacle or an arc, or many of them from a file; repeated for each. "
-    "Its collision rule is described under [boundaries](boundaries.md).",
-    "wall": "A straight wall, a polyline, or many walls from a file; repeated for each. Disks "
-    "bounce off both faces and off the end points. Its collision rule is described under "
+    "side": "The group describes a side of the box that is a wall, with its motion "
+    "([theory](../../explanation/theory.md#sides-that-move)). Each group describes one side. The "
+    "collision rule of a side is described under [boundaries](boundaries.md).",
+    "obstacle": "The group describes a circular obstacle or an arc, or many of them from a file, "
+    "and may be repeated. The collision rule of an obstacle is described under "
     "[boundaries](boundaries.md).",
-    LAW: "Each group `&side`, `&obstacle` and `&wall` may contain these variables. Where they "
-    "are not given, the `wall_...` variables of [`&contact`](contact.md) apply.",
-    "species": "Disks of one kind; repeated for each species. At least one is needed "
+    "wall": "The group describes a straight wall, a polyline, or many walls from a file, and may "
+    "be repeated. Disks bounce off both faces of a wall and off its end points. The collision rule "
+    "of a wall is described under [boundaries](boundaries.md).",
+    LAW: "Each group `&side`, `&obstacle` and `&wall` may contain these variables, which describe "
+    "the collisions of disks with one boundary. For a boundary without these variables, the "
+    "`wall_...` variables of [`&contact`](contact.md) apply.",
+    "species": "The group describes disks of one kind. It is repeated for each species, and an "
+    "input file contains at least one such group "
     "([starting states](../../explanation/theory.md#starting-states)).",
-    "contact": "Collision rules of disks, and of boundaries that have none of their own "
-    "([theory](../../explanation/theory.md#contact)).",
-    "drive": "Driving: changes of velocities (kicks) at fixed intervals "
+    "contact": "The group contains the collision rules of disks, and of boundaries that have no "
+    "rule of their own ([theory](../../explanation/theory.md#contact)).",
+    "drive": "The group describes driving, which changes velocities at fixed intervals "
     "([theory](../../explanation/theory.md#kicks)).",
-    "stop": "End of the run, at the first of these rules that is met. At least one is needed. If "
-    "no further event can occur and no `time` is given, the run ends at the last collision, or "
-    "at the sample that is due after it.",
-    "output": "Contents of the output file, and the times at which they are written. The initial "
-    "and the final state are always written. Averages over samples by collisions or events "
-    "differ from averages over time by a relative amount of order 1/N "
-    "([output](../output.md#observables)).",
+    "stop": "The group contains the rules that end the run. The run ends when the first of these "
+    "rules is met, and at least one rule is needed. If no further event can occur and no `time` is "
+    "given, the run ends at the last collision, or at the sample that is due after it.",
+    "output": "The group determines the contents of the output file, and the times of frames and "
+    "samples. The initial and the final state are always written. Averages over samples at "
+    "intervals of collisions or events differ from averages over time by a relative amount of "
+    "order 1/N ([output](../output.md#observables)).",
 }
 #: Input file from which the example of each group is taken.
 EXAMPLES = {
@@ -64,9 +67,10 @@ HEAD = """\
 
 This page is the reference for all variables of an input file, for everybody who writes one.
 [input/README](../../input/README.md) explains the rules of the format and shows how to describe a
-system; [input/reference.nml](../../input/reference.nml) is a file with all variables. The same text
-for one variable is printed by `ricochet --explain VARIABLE`; `--explain WORD` searches names,
-choices and explanations. `docs/input_page.py` generates these pages from the table in the program.
+system; [input/reference.nml](../../input/reference.nml) is a file with all variables. The command
+`ricochet --explain VARIABLE` prints the same text for one variable, and `--explain WORD` searches
+names, choices and explanations. `docs/input_page.py` generates these pages from the table in the
+program.
 
 A file consists of groups `&name ... /` with lines `variable = value`. Only values that differ from
 the default are needed. On the command line `--set GROUP.VARIABLE=VALUE` replaces a value. A
@@ -74,11 +78,12 @@ species, an obstacle or a wall is addressed by its name, as in `--set species.pr
 and one element of a vector by its number, as in `--set 'box.gravity(2)=-5'`. The file chooses the
 units of length, time and mass ([units](../explanation/glossary.md#units)).
 
-For each variable the pages list the values that are *allowed*, the *default* (if there is none, an
-example), the choice of another variable with which it *applies*, and variables of its group with
-which it may *not* be given *together*. A variable *may change* when a run is continued
-(`--resume`), because it has no effect on the trajectory, or while a simulation runs (in Python and
-on the laboratory page). All other variables are fixed during a run.
+A table for each variable lists the allowed values with their unit, the default, and an example if
+the variable has no default. The row *applies with* names the choice of another variable for which
+the variable has an effect. The row *excludes* names variables that cannot be given together with
+it. The row *may change* exists for two kinds of variables: variables without an effect on the
+trajectory may change when a run is continued with `--resume`, and some others may change while a
+simulation runs (in Python and on the laboratory page). All other variables are fixed during a run.
 
 ## Groups
 
@@ -133,23 +138,20 @@ def condition(group: str, entry: dict) -> str:
 
 
 def facts(group: str, entry: dict) -> list[str]:
-    """Return the properties of a variable, such as its allowed values, as text for the page."""
-    allowed = [f"Allowed: {entry['allowed']}" + f" [{entry['unit']}]" * bool(entry["unit"])]
+    """Return the rows of the table of a variable, such as its allowed values."""
+    rows = {"allowed": entry["allowed"] + f" [{entry['unit']}]" * bool(entry["unit"])}
     if entry["default"] is not None:
-        default = f"Default: `{written(entry)}`"
+        rows["default"] = f"`{written(entry)}`"
     else:
         given = "none; must be given" + " where it applies" * bool(entry["goes_with"])
-        default = f"Default: {entry['otherwise'] or given}. Example: `{written(entry)}`"
-    applies = condition(group, entry)
-    excludes = ", ".join(f"`{name}`" for name in entry["excludes"] or [])
-    change = "on `--resume`" * entry["resumable"] + "while a simulation runs" * entry["changeable"]
-    return [
-        *allowed,
-        default,
-        *([f"Applies with: {applies}"] if applies else []),
-        *([f"Not together with: {excludes}"] if excludes else []),
-        *([f"May change: {change}"] if change else []),
-    ]
+        rows["default"] = entry["otherwise"] or given
+        rows["example"] = f"`{written(entry)}`"
+    rows["applies with"] = condition(group, entry)
+    rows["excludes"] = ", ".join(f"`{name}`" for name in entry["excludes"] or [])
+    rows["may change"] = (
+        "on `--resume`" * entry["resumable"] + "while a simulation runs" * entry["changeable"]
+    )
+    return [f"| {name} | {value} |" for name, value in rows.items() if value]
 
 
 def section(group: str, name: str, entry: dict) -> str:
@@ -158,7 +160,8 @@ def section(group: str, name: str, entry: dict) -> str:
     meanings = (entry["meanings"] or {}).items()
     lines = [f"### `{title}`", "", plain(entry["help"]), ""]
     lines += [f"- `'{word}'`: {plain(meaning)}" for word, meaning in meanings]
-    lines += [""] * bool(meanings) + [plain(". ".join(facts(group, entry)) + "."), ""]
+    lines += [""] * bool(meanings) + ["| property | value |", "|---|---|"]
+    lines += [plain(row) for row in facts(group, entry)] + [""]
     return "\n".join(lines)
 
 
@@ -183,7 +186,8 @@ def example_of(group: str) -> list[str]:
     text = (ROOT / "input" / f"{name}.nml").read_text(encoding="utf-8")
     kind = "side" if group == LAW else group
     blocks = re.findall(rf"^&{kind}\n.*?^/\n", text, re.MULTILINE | re.DOTALL)
-    lines = ["## Example", "", f"From [{name}.nml](../../../input/{name}.nml):", "", "```text"]
+    link = f"[{name}.nml](../../../input/{name}.nml)"
+    lines = ["## Example", "", f"The example is part of {link}:", "", "```text"]
     lines += ["".join(blocks).rstrip("\n"), "```"]
     if (ROOT / f"input/pictures/{name}.png").exists():
         lines += ["", f"![{name}.nml](../../../input/pictures/{name}.png)"]
@@ -198,7 +202,9 @@ def linked(name: str, group: str) -> str:
 
 def group_page(group: str, entries: dict[str, dict]) -> str:
     """Return the text of the page about a group of input variables."""
-    lines = [f"# {title_of(group)}", "", GROUPS[group], "", *example_of(group)]
+    subject = "collision rules of boundaries" if group == LAW else f"the group `&{group}`"
+    purpose = f"This page is the reference for {subject}, for everybody who writes an input file."
+    lines = [f"# {title_of(group)}", "", f"{purpose} {GROUPS[group]}", "", *example_of(group)]
     lines += ["## Variables", "", "| variable | default |", "|---|---|"]
     for name, entry in entries.items():
         default = f"`{written(entry)}`" if entry["default"] is not None else ""

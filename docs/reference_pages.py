@@ -29,7 +29,7 @@ INPUTS_HEAD = """\
 
 This page is a gallery of the files in `input/`, for everybody who looks for an experiment to start
 from. Each file is ready to run, and its comments explain the settings. A picture shows the
-simulation at one time; `make lab` shows it moving. `docs/reference_pages.py` generates this page.
+simulation at one time; `make lab` shows the motion. `docs/reference_pages.py` generates this page.
 
 """
 
@@ -107,7 +107,8 @@ def inputs_page() -> str:
             picture = f"input/pictures/{name}.png"
             shown = f"![{name}](../../{picture})" if (ROOT / picture).exists() else ""
             about = summary(ROOT / "input" / f"{name}.nml").replace("|", "\\|")
-            lines.append(f"| {shown} | [{name}.nml](../../input/{name}.nml) | {about}. |")
+            end = "" if about.endswith("?") else "."
+            lines.append(f"| {shown} | [{name}.nml](../../input/{name}.nml) | {about}{end} |")
         lines.append("")
     return "\n".join(lines)
 

@@ -45,7 +45,7 @@
    An exit code is 0 for success, 2 for invalid input, 3 for a file that cannot be read or written, and 4 for a
    simulation that broke off. Negative values of counts and of `room` are treated as 0.
 
-   libricochet.so does not need HDF5. libricochet_files.so also contains the functions at the end of this file, and
+   libricochet.so does not need HDF5. libricochet_files.so also contains ricochet_save and ricochet_load, and
    its ricochet_open also accepts species that start from the output file of a run. A handle that one of the two libraries
    has returned can be passed to functions of the other library. */
 #ifndef RICOCHET_H

@@ -13,15 +13,15 @@ module choices
   type(choice_t), parameter :: list(*) = [ &
     choice_t("dynamics", "events", "Event-driven: exact motion from one collision to the next, without a time step."), &
     choice_t("dynamics", "steps", "Time-stepped: all disks move for a fixed time step dt, after which overlapping pairs " &
-      //"collide. Collisions are up to one step late, and short contacts can be missed. This method exists for comparison. It " &
+      //"collide. Collisions are up to one step late, and short contacts can be missed. This method exists for comparison, and " &
       //"cannot be combined with box.shear_rate or a piston."), &
     choice_t("search", "cells", "Search in the nine cells around a disk, or in neighbour lists if the sizes of the disks " &
       //"differ much. The cost per event does not depend on the number N of disks."), &
     choice_t("search", "pairs", "Search among all disks. The cost per event is O(N)."), &
     choice_t("search", "rescan", "Search among all disks, with new predictions for all pairs after each event. The cost per " &
       //"event is O(N**2)."), &
-    choice_t("queue", "calendar", "Calendar queue: its cost per event does not depend on N."), &
-    choice_t("queue", "heap", "Heap with four children per node: its cost per event is O(log N)."), &
+    choice_t("queue", "calendar", "Calendar queue, whose cost per event does not depend on N."), &
+    choice_t("queue", "heap", "Heap with four children per node, whose cost per event is O(log N)."), &
     choice_t("boundary", "wall", "Disks bounce off both sides. The collision rule of all sides is set in &contact, and the " &
       //"rule of a single side in a group &side."), &
     choice_t("boundary", "periodic", "Opposite sides are identified (periodic boundary condition). Along this axis the box " &
@@ -72,8 +72,8 @@ module choices
     choice_t("placement", "grown", "Lubachevsky-Stillinger compression that starts at the positions in the starting file " &
       //"(file): disks grow from smaller radii to the radii in this input."), &
     choice_t("placement", "relaxed", "Dense start in equilibrium: a lattice or a packing as with 'dense', equilibrated by " &
-      //"event-chain Monte Carlo, with swaps of disks whose radii differ. All species of the run must use it, in a box " &
-      //"without obstacles, moving sides and gravity. --check leaves the placement out."), &
+      //"event-chain Monte Carlo, with swaps of disks whose radii differ. All species of the run must use this " &
+      //"placement, in a box without obstacles, moving sides and gravity. The option --check omits this placement."), &
     choice_t("velocities", "rest", "All disks start at rest."), &
     choice_t("velocities", "equal_speed", "All disks have the same speed, in random directions."), &
     choice_t("velocities", "uniform", "Both components are uniformly distributed between -speed and speed."), &
