@@ -33,6 +33,10 @@ After 20 collisions per disk the ratio of the temperatures, heavy over light, is
 1, {ratio_0.9} for ξ = 0.9 and {ratio_0.8} for ξ = 0.8 (eight seeds). There is no equipartition for
 ξ < 1.
 """,
+    "walls": """\
+After 20 collisions per disk K/K₀ is {left_velocity} with the walls of the exam and {left_normal}
+with smooth walls (ξ = 0.8, eight seeds).
+""",
     "crater": """\
 - In a bed of 2000 grains {hit} are hit, and {displaced} move by more than their radius. They come
   from a region that is {width} wide and {depth} deep (eight beds).
@@ -93,12 +97,16 @@ def mixture() -> Numbers:
 
 
 def cooling() -> Numbers:
-    """Return the ratio of the temperatures of the two species after cooling, by restitution."""
-    end = table("cooling_velocity")[-1]
-    return {
-        f"ratio_{xi}": value(end, f"ratio_xi{xi}", f"ratio_error_xi{xi}")
+    """Return the ratios of the temperatures of both species, and the energy left, after cooling."""
+    end = {rule: table(f"cooling_{rule}")[-1] for rule in ("velocity", "normal")}
+    found = {
+        f"ratio_{xi}": value(end["velocity"], f"ratio_xi{xi}", f"ratio_error_xi{xi}")
         for xi in ("1", "0.9", "0.8")
     }
+    left = {
+        f"left_{rule}": value(row, "K_all_xi0.8", "K_all_error_xi0.8") for rule, row in end.items()
+    }
+    return found | left
 
 
 def crater() -> Numbers:
