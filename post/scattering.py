@@ -6,9 +6,9 @@ Each run contains two disks, one of which is at rest at the start.  The impact p
 distance between the path of the moving disk and the centre of the disk at rest.  The sign of b is
 positive if the moving disk passes on the left.  R12 = r1 + r2 is the sum of the radii.  The
 scattering angle is the angle between the initial and the final velocity of the moving disk.  Let M
-= m1 / m2 be the mass ratio, xi the coefficient of restitution, s = b / R12, c^2 = 1 - s^2, and
-kappa = (1 + xi) / 2 * M / (1 + M).  For finite M the exact scattering angle is given by the
-following formula:
+be the mass of the disk at rest divided by the mass of the moving disk, xi the coefficient of
+restitution, s = b / R12, c^2 = 1 - s^2, and kappa = (1 + xi) / 2 * M / (1 + M).  For finite M the
+exact scattering angle is given by the following formula:
 
     tan theta = 2 kappa s c / (1 - 2 kappa c^2).
 
@@ -58,11 +58,11 @@ def draw(rows: list[dict], ratio: float, restitution: float) -> plt.Figure:
     figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(6, 6), height_ratios=(3, 1))
     end = max(1.2, np.abs(s).max())
     fine = np.linspace(-end if s.min() < 0 else 0, end, 2401)
-    label = f"exact, $m_1/m_2$ = {ratio:,.7g}, ξ = {restitution:g}"
+    label = f"exact, mass ratio {ratio:,.7g}, ξ = {restitution:g}"
     exact = np.degrees(scattering_angle(fine, ratio, restitution))
     top.plot(fine, exact, color="black", lw=1.2, label=label)
     if restitution == 1:
-        label, heavy = "$m_1/m_2 = \\infty$: $2\\arccos(|b|/R_{12})$", scattering_angle(fine)
+        label, heavy = "infinite mass ratio: $2\\arccos(|b|/R_{12})$", scattering_angle(fine)
         top.plot(fine, np.degrees(heavy), color=COLOURS[4], lw=1.2, ls="--", label=label)
     label = f"simulation, {len(rows)} runs"
     top.plot(s, angle, ls="", marker="o", mfc="none", color=COLOURS[0], label=label)
