@@ -199,7 +199,8 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
         a2 = estimate([track[:common] for _, track in tracks])
         error = a2.error if len(runs) > 1 else None
         axes.errorbar(tau, a2.mean, error, color=colour, marker=".", lw=1, label=f"N = {count}")
-        noise_band(axes, count * len(runs), colour, "95 % in equilibrium")
+        label = "95 % in equilibrium" + f", N = {count}" * (len(groups) > 1)
+        noise_band(axes, count * len(runs), colour, label)
         closed = all(run.nature <= {"obstacles", "rotating", "walls"} for run in runs)
         equal = equal and closed and max(a[0] for _, a in tracks) < -0.4
     if equal:

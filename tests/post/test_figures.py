@@ -207,14 +207,17 @@ def test_speeds_are_drawn_in_units_of_the_input_on_request(tmp_path, rng, figure
 
 
 def test_the_coefficient_of_speeds_is_explained_beside_its_band(tmp_path, rng, figures):
-    """The legend shows the colours of the band and of the curve."""
-    path = maxwellian(tmp_path / "gas.h5", rng)
+    """The legend shows the colours of the band and of the curve, for each number of disks."""
+    path, small = maxwellian(tmp_path / "gas.h5", rng), maxwellian(tmp_path / "b.h5", rng, count=50)
     assert run_script("speeds", path, "-o", tmp_path / "a.png") == 0
-    way = figures[0].axes[3]
-    assert "0 for Maxwell's speeds" in way.texts[0].get_text()
-    shown = dict(zip(*way.get_legend_handles_labels()[::-1], strict=True))
-    band = shown["95 % in equilibrium"].get_facecolor()
-    assert band[:3] == colors.to_rgb(shown["N = 400"][0].get_color())
+    assert run_script("speeds", path, small, "-o", tmp_path / "a.png") == 0
+    assert "0 for Maxwell's speeds" in figures[0].axes[3].texts[0].get_text()
+    for figure, ends in zip(figures, ({400: ""}, {50: ", N = 50", 400: ", N = 400"}), strict=True):
+        labels = figure.axes[3].get_legend_handles_labels()
+        shown = dict(zip(*labels[::-1], strict=True))
+        for count, end in ends.items():
+            band = shown[f"95 % in equilibrium{end}"].get_facecolor()
+            assert band[:3] == colors.to_rgb(shown[f"N = {count}"][0].get_color())
 
 
 # --- pictures of disks ---
