@@ -56,11 +56,11 @@ with smooth walls (ξ = 0.8, eight seeds).
 The total energy of all methods is constant to {energy_change}. The time steps miss {missed_0.001}
 % of the collisions for dt = 0.001, {missed_0.002} % for 0.002 and {missed_0.004} % for 0.004; the
 formula gives {expected_0.001}, {expected_0.002} and {expected_0.004} % (32 pairs of runs of 520
-time units).
+s).
 """,
     "equipartition": """\
-The mean energies of both species agree within 10 % from the time {T_first} (earliest of the four
-v₀) to {T_last} (latest) on. The time hardly depends on v₀.
+The mean energies of both species agree within 10 % from ({T_first}) s on for the earliest of the
+four v₀, and from ({T_last}) s on for the latest. The time hardly depends on v₀.
 """,
     "laws": """\
 Relative to the exponential laws, the measured slopes of seed 1 are {speed_A} and {speed_B} for v²

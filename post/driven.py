@@ -348,7 +348,7 @@ def draw(
         drawing.disk_collection(panel, run, run.position[frame], facecolors=shades, **rim)
         panel.set_title("\n".join(filter(None, (name, f"t = {run.time[frame]:.4g}"))))
     panels[0].tick_params(labelleft=True)
-    panels[0].set_ylabel("y", labelpad=-8)
+    panels[0].set_ylabel(runs[0].units.coordinate("y"), labelpad=-8)
     if not any(species for _, species in tracks):  # otherwise the legend shows their colours
         drawing.species_legend(figure, runs[0])
     figure.suptitle(drawing.titled(runs))

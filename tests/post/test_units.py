@@ -67,8 +67,10 @@ def test_the_axes_of_a_figure_have_the_named_units(tmp_path, rng, monkeypatch):
     monkeypatch.setattr(script, "save", kept)
     words = ("--units", "length=cm,time=s", "--colour", "speed")
     assert run_script("snapshot", path, "-o", tmp_path / "a.png", *words) == 0
-    assert "speed (cm/s)" in texts
+    assert "speed (cm/s)" in texts and "y (cm)" in texts
     assert np.all(["reduced" not in text for text in texts])
+    assert run_script("snapshot", path, "-o", tmp_path / "a.png") == 0
+    assert "y" in texts, "the box without names of units"
     page = tmp_path / "a.html"
     assert run_script("player", path, "-o", page, *words) == 0
     assert "speed (cm/s)" in page.read_text()

@@ -222,8 +222,8 @@ def draw_box(axes: Axes, run: Run, time: float | None = None) -> None:
     (x0, y0), (x1, y1) = run.lower, run.upper
     axes.set_xticks([x0, x1], [f"{x0:g}", f"{x1:g}"])
     axes.set_yticks([y0, y1], [f"{y0:g}", f"{y1:g}"])
-    axes.set_xlabel("x", labelpad=-8)
-    axes.set_ylabel("y", labelpad=-8)
+    axes.set_xlabel(run.units.coordinate("x"), labelpad=-8)
+    axes.set_ylabel(run.units.coordinate("y"), labelpad=-8)
     axes.tick_params(length=3)
     axes.label_outer()
     axes.spines[:].set_visible(False)

@@ -43,6 +43,13 @@ class Units(NamedTuple):
         unit = self.name(quantity or words)
         return f"{words} ({unit})" if unit else words
 
+    def coordinate(self, name: str) -> str:
+        """Return the label of an axis of a picture of the box, for example 'x (m)'.
+
+        Without the name of a unit the label is only 'x', because these axes are short.
+        """
+        return f"{name} ({self.length})" if self.length else name
+
     def name(self, quantity: str) -> str:
         """Return the unit of a quantity, or 'reduced units' if the name of a unit is unknown."""
         if quantity == "energy" and self.energy:
