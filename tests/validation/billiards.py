@@ -321,11 +321,11 @@ CASES = [
     ),
     Case(
         "W1-01", "right-angled wedge under gravity, 160 collisions: deviation of the path",
-        (FALL,), miss, 0, within(1e-10), "two independent bouncing balls",
+        (FALL,), miss, 0, within(1e-10), "D: two independent bouncing balls",
     ),
     Case(
         "W1-03", "wedge with time steps of 1e-5, 8 collisions: deviation of the path",
-        (STEPS,), miss, 0, within(1e-3), "two independent bouncing balls",
+        (STEPS,), miss, 0, within(1e-3), "D: two independent bouncing balls",
     ),
     Case(
         "P12-03", "Sinai's billiard, 2e6 collisions: mean free path",

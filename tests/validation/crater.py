@@ -90,11 +90,11 @@ CRATERS = [
     ),
     Case(
         "P10-03", "craters, masses 1 to 25: increase of the disks hit, in standard errors",
-        SCAN, rises, 2, AT_LEAST, "granulargas, R",
+        SCAN, rises, 2, AT_LEAST, "a student's report; R",
     ),
     Case(
         "P10-03", "craters, masses 1 to 25: correlation of the disks hit with the mass",
-        SCAN, straightness, 0.97, AT_LEAST, "granulargas, R",
+        SCAN, straightness, 0.97, AT_LEAST, "a student's report; R",
     ),
     Case(
         "P10-04", "craters without TC model: fraction of 12 runs that end in a reported collapse",

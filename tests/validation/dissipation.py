@@ -108,7 +108,7 @@ GAS = [
         Case(
             "P9-01", f"cooling, ξ = {xi}: K / K(0) after {tau} collisions per disk",
             COOLING[xi], over(lambda run, tau=tau: left(run, tau)),
-            hd.haff_by_collisions(tau, xi), relative(0.03), "van Noije and Ernst; R",
+            hd.haff_by_collisions(tau, xi), relative(0.03), "van Noije and Ernst 1998; R",
         )
         for xi, tau in ((0.9, 10), (0.9, 20), (0.8, 10))
     ],

@@ -241,7 +241,7 @@ MIXTURES = [
         "P7-07", "radii 1 : 2, masses 1 : 4, packing 0.1: collision rates of each pair of species",
         mixtures(4, radii_for(0.1, 2), (1, 4), event_log=True), over(species_rates),
         mixture_rates(2 * np.array(radii_for(0.1, 2)), [N / 2, N / 2], [1, 4]).ravel(),
-        relative(0.01), "section 7",
+        relative(0.01), "Jenkins and Mancini 1987; Santos, Yuste and Lopez de Haro 2002",
     ),
 ]  # fmt: skip
 

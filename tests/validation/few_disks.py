@@ -90,19 +90,19 @@ ONE = [
         "P1-04", "one disk on a closed path: order and times of the collisions",
         (square_path(events=4),),
         lambda run: [*run.event_log().j, *run.event_log().time],
-        [-1, -3, 0, -2, 0.4, 0.65, 1.2, 1.45], within(1e-14), "EX B.1",
+        [-1, -3, 0, -2, 0.4, 0.65, 1.2, 1.45], within(1e-14), "EX, section B.1",
     ),
     Case(
         "P1-04", "one disk from the centre into the corners: back after 4 collisions",
         (square_path((0.5, 0.5), time=1.6),),
         lambda run: [*run.position[-1][0], *final(run), len(run.event_log().time)],
-        [0.5, 0.5, 1, 1, 4], within(1e-14), "EX B.1",
+        [0.5, 0.5, 1, 1, 4], within(1e-14), "EX, section B.1",
     ),
     Case(
         "P1-05", "walls with restitution 0: velocity and number of events",
         (square_path(contact={"wall_restitution": 0}, time=2),),
         lambda run: [*final(run), len(run.event_log().time), run.time[-1]],
-        [0, 0, 1, 2], EXACT, "EX B.1",
+        [0, 0, 1, 2], EXACT, "EX, section B.1",
     ),
     Case(
         "P1-06", "walls, rule 'velocity', ξ = 0.9: times of 6 collisions",
@@ -199,12 +199,12 @@ TWO = [
             0.216327631153395, 0.367472195926245, -0.781276238886498, -0.289157398642082,
             0.460425412962166, 0.11888046875,
         ],
-        within(1e-13), "EX eq. 7, 11; D",
+        within(1e-13), "EX, eq. 7 and 11; D",
     ),
     Case(
         "P2-06", "two disks that graze, recede or are at relative rest: number of collisions",
         NO_MEETING, each(lambda run: np.sum(run.event_log().j > 0)),
-        [0, 0, 0], EXACT, "EX eq. 7",
+        [0, 0, 0], EXACT, "EX, eq. 7",
     ),
     Case(
         "P2-07", "two falling disks: time, positions, velocities",
@@ -255,7 +255,7 @@ SCATTERING = [
     Case(
         "P3-01", "scattering angle against impact parameter, finite mass, in degrees",
         SCATTERED, each(deflection),
-        ANGLES, within(1e-9), "EX 1; D",
+        ANGLES, within(1e-9), "EX, problem 1; D",
     ),
     Case(
         "P3-01", "ratio of the speeds after and before, minus 1",

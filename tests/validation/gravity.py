@@ -239,7 +239,7 @@ STEPS = [
     Case(
         "P11-10", f"time steps of {dt}: fraction of collisions found, over the predicted fraction",
         (*boxes((2,), 0.5, 5000.0, run={"dynamics": "steps", "dt": dt}), LONG_RUNS[1]),
-        rate_ratio, 1, within(0.01), "D, see the docstring of too_short",
+        rate_ratio, 1, within(0.01), "D: docstring of too_short",
     )
     for dt in (0.004, 0.002, 0.001)
 ]  # fmt: skip

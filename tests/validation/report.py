@@ -1,6 +1,7 @@
 """The report of a validation: a page in Markdown and data in JSON."""
 
 import json
+import re
 from itertools import groupby
 from pathlib import Path
 
@@ -17,13 +18,30 @@ program on an input of its own and compares the result with an exact value, a de
 published numbers.
 
 The table has one row for each case. If a case has several values, the row contains the value that
-is closest to its tolerance. The *verdict* is the deviation from the reference divided by the
-tolerance: a value passes if its verdict is at most 1. A reference with ≤ or ≥ is a bound, and the
-verdict is 0 if the bound is satisfied. Values that must agree to rounding (1e-9 or better) have no
-rows; the row of their topic contains their number. The file `validation.json` contains all values
-with tolerances and sources.
+is closest to its tolerance. The *verdict* is the deviation from the reference divided by the tolerance: a value passes if its
+verdict is at most 1. A reference with ≤ or ≥ is a bound, and the verdict is 0 if the bound is
+satisfied. Values that must agree to rounding (1e-9 or better) have no rows; the row of their topic
+contains their number, and [the second table](#cases-that-agree-to-rounding) lists them. The file `validation.json`
+beside this page contains all values with their tolerances.
+
+The column *source* names the origin of the reference. A *derived* reference follows from the model
+by a calculation; the modules in `tests/validation` contain its formula. A *reference program* is a
+separate program for hard disks, which shares no code with Ricochet and was written for these cases.
+*DSMC* is a direct simulation Monte Carlo solution of the Boltzmann equation. *Exam*, *lab* and
+*gravity exercise* are the texts of the [exercises](../tutorials/README.md). All other sources are
+publications.
 
 """
+
+#: Words of the page for the abbreviations of the sources.
+SOURCES = {
+    "D": "derived",
+    "R": "reference program",
+    "EX": "exam",
+    "LAB": "lab",
+    "URB": "gravity exercise",
+    "KR": "Kolafa and Rottner 2006",
+}
 
 TOPICS = {
     "P1": "one disk: walls, bounces, TC model",
@@ -140,6 +158,11 @@ def topic_of(case: dict) -> str:
     return case["case"].partition("-")[0]
 
 
+def order(case: dict) -> int:
+    """Return the position of the topic of a case on the page."""
+    return [*TOPICS, topic_of(case)].index(topic_of(case))
+
+
 def is_rounding(case: dict) -> bool:
     """Return whether the tolerance of a case allows for rounding errors only."""
     text = case["tolerance"].partition(" ")[0]
@@ -151,13 +174,12 @@ def is_rounding(case: dict) -> bool:
 def rows(cases: list[dict]) -> list[str]:
     """Return the lines of the table: one for each topic and for each case, and all failures."""
     lines = []
-    ordered = sorted(cases, key=lambda case: [*TOPICS, topic_of(case)].index(topic_of(case)))
-    for topic, under in groupby(ordered, key=topic_of):
+    for topic, under in groupby(sorted(cases, key=order), key=topic_of):
         values = list(under)
         exact = [value for value in values if is_rounding(value) and value["verdict"] == "pass"]
         used = number(max(value["used"] for value in exact), 2) if exact else ""
         count = f"{len(exact)} to rounding" if exact else ""
-        lines.append(line(f"**{topic}**", TOPICS.get(topic, ""), "", count, used))
+        lines.append(line(f"**{topic}**", TOPICS.get(topic, ""), "", "", count, used))
         for _, group in groupby(values, key=lambda value: value["case"]):
             lines += rows_of_case([value for value in group if value not in exact])
     return lines
@@ -171,8 +193,26 @@ def rows_of_case(values: list[dict]) -> list[str]:
         verdict = f"**FAIL** {value['problem']}" if failed else number(value["used"], 2)
         reference = LIMITS.get(value["tolerance"], "") + number(value["reference"])
         figure = measured(value["measured"], value["standard_error"])
-        lines.append(line(value["case"], value["what"], reference, figure, verdict))
+        origin = source(value["source"])
+        lines.append(line(value["case"], value["what"], reference, origin, figure, verdict))
     return lines
+
+
+def rounding_rows(cases: list[dict]) -> list[str]:
+    """Return a line for each value that agrees with its reference to rounding."""
+    return [
+        line(
+            case["case"], case["what"], str(case["values"]), source(case["source"]),
+            case["tolerance"], number(case["used"], 2),
+        )
+        for case in sorted(cases, key=order)
+        if is_rounding(case) and case["verdict"] == "pass"
+    ]  # fmt: skip
+
+
+def source(text: str) -> str:
+    """Return the source of a reference with the abbreviations replaced by words."""
+    return re.sub("|".join(rf"\b{name}\b" for name in SOURCES), lambda one: SOURCES[one[0]], text)
 
 
 def line(*cells: str) -> str:
@@ -187,6 +227,14 @@ def outcome(cases: list[dict], seconds: float) -> str:
     return f"{len(cases)} cases in {seconds / 60:.1f} minutes: {result}"
 
 
+ROUNDING = """
+## Cases that agree to rounding
+
+The columns are as above. *Values* is the number of compared values.
+
+| case | quantity | values | source | tolerance | verdict |
+|---|---|---|---|---|---|
+"""
 BARS = """
 ## Error bars and p-values
 
@@ -263,9 +311,11 @@ def markdown(data: dict, tables: str = "") -> str:
     cases = data["cases"]
     return (
         f"{HEAD}{outcome(cases, data['seconds'])}. Program: {data['program']}.\n\n"
-        "| case | quantity | reference | measured | verdict |\n|---|---|---|---|---|\n"
+        "| case | quantity | reference | source | measured | verdict |\n|---|---|---|---|---|---|\n"
         + "\n".join(rows(cases))
-        + f"\n{NOTES}{tables}"
+        + f"\n{NOTES}{ROUNDING}"
+        + "\n".join(rounding_rows(cases))
+        + f"\n{tables}"
     )
 
 

@@ -86,11 +86,21 @@ def test_the_page_has_every_case_of_the_report_and_the_worst_value_of_each():
     exact = [case for case in data["cases"] if report.is_rounding(case)]
     counted = sum(map(int, re.findall(r"\| (\d+) to rounding \|", page)))
     assert 40 < counted == len(exact) < 80
+    main, _, rounding = page.partition("## Cases that agree to rounding")
     others = [case for case in data["cases"] if case not in exact]
     for name in {case["case"] for case in others}:
-        worst = max(case["used"] for case in others if case["case"] == name)
-        (row,) = [line for line in page.splitlines() if line.startswith(f"| {name} |")]
-        assert row.endswith(f"| {report.number(worst, 2)} |")
+        worst = max((case for case in others if case["case"] == name), key=lambda c: c["used"])
+        (row,) = [line for line in main.splitlines() if line.startswith(f"| {name} |")]
+        assert row.endswith(f"| {report.number(worst['used'], 2)} |")
+        assert report.source(worst["source"]) in row
+    for case in exact:
+        assert report.line(case["case"], case["what"], str(case["values"])).rstrip("|") in rounding
+
+
+def test_sources_are_written_in_words():
+    assert report.source("EX, eq. 7; D, R") == "exam, eq. 7; derived, reference program"
+    found = {word for case in CASES for word in re.findall(r"\b[A-Z]{1,4}\b", case.source)}
+    assert found - report.SOURCES.keys() <= {"B", "DSMC", "E", "J", "N"}, "names of journals and letters"
 
 
 def test_other_seeds_give_other_runs(program, tmp_path):
