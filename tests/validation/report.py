@@ -18,11 +18,12 @@ program on an input of its own and compares the result with an exact value, a de
 published numbers.
 
 The table has one row for each case. If a case has several values, the row contains the value that
-is closest to its tolerance. The *verdict* is the deviation from the reference divided by the tolerance: a value passes if its
-verdict is at most 1. A reference with ≤ or ≥ is a bound, and the verdict is 0 if the bound is
-satisfied. Values that must agree to rounding (1e-9 or better) have no rows; the row of their topic
-contains their number, and [the second table](#cases-that-agree-to-rounding) lists them. The file `validation.json`
-beside this page contains all values with their tolerances.
+is closest to its tolerance. The *verdict* is the deviation from the reference divided by the
+tolerance: a value passes if its verdict is at most 1. A reference with ≤ or ≥ is a bound, and the
+verdict is 0 if the bound is satisfied. Values that must agree to rounding (1e-9 or better) have no
+rows; the row of their topic contains their number, and [the second
+table](#cases-that-agree-to-rounding) lists them. The file `validation.json` beside this page
+contains all values with their tolerances.
 
 The column *source* names the origin of the reference. A *derived* reference follows from the model
 by a calculation; the modules in `tests/validation` contain its formula. A *reference program* is a
