@@ -1,4 +1,4 @@
-"""Equation of state of hard disks: Z = P / (n kT) against packing fraction, from three methods.
+"""Equation of state Z = P / (n kT) of hard disks against packing fraction, from three methods.
 
     python post/equation_of_state.py runs/state/eta_*.h5 -o state.png --csv state.csv
 
@@ -11,11 +11,11 @@ samples of the virial. Runs with equal packing fraction are combined.  The disks
 and there must be no gravity.  Thermal walls and driving are allowed if all of them impose the same
 temperature; the temperature kT is then a measured mean with an error.  Near walls there is a layer
 that the centres of disks cannot reach, and therefore the density in the interior is higher.
-Therefore Z from the wall pressure refers to the area that centres can reach, and differs from Z of
-the bulk by a fraction of about 1/sqrt(N).  For disks of many radii r, the curves show the equation
-of state of fluids derived by Santos, Yuste and Lopez de Haro (1999).  The equation of Santos, Yuste
-and Lopez de Haro depends on the radii only through the ratio <r>^2 / <r^2>, which must be the same
-for all runs.
+The factor Z that follows from the force on the walls is calculated with the area that centres can
+reach, and differs from Z far from the walls by a fraction of about 1/sqrt(N).  For disks of many
+radii r, the curves show the equation of state of fluids derived by Santos, Yuste and Lopez de Haro
+(1999).  The equation of Santos, Yuste and Lopez de Haro depends on the radii only through the ratio
+<r>^2 / <r^2>, which must be the same for all runs.
 """
 
 from ricochet import Run, RunError, hard_disks

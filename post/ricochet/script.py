@@ -365,7 +365,7 @@ def over_runs(
 def spread(results: dict[str, dict]) -> dict[str, np.ndarray]:
     """Convert groups of results to table columns: one for a number, two for an estimate.
 
-    The key of each group is appended to the names of its columns.
+    The name of each column ends with the key of its group.
     """
     columns = {}
     for end, found in results.items():

@@ -237,7 +237,7 @@ class Session:
         self.goal = self.simulation.time + more, NEVER, NEVER
 
     def reach(self, request: dict) -> None:
-        """Advance to a time at which the page compares several runs, and then await a request."""
+        """Advance to the time at which the page compares several runs, and then await a request."""
         self.led, self.goal = True, (float(request["time"]), NEVER, NEVER)
 
     def event(self, request: dict) -> None:
