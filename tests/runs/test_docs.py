@@ -184,15 +184,15 @@ def test_procedures_that_are_named_are_called_in_their_examples(tmp_path):
 
 @pytest.mark.parametrize("folder", sorted(p.name for p in ROOT.glob("src/*/")))
 def test_every_folder_introduces_its_modules_and_says_which_tests_protect_it(folder):
-    """The README of each folder names existing tests after the words "Protected by"."""
+    """The README of each folder names existing tests after the words "is tested by"."""
     page = (ROOT / "src" / folder / "README.md").read_text()
     modules = [path.stem for path in (ROOT / "src" / folder).glob("*.f90")]
     assert [name for name in modules if not re.search(rf"`{name}\b", page)] == []
-    _, protected, words = page.partition("Protected by")
-    named = re.findall(r"`(?:tests/)?([\w/]+(?:\.\w+)?)`", words.partition("\n\n")[0])
+    protected = re.search(r"is\s+tested\s+by(.*?)(\n\n|\Z)", page, re.S)
+    named = re.findall(r"`(?:tests/)?([\w/]+(?:\.\w+)?)`", protected[1])
     there = {str(path.relative_to(ROOT / "tests")) for path in ROOT.glob("tests/**/*")}
     there |= {name.rpartition("/")[2] for name in there}
-    assert protected and named and [name for name in named if name not in there] == []
+    assert named and [name for name in named if name not in there] == []
 
 
 def test_options_that_are_named_exist(program):
