@@ -6,24 +6,28 @@ Each run must contain a hopper, whose mouth is the gap between the ends of two s
 must recycle the disks that leave the mouth (drive.kind = 'recycle').  The rate W is the number of
 disks that are recycled per unit of time; recycled disks are counted after the time --after.  D is
 the width of the mouth and d the mean diameter of the disks.  Under gravity g, Beverloo's law in two
-dimensions is W = C sqrt(g / d) (D / d - k)^(3/2).  If the runs have at least three values of D, the
-script determines C and k by a fit.  In a second fit the exponent is free, and k has the fixed value
-1.4.  Beverloo, Leniger and van de Velde, Chemical Engineering Science 15, 260 (1961), measured k =
-1.4 in three dimensions, where the exponent is 5/2.  Beverloo's law applies to rough disks.  The
-rate of smooth disks increases with the height of the bed.
+dimensions is W = C sqrt(g / d) (D / d - k)^(3/2).  The table contains W in disks per time, and the
+dimensionless rate W_reduced = W sqrt(d / g).  If all runs have one value of D, the figure shows the
+rate against time, from which the start of the steady state can be read.  If the runs have several
+values of D, the figure shows W_reduced against D / d.  If the runs have at least three values of D,
+the script determines C and k by a fit.  In a second fit the exponent is free, and k has the fixed
+value 1.4.  Beverloo, Leniger and van de Velde, Chemical Engineering Science 15, 260 (1961),
+measured k = 1.4 in three dimensions, where the exponent is 5/2.  Beverloo's law applies to rough
+disks.  The rate of smooth disks increases with the height of the bed.
 """
 
 from ricochet import Run, RunError
-from ricochet.analysis.statistics import combine_runs, correlated_mean
-from ricochet.figures.drawing import caption, plt
+from ricochet.analysis.statistics import combine_runs, correlated_mean, rounded_to_error, windows
+from ricochet.figures.drawing import COLOURS, caption, plt
 from ricochet.reading.nature import Refused
-from ricochet.script import command_line, grouped, launch, not_negative, over_runs, report
+from ricochet.script import command_line, grouped, launch, measured, not_negative, over_runs, report
 
 import numpy as np
 from scipy.optimize import curve_fit
 
 EXPONENT = 1.5  # of Beverloo's law in two dimensions
 BEVERLOO = 1.4  # k of Beverloo, Leniger and van de Velde (1961)
+WINDOWS = 50  # number of mean rates in a figure against time
 LEAST_ERROR = 0.01  # relative error of a rate in the fits, besides its statistical error
 
 
@@ -48,18 +52,28 @@ def reduced_width(run: Run) -> float:
 
 
 def rate(run: Run, after: float):
-    """Return the mean number of recycled disks per time, in units of sqrt(g / d)."""
+    """Return the mean number of recycled disks per time after the time `after`."""
+    time, rates = rates_of(run)
+    late = time[:-1] >= after
+    if late.sum() < 2:
+        count = int(np.sum(time >= after))
+        raise RunError(f"{run.path}: has {count} samples after t = {after:g}; needs 3")
+    return correlated_mean(rates[late])
+
+
+def reduction(run: Run) -> float:
+    """Return the factor sqrt(d / g), by which a rate is multiplied to make it dimensionless."""
+    return float(np.sqrt(2 * run.radius.mean() / np.linalg.norm(run.gravity)))
+
+
+def rates_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Return the sampling times (T,), and the numbers of recycled disks per time between them."""
     if "recycled" not in run.nature:
         raise Refused(f"{run.path}: recycles no disks (drive.kind = 'recycle')")
-    gravity = float(np.linalg.norm(run.gravity))
-    if gravity == 0:
+    if not np.any(run.gravity):
         raise Refused(f"{run.path}: has no gravity (box.gravity)")
     time, count = run.observable("recycled")
-    late = time >= after
-    if late.sum() < 3:
-        raise RunError(f"{run.path}: has {late.sum()} samples after t = {after:g}; needs 3")
-    rates = np.diff(count[late]) / np.diff(time[late])
-    return correlated_mean(rates).scaled(np.sqrt(2 * float(run.radius.mean()) / gravity))
+    return time, np.diff(count) / np.diff(time)
 
 
 def fitted(x: np.ndarray, y: np.ndarray, error: np.ndarray) -> dict[str, tuple[float, float]]:
@@ -92,13 +106,44 @@ def table(runs: list[Run], after: float) -> tuple[list[dict], list[str]]:
         width = round(float(np.mean([reduced_width(run) for run in same])), 6)
         row = {"D_over_d": width, "runs": len(same)}
         row |= over_runs("W", members, notes, f"D = {width:g} d")
+        reduced = [one.scaled(reduction(run)) for one, run in zip(members, same, strict=True)]
+        row |= measured("W_reduced", combine_runs(reduced))
         rows.append(row | {"samples": round(combine_runs(members).samples, 1)})
     return rows, notes
 
 
 def columns(rows: list[dict]) -> np.ndarray:
-    """Return an array (3, M) with D / d, the rate and its error; an unknown error is NaN."""
-    return np.array([[row[name] for row in rows] for name in ("D_over_d", "W", "W_error")], float)
+    """Return an array (3, M) with D / d, the reduced rate and its error, which is NaN if unknown."""
+    names = "D_over_d", "W_reduced", "W_reduced_error"
+    return np.array([[row[name] for row in rows] for name in names], float)
+
+
+def draw_in_time(row: dict, runs: list[Run], after: float) -> plt.Figure:
+    """Draw the number of recycled disks and the discharge rate of each run against time."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8))
+    for k, run in enumerate(runs):
+        style = {"color": COLOURS[0], "lw": 1, "alpha": 1 if len(runs) == 1 else 0.6}
+        style |= {"label": "measured" if k == 0 else ""}
+        time, rates = rates_of(run)
+        left.plot(*run.observable("recycled"), **style)
+        width = max((time[-1] - time[0]) / WINDOWS, float(np.diff(time).max()))
+        right.plot(*windows(time[1:], rates, width), **style)
+    last = max(float(run.observable("recycled").time[-1]) for run in runs)
+    start = np.mean([np.interp(after, *run.observable("recycled")) for run in runs])
+    label = f"$W$ = {' ± '.join(rounded_to_error(row['W'], row['W_error']))}"
+    line = np.array([after, last])
+    left.plot(line, start + row["W"] * (line - after), color="black", ls="--", label=label)
+    error = np.nan_to_num(row["W_error"])
+    right.plot(line, 2 * [row["W"]], color="black", ls="--", label=label)
+    right.fill_between(line, row["W"] - error, row["W"] + error, color="0.5", alpha=0.3, lw=0)
+    for axes in (left, right):
+        axes.axvline(after, color="0.5", ls=":", lw=1, label=f"--after {after:g}")
+        axes.set(xlabel=runs[0].units.label("time $t$", "time"), xlim=(0, None), ylim=(0, None))
+        axes.legend(loc="best")
+    left.set_ylabel("recycled disks since the start")
+    right.set_ylabel(runs[0].units.label("recycled disks per time", "rate"))
+    figure.suptitle(f"{caption(runs)},  $D/d$ = {row['D_over_d']:.3g}")
+    return figure
 
 
 def draw(rows: list[dict], runs: list[Run], fit: dict) -> plt.Figure:
@@ -115,9 +160,10 @@ def draw(rows: list[dict], runs: list[Run], fit: dict) -> plt.Figure:
         left.plot(line, c * (line - k) ** EXPONENT, label=text)
         right.plot(line, c ** (2 / 3) * (line - k), label=text)
         left.plot([], [], " ", label=f"exponent {n:.2f} ± {dn:.2f} for $k$ = {BEVERLOO}")
-    for axes in (left, right):
-        axes.set(xlabel="width of the mouth $D/d$", xlim=(0, None), ylim=(0, None))
-        axes.legend()
+    top = 1.1 * np.max(y + np.nan_to_num(error))
+    for axes, highest in ((left, top), (right, top ** (2 / 3))):
+        axes.set(xlabel="width of the mouth $D/d$", xlim=(0, 1.1 * x.max()), ylim=(0, highest))
+        axes.legend(loc="upper left")
     left.set_ylabel("rate $W \\sqrt{d/g}$")
     right.set_ylabel("$(W \\sqrt{d/g})^{2/3}$")
     figure.suptitle(caption(runs))
@@ -134,7 +180,11 @@ def main() -> None:
     fit = fitted(x, y, error) if len(rows) > 2 else {}
     for name, (value, uncertainty) in fit.items():
         print(f"{name} = {value:.4f} ± {uncertainty:.4f}")
-    report(args, draw(rows, args.runs, fit), rows, notes=notes)
+    if len(rows) == 1:
+        figure = draw_in_time(rows[0], args.runs, args.after)
+    else:
+        figure = draw(rows, args.runs, fit)
+    report(args, figure, rows, notes=notes)
 
 
 if __name__ == "__main__":

@@ -75,6 +75,11 @@ def test_captions_name_what_varies(tmp_path):
     assert caption(two) == "N = 2,  ξ = 1,  mass = 2, 4,  3 seeds"
     many = [run(k, packing_fraction=k / 10, radius=k / 100) for k in range(1, 7)]
     assert caption(many) == "N = 2,  ξ = 1,  packing_fraction = 0.1 to 0.6,  6 seeds"
+    random = {"radius": 0.1, "polydispersity": 0.2}
+    many = [run(k, packing_fraction=0.3 + k / 1000, **random) for k in range(1, 4)]
+    assert caption(many) == "N = 2,  ξ = 1,  3 seeds"
+    many = [run(k, packing_fraction=k / 10, polydispersity=0.2, radius=k) for k in range(1, 4)]
+    assert "packing_fraction = 0.1, 0.2, 0.3" in caption(many)
 
 
 def test_what_is_no_number_has_its_reason(tmp_path, rng, capsys):

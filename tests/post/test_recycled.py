@@ -107,12 +107,25 @@ def test_the_rate_of_a_hopper_follows_the_law_that_it_has(tmp_path, capsys):
     paths = mouths(tmp_path, (0.1, 0.15, 0.2, 0.3), k=1.4, c=0.7)
     rows, _ = discharge.table([read_run(path) for path in paths], 4)
     assert [row["D_over_d"] for row in rows] == [5, 7.5, 10, 15]
-    x, y = (np.array([row[name] for row in rows]) for name in ("D_over_d", "W"))
+    x, y = (np.array([row[name] for row in rows]) for name in ("D_over_d", "W_reduced"))
+    per_time = np.array([row["W"] for row in rows])
+    assert per_time == pytest.approx(0.7 * (x - 1.4) ** 1.5 * np.sqrt(4 / 0.02), rel=1e-6)
     assert y == pytest.approx(0.7 * (x - 1.4) ** 1.5, rel=1e-6)
     found = discharge.fitted(x, y, np.zeros(4))
     assert [one[0] for one in found.values()] == pytest.approx([0.7, 1.4, 1.5], rel=1e-5)
     assert run_script("discharge", *paths, "-o", tmp_path / "rate.png") == 0
     assert "k = 1.4000" in capsys.readouterr().out
+
+
+def test_the_rate_of_one_mouth_is_drawn_against_time(tmp_path):
+    """The lines at the rate and at the number of disks meet the measured curves at the end."""
+    runs = [read_run(path) for path in mouths(tmp_path, (0.2,), k=1.4, c=0.7)]
+    rows, _ = discharge.table(runs, 4)
+    figure = discharge.draw_in_time(rows[0], runs, 4)
+    left, right = figure.axes
+    measured, line, *_ = left.lines
+    assert line.get_ydata()[-1] == pytest.approx(measured.get_ydata()[-1])
+    assert right.lines[1].get_ydata() == pytest.approx(2 * [rows[0]["W"]])
 
 
 def test_what_is_no_refilled_hopper_is_refused(run, tmp_path):

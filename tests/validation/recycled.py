@@ -4,7 +4,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from discharge import EXPONENT, fitted, rate, reduced_width
+from discharge import EXPONENT, fitted, rate, reduced_width, reduction
 from ricochet import Run
 
 from .case import Case, Member, sigmas, within
@@ -93,7 +93,7 @@ HOPPERS = tuple(hopper(width) for width in (0.12, 0.16, 0.20, 0.24, 0.28, 0.32))
 
 def beverloo(*runs: Run) -> dict[str, tuple[float, float]]:
     """Return the results of the fits of `post/discharge.py`."""
-    rates = [rate(run, SETTLED) for run in runs]
+    rates = [rate(run, SETTLED).scaled(reduction(run)) for run in runs]
     widths = np.array([reduced_width(run) for run in runs])
     means, errors = np.array([(one.mean, one.error) for one in rates]).T
     return fitted(widths, means, errors)

@@ -55,10 +55,30 @@ def caption(runs: list[Run]) -> str:
     for run in runs:
         for name, value in numbers_of(run).items():
             values.setdefault(name, set()).add(value)
-    parts += [f"{name} = {listed(own)}" for name, own in values.items() if len(own) > 1]
+    chance = by_chance(runs)
+    parts += [
+        f"{name} = {listed(own)}"
+        for name, own in values.items()
+        if len(own) > 1 and name not in chance
+    ]
     seeds = {run.seed for run in runs}
     parts.append(f"seed {min(seeds)}" if len(seeds) == 1 else f"{len(seeds)} seeds")
     return "\n".join(wrap(",  ".join(parts), 110))
+
+
+def by_chance(runs: list[Run]) -> set[str]:
+    """Return the names of packing fractions that differ only because radii are random.
+
+    They belong to species of random radii with the same number of disks, mean radius and region.
+    """
+    given: dict[str, set[tuple]] = {}
+    for run in runs:
+        for kind in run.names:
+            own = run.parameters.get("species", {}).get(kind, {})
+            what = [np.ravel(own.get(name, 0)).tolist() for name in ("count", "radius", "region")]
+            name = f"{kind} " * (len(run.names) > 1) + "packing_fraction"
+            given.setdefault(name, set()).add((own.get("polydispersity", 0) > 0, str(what)))
+    return {name for name, kinds in given.items() if len(kinds) == 1 and next(iter(kinds))[0]}
 
 
 def count_at(run: Run, frame: int) -> dict[str, int]:
