@@ -113,7 +113,7 @@ def table(runs: list[Run], after: float) -> tuple[list[dict], list[str]]:
 
 
 def columns(rows: list[dict]) -> np.ndarray:
-    """Return an array (3, M) with D / d, the reduced rate and its error, which is NaN if unknown."""
+    """Return an array (3, M) with D / d, the reduced rate and its error (NaN if unknown)."""
     names = "D_over_d", "W_reduced", "W_reduced_error"
     return np.array([[row[name] for row in rows] for name in names], float)
 
