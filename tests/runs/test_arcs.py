@@ -37,6 +37,17 @@ def ring(kind: str, law: str, more: str = "", box: str = "") -> str:
 &stop time = 3 /"""
 
 
+@pytest.mark.parametrize("name", ["stadium", "mushroom"])
+def test_random_starts_lie_inside_the_billiard(name):
+    """Disks that start at random positions of the input never reach the left and right sides."""
+    random = {"position": None, "velocity": None, "count": 1, "speed": 1}
+    for seed in range(1, 21):
+        own = {"run": {"seed": seed}, "species": {"disk": random}}
+        with Simulation(INPUTS / f"{name}.nml", overrides=own) as billiard:
+            billiard.advance(events=100)
+            assert not np.any(billiard.observable("side_collisions")[:2])
+
+
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize(
     ("more", "box"),

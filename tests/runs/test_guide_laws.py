@@ -9,11 +9,11 @@ from synthetic_run import ROOT
 
 
 def carried_out(guide, heading):
-    """Execute the Python example below a heading of a guide; return its variables."""
+    """Execute the Python examples of a section of a guide; return their variables."""
     text = (ROOT / "docs" / "guides" / f"{guide}.md").read_text()
-    after = text.partition(f"\n{heading}\n")[2]
+    section = text.partition(f"\n{heading}\n")[2].partition("\n## ")[0]
     variables: dict = {}
-    exec(re.search(r"```python\n(.*?)```", after, re.S)[1], variables)
+    exec("".join(re.findall(r"```python\n(.*?)```", section, re.S)), variables)
     return variables
 
 
@@ -48,3 +48,4 @@ def test_the_event_log_of_a_stadium_contains_its_lyapunov_exponent(monkeypatch):
     found = carried_out("billiards", "## Stadium and mushroom")
     log = found["log"]
     assert abs(found["growth"] / (log.time[-1] - log.time[0]) - 0.43) < 0.02
+    assert abs(found["path"].mean - found["expected"]) < 5 * found["path"].error < 0.1
