@@ -1,7 +1,8 @@
 #!/bin/sh
 
 # Writes a Fortran module with the origin of the program (commit, compiler and flags), which `--version` prints.
-# Arguments: the flags of the compiler.
+# The arguments of the script are the flags of the compiler.
+
 # shellcheck disable=SC2016 # `make dist` puts the commit here
 commit='$Format:%h$'
 case $commit in

@@ -7,8 +7,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 action=$1 build=${BUILD:-build} root=${DESTDIR:-}$PREFIX
 
-# All names are relative to $root. The file $list contains the names of all installed files, one per line. This script
-# removes or replaces only files whose names are in $list.
+# All names of installed files are relative to $root. The file $list contains the names of all installed files, one per line. This
+# script removes or replaces only files whose names are in $list.
 shared=share/ricochet
 list=$shared/installed
 documents=share/doc/ricochet

@@ -1,4 +1,4 @@
-!> The C interface for other programs. The header file `ricochet.h` describes each function of this interface. A handle represents
+!> The C interface for other programs. The header file `ricochet.h` describes each function of the C interface. A handle represents
 !> an open simulation. The functions print nothing, do not end the process, and share no data between handles.
 module library
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan

@@ -14,8 +14,8 @@ module library_events
   implicit none
   private
 
-  !> Number of events and kicks after which `next_events` ends its search for future events. The limit increases by 100 for each
-  !> requested event.
+  !> Number of events and kicks after which `next_events` ends its search for future events. For n requested events the limit is
+  !> larger by 100 n.
   integer(int64), parameter :: longest_look = 2000000
 
 contains

@@ -158,7 +158,8 @@ contains
 
   !> Determines the number of threads from the input or the environment. The default is one thread.
   subroutine ask(threads, name)
-    !> In: number of threads in the input, or 0 if the input contains no number. Out: number of threads to use.
+    !> Number of threads in the input, or 0 if the input contains no number; the procedure replaces 0 by the number of threads to
+    !> use
     integer, intent(inout) :: threads
     character(len=:), allocatable, intent(out) :: name
     character(len=16) :: value

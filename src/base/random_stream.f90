@@ -3,7 +3,7 @@
 !> seeds are unrelated. A copy of a random stream yields the same numbers as the original stream.
 !>
 !> Both generators, xoshiro256** and SplitMix64, use unsigned arithmetic modulo 2**64. Fortran has no unsigned integers and does not
-!> allow overflow of signed integers. Sums and products are therefore calculated with longer integers.
+!> allow overflow of signed integers. Sums and products modulo 2**64 are therefore calculated with longer integers.
 module random_stream
   use kinds, only: int32, int64, int128, real64
   implicit none

@@ -237,8 +237,8 @@ contains
     kind = trim(kinds_of_files(c_what_is(path//c_null_char)))
   end function what_is
 
-  !> Inode, size and modification time of a file, which together identify the file and its contents. All three numbers are 0 if the
-  !> file does not exist. A copy of a file has a different inode.
+  !> Inode, size and modification time of a file, which together identify the file and its contents; three zeros if the file does
+  !> not exist. A copy of a file has a different inode.
   function identity_of(path) result(identity)
     character(len=*), intent(in) :: path
     integer(int64) :: identity(3)

@@ -55,8 +55,8 @@ module team
 
 contains
 
-  !> Sets the number of threads for parallel loops that do not specify a number of threads. In a build without OpenMP the number is
-  !> always 1.
+  !> Sets the number of threads for parallel loops that do not specify a number of threads. In a build without OpenMP the number of
+  !> threads is always 1.
   subroutine make_team(n)
     integer, intent(in) :: n
 

@@ -209,7 +209,7 @@ contains
   pure function suggestion(word, known, listed) result(advice)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
-    character(len=*), intent(in), optional :: listed(:)  !! words that are listed if no known word is similar; `known` if absent
+    character(len=*), intent(in), optional :: listed(:)  !! words to list if no known word is similar, instead of `known`
     character(len=:), allocatable :: advice
 
     advice = nearest_word(word, known)
@@ -291,7 +291,7 @@ contains
     text = written(anint(number/unit)*unit)
   end function about
 
-  !> A number followed by a noun, which is in the plural unless the number is 1. Examples are `1 value` and `2 values`.
+  !> A number followed by a noun, which is in the plural unless the number is 1, as in `1 value` and `2 values`.
   pure function counted(number, noun) result(text)
     integer(int64), intent(in) :: number
     character(len=*), intent(in) :: noun

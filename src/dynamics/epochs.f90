@@ -16,7 +16,7 @@ module epochs
   !> Intended number of collisions per disk in an epoch. The time origin moves at the end of each epoch, so that times keep their
   !> precision.
   integer(int64), parameter :: epoch_length = 24
-  !> Number of significant bits in a shift of the time origin. Shifts with so few significant bits can be added without rounding
+  !> Number of significant bits in a shift of the time origin. Shifts with at most 20 significant bits can be added without rounding
   !> errors.
   integer, parameter :: significant_bits = 20
   !> An inelastic collapse is reported if the time does not advance during a long series of events. The series must have at least
@@ -82,9 +82,9 @@ contains
   end subroutine begin_epoch
 
   !> Ends the epoch and moves the time origin to about the present time, so that times stay small and keep their precision. The
-  !> disks are sorted by cells at the same time, because all events have to be predicted again after a shift of the time origin. The
-  !> next epoch ends at a fixed time and not after a fixed number of events, so that domains that run independently of each other
-  !> end the epoch at the same time.
+  !> procedure also sorts the disks by cells, because all events have to be predicted again after a shift of the time origin in any
+  !> case. The next epoch ends at a fixed time and not after a fixed number of events, so that domains that run independently of
+  !> each other end the epoch at the same time.
   subroutine move_epoch(sim)
     type(simulation_t), intent(inout) :: sim
     real(real64) :: shift, length

@@ -30,7 +30,7 @@ module event_driven
   !> Largest number of events between two checks of the limits.
   integer(int64), parameter :: events_to_look = 20000
   !> Largest number of disks that fit into a second-level cache. Prefetching saves time only if a simulation contains more disks
-  !> than this number.
+  !> than fit into the cache.
   integer(int32), parameter :: disks_in_cache = 20000
   integer(int64), parameter :: events_ahead = 8    !! number of events between two prefetches
 
@@ -291,8 +291,8 @@ contains
     end associate
   end subroutine follow_side
 
-  !> Predicts events again when a piston leaves its strip, which consists of the cells that the piston can reach soon (see
-  !> `piston_strips`). Predictions are made for the disks in the old strip and in the new strip.
+  !> When a piston leaves its strip (the cells that the piston can reach soon, see `piston_strips`), predicts the events of the
+  !> disks in the old strip and in the new strip again.
   subroutine follow_piston(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

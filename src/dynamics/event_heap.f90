@@ -38,9 +38,9 @@ contains
     if (.not. (yes .or. a%time > b%time)) yes = wins(a, b, tag)
   end function precedes
 
-  !> Nonzero if a and b are different events at the same time, whose order `precedes` has to determine. The caller ensures that
-  !> event a is not earlier than event b. Two events at the same time are usually the two copies of one collision, which both disks
-  !> store, and the order of the two copies has no effect.
+  !> Nonzero if the function `precedes` has to determine the order of events a and b, because they are different events at the same
+  !> time. The caller ensures that event a is not earlier than event b. Two events at the same time are usually the two copies of
+  !> one collision, which both disks store, and the order of the two copies has no effect.
   elemental function need_order(a, b) result(bits)
     type(event_t), intent(in) :: a, b
     integer(int32) :: bits

@@ -12,8 +12,8 @@ module evolution
   !> Limits at which the dynamics stops and returns to its caller: the first limit that is reached determines the stop. By default
   !> each limit has a value that no simulation reaches.
   type :: limits_t
-    !> Limit of the simulated time, measured from the start of the run [time]. In calls of the procedures of `evolution_t` the limit
-    !> is measured from the time origin `box%epoch`.
+    !> Limit of the simulated time, measured from the start of the run or, in calls of the procedures of `evolution_t`, from the
+    !> time origin `box%epoch` [time]
     real(real64) :: time = never
     integer(int64) :: collisions = huge(0_int64)
     integer(int64) :: events = huge(0_int64)

@@ -117,7 +117,7 @@ contains
     end if
   end function counts
 
-  !> Records a collision of disks i and j, and their cells.
+  !> Records a collision of disks i and j, and the cells that contain the two disks.
   subroutine record_collision(self, disk, tag, i, j)
     class(histories_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)

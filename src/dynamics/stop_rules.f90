@@ -1,10 +1,10 @@
 !> Determines when a run ends: when one of the stop rules in the input is met, or when rounding errors dominate the velocities of
 !> the disks.
 !>
-!> Inelastic disks in a periodic box cool without end. A run with such disks ends when rounding errors dominate the temperature. The
-!> test for a negligible temperature is made at the start of each epoch, so that the end of the run depends on the trajectory alone.
-!> The present kinetic energy is compared with the kinetic energy at the time when the velocities were last set, because the earlier
-!> energy determines the magnitude of the rounding errors.
+!> Inelastic disks in a periodic box cool without end. A run with inelastic disks in a periodic box ends when rounding errors
+!> dominate the temperature. The test for a negligible temperature is made at the start of each epoch, so that the end of the run
+!> depends on the trajectory alone. The present kinetic energy is compared with the kinetic energy at the time when the velocities
+!> were last set, because the earlier energy determines the magnitude of the rounding errors.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use epochs, only: is_at_rest, stands_still
@@ -65,8 +65,8 @@ contains
       .and. .not. sim%is_driven()
   end function new_stop_rule
 
-  !> A real number of collisions, rounded up to an integer. A number of collisions may exceed an integer by a few rounding errors
-  !> without being rounded up to the next integer. The result is huge(n) if the number exceeds the range of 64-bit integers.
+  !> A real number of collisions, rounded up to an integer. A number of collisions that exceeds an integer only by a few rounding
+  !> errors is rounded to this integer. The result is huge(n) if the number exceeds the range of 64-bit integers.
   pure function whole_collisions(number) result(n)
     real(real64), intent(in) :: number
     integer(int64) :: n

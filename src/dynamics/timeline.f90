@@ -117,9 +117,10 @@ contains
     end subroutine end_epoch
   end subroutine advance_once
 
-  !> Number of iterations that take about `pause_interval`. The number of iterations is increased only after a call that used all
-  !> its iterations, and not after a call that reached a limit early. In a run with many samples, whose calls all return early, the
-  !> number would otherwise become arbitrarily large. After the last sample, signals would then not be checked for hours.
+  !> Number of iterations of the event loop that take about the wall-clock time `pause_interval`. The number of iterations is
+  !> increased only after a call that used all its iterations, and not after a call that reached a limit early. In a run with many
+  !> samples, whose calls all return early, the number would otherwise become arbitrarily large, and signals would not be checked
+  !> for hours after the last sample.
   pure function adapted_iterations(iterations, elapsed, cut_short) result(n)
     integer(int64), intent(in) :: iterations
     real(real64), intent(in) :: elapsed               !! wall-clock time of the iterations that were used [s]

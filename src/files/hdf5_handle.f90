@@ -203,7 +203,7 @@ contains
     call h5pclose_f(access, closed)
   end subroutine open_file
 
-  !> Renames the open file to its final path. A file that already has this path is replaced.
+  !> Renames the open file to its final path. An existing file with the final path is replaced.
   subroutine rename_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     logical :: moved

@@ -1,6 +1,6 @@
-!> A record: a sequence of numbers that is stored, together with a checksum, in one dataset of an open file. One sequence of calls
-!> serves to count, to write and to read the numbers, depending on the mode; the numbers are therefore always read in the order in
-!> which they were written.
+!> A record: a sequence of numbers that is stored, together with a checksum, in one dataset of an open file. The same sequence of
+!> calls counts, writes or reads the numbers, depending on the mode, so that the numbers are always read in the order in which they
+!> were written.
 module record
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_int, c_int8_t, c_loc, c_long, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8

@@ -70,7 +70,7 @@ contains
     arc%extent = 0.5_real64*(high - low)
     offset = magnitude(arc%centre)
     arc%circumradius = maxval([(magnitude(arc%end_point(k)), k=1, 2)])
-    if (arc%is_in_window(arc%centre)) arc%circumradius = radius + offset   ! the arc contains the farthest point of the circle
+    if (arc%is_in_window(arc%centre)) arc%circumradius = radius + offset   ! the arc has the farthest point of the circle
   end function new_arc
 
   !> Unit vector in the direction of an angle. For a multiple of 90 degrees the result is exact.
@@ -259,10 +259,9 @@ contains
       magnitude(abs(c) + half) >= self%radius - radius - slack
   end function reaches
 
-  !> Whether the arc excludes the centres of disks from a whole rectangle. The distances of two points from the arc differ by at
-  !> most the distance between the two points, and the largest distance between the middle of a rectangle and its other points is
-  !> half the diagonal. For a large rectangle the result may be .false. although the arc excludes the centres of disks from the
-  !> whole rectangle.
+  !> Whether the arc excludes the centres of disks from a whole rectangle. The distances of the middle and of any other point of the
+  !> rectangle from the arc differ by at most half the diagonal of the rectangle. For a large rectangle the result may be .false.
+  !> although the arc excludes the centres of disks from the whole rectangle.
   pure function covers(self, d, half, radius) result(yes)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius

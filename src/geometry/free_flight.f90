@@ -7,7 +7,7 @@ module free_flight
   private
   public :: flight, flight_velocity, time_to_line, time_to_circle, later_time_to_circle, slowest
 
-  !> Speeds below this value are treated as zero, because contact times would overflow. [length/time]
+  !> Largest speed that is treated as zero, because contact times would overflow. [length/time]
   real(real64), parameter :: slowest = 1/never
 
   !> Relative safety margin, larger than all rounding errors, of tests that exclude contacts. With the margin, a test accepts every
@@ -172,7 +172,7 @@ contains
     passed = 0
     cubic = [2*dot_product(d, v), 2*(dot_product(v, v) + dot_product(d, g)), 3*dot_product(v, g), dot_product(g, g)]
     bound = root_bound(cubic, rho/sqrt(cubic(3)))
-    a = 3*cubic(3); b = cubic(2); c = cubic(1)         ! F'' = a s**2 + 2 b s + c
+    a = 3*cubic(3); b = cubic(2); c = cubic(1)         ! F'' equals a s**2 + 2 b s + c
     disc = max(b*b - a*c, 0.0_real64)
     bend = [(-b - sign(sqrt(disc), a))/a, (-b + sign(sqrt(disc), a))/a]
 

@@ -1,5 +1,5 @@
-!> Displacements and velocities of the periodic images of the box. The modules for neighbour search, placement of disks, obstacles
-!> and collisions use this module.
+!> Displacements and velocities of the periodic images of the box. The module `images` is used in the neighbour search, in the
+!> placement of disks, for obstacles and in collisions.
 !>
 !> In a sheared box (Lees and Edwards, 1972, doi:10.1088/0022-3719/5/15/006) the image above the box moves along x. The position of
 !> an image of the box depends only on the time, because the image has a constant velocity. The separation between a disk and an

@@ -249,7 +249,7 @@ contains
   !> If several given variables determine a choice, the last variable in the table takes precedence.
   pure subroutine infer_choices(self)
     class(group_t), intent(inout) :: self
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of a second variable, and values of the second variable
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of a variable, and its values in the condition
     integer :: k
 
     do k = 1, size(self%values)
@@ -266,7 +266,7 @@ contains
   pure subroutine check_choices(self, problems)
     class(group_t), intent(inout) :: self
     type(problem_list_t), intent(inout) :: problems
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of a second variable, and values of the second variable
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of a variable, and its values in the condition
     character(len=len(table%goes_with)) :: word
     integer :: j, k
 

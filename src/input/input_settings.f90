@@ -296,8 +296,8 @@ contains
       end associate
     end subroutine check_columns
 
-    !> Checks the conditions for placement = 'relaxed'. Event chains move all disks of the run, in a box without obstacles and
-    !> moving sides. The chains sample the uniform distribution of positions, which is the equilibrium distribution only without
+    !> Checks the conditions for placement = 'relaxed'. Event chains move all disks of the run, and require a box without obstacles
+    !> and moving sides. The chains sample the uniform distribution of positions, which is the equilibrium distribution only without
     !> gravity.
     subroutine check_relaxed()
       character(len=*), parameter :: with = "'relaxed' cannot be combined with "

@@ -17,7 +17,7 @@ module input_species
 
 contains
 
-  !> Fills the settings of all species. Calculated values are also stored in the groups.
+  !> Fills the settings of all species. Values that the procedure calculates are also stored in the groups of the input.
   subroutine take_species(groups, box, seed, species, problems)
     type(group_t), intent(inout) :: groups(:)             !! the species
     type(box_t), intent(in) :: box

@@ -1,10 +1,8 @@
 !> Reads the text of an input file and splits the text into lines and tokens. The namelist reader of Fortran is not used: it accepts
 !> some invalid texts without a message, its messages contain neither the line nor the variable, and it can crash. The modules
-!> `input_text` and `namelist_input` read the text instead, with a small and strict grammar.
-!>
-!>     &group  name = value, value  name(2) = value  name = 3*value  /     ! comment
-!>
-!> A text that does not obey the grammar is reported as an error with its line number.
+!> `input_text` and `namelist_input` read the text instead, with a small and strict grammar. A group has the form
+!> `&group name = value, value name(2) = value name = 3*value /`, and a comment begins with `!`. A text that does not obey the
+!> grammar is reported as an error with its line number.
 module input_text
   use kinds, only: int64
   use errors, only: error_t, exit_files, exit_usage, fail

@@ -212,7 +212,7 @@ contains
     end if
     problem = ""
     if (scan(word(:mark - 1), "123456789") == 0) return
-    if (abs(exponent) <= 200) then                 ! for |exponent| <= 200, the reading can neither overflow nor underflow
+    if (abs(exponent) <= 200) then                 ! with such exponents, the reading neither overflows nor underflows
       read (word, "(f60.0)", iostat=status) value
       if (status == 0 .and. abs(value) >= smallest .and. abs(value) <= largest) return
     end if

@@ -59,7 +59,7 @@ contains
     if (allocated(error)) return
     do k = 1, size(rows, 2)
       do c = 1, size(rows, 1)
-        wrong = .not. ieee_is_finite(rows(c, k))           ! NaN is excluded first: debug builds stop if it is compared
+        wrong = .not. ieee_is_finite(rows(c, k))           ! debug builds stop if NaN is compared
         if (.not. wrong) wrong = abs(rows(c, k)) > largest .or. (c == 3 .and. .not. walls .and. rows(c, k) < smallest)
         if (.not. wrong) cycle
         call fail(error, exit_usage, path//": row "//written(k)//": "//written(rows(c, k))//" is out of range")

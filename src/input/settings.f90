@@ -147,8 +147,8 @@ contains
     n = sum(int(self%species%count, int64), mask=self%drive%acts_on([(k, k=1, size(self%species))]))
   end function n_driven
 
-  !> Determines the features that the run needs, such as rotation. This procedure must be called after the starting files have been
-  !> read.
+  !> Determines the features that the run needs, such as rotation. The procedure `choose_features` must be called after the starting
+  !> files have been read.
   pure subroutine choose_features(self)
     class(settings_t), intent(inout) :: self
 

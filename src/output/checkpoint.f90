@@ -86,8 +86,8 @@ contains
   !> Overrides of variables that may change on `--resume` are not added.
   subroutine recall_overrides(output, overrides, error)
     character(len=*), intent(in) :: output                       !! path of the output
-    !> Overrides in the form GROUP.VARIABLE=VALUE. In: the overrides of the present command line. Out: the overrides from the output
-    !> file, followed by the overrides of the present command line.
+    !> Overrides of the present command line, in the form GROUP.VARIABLE=VALUE. The procedure inserts the overrides from the output
+    !> file before the overrides of the present command line.
     type(text_t), allocatable, intent(inout) :: overrides(:)
     !> Error if another version of the program wrote the output, or if the text of the input in the output file is damaged.
     type(error_t), allocatable, intent(out) :: error

@@ -43,7 +43,7 @@ module output
     character(len=:), allocatable :: path         !! path of the finished file
     type(run_input_t) :: input                    !! the input that the file describes
     type(hdf5_file_t), allocatable, private :: file
-    type(track_t), allocatable, private :: track(:)      !! (2 or 3) frames, observables and, if requested, the event log
+    type(track_t), allocatable, private :: track(:)      !! (2 or 3) tracks of frames, observables and, if requested, events
     type(frame_column_t), allocatable, private :: columns(:)  !! columns of the frames
     type(lock_t), private :: lock
     integer(int64), private :: replaced(3) = 0_int64     !! identity of the file that existed at `path` when the run started
@@ -73,7 +73,7 @@ contains
     character(len=:), allocatable :: problem
     logical :: made
 
-    call record_signals()                         ! from this call on, a sudden end of the program could lose data
+    call record_signals()                         ! a sudden end of the program could lose data from now on
     self%file = hdf5_file_t()
     self%path = path
     self%opened = seconds()
@@ -254,7 +254,7 @@ contains
     call self%progress%schedule(values)%tighten(limits)
   end subroutine tighten
 
-  !> Takes the samples that are due. The main loop calls this procedure whenever the simulation has stopped at a limit.
+  !> Takes the samples that are due. The main loop calls `take_due_samples` whenever the simulation has stopped at a limit.
   subroutine take_due_samples(self, sim, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -399,13 +399,14 @@ contains
     if (.not. allocated(error)) call self%release()
   end subroutine finish
 
-  !> Writes the last samples, removes unused space, and records how the run ended. The final checkpoint does not count the samples
-  !> that are taken only because the run ends. If the run is continued, new samples overwrite the uncounted samples.
+  !> Writes the last samples, removes unused space, and records how the run ended. The final checkpoint does not count samples that
+  !> are taken only because the run ends, so that a continued run overwrites these samples.
   subroutine write_end(self, sim, cost, note, broken)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: cost(3)           !! three values for the present part of the run:
-    !! wall time [s], collisions per processor time [1/s], number of events executed by the serial engine
+    !> Three values for the present part of the run: wall time [s], collisions per processor time [1/s], and number of events that
+    !> the serial engine executed
+    real(real64), intent(in) :: cost(3)
     character(len=*), intent(in) :: note          !! reason why the run ended, if no stop rule was met
     logical, intent(in) :: broken
     type(progress_t) :: before

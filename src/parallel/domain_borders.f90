@@ -1,7 +1,7 @@
 !> Compares and corrects copies of disks after each time window. A domain compares its copies of disks with the original disks,
 !> which other domains own. A copy is wrong if the copy has not moved in the same way as the original disk. If a disk that the
 !> domain owns can have touched a wrong copy, the window is invalid. If the window is valid, wrong copies are corrected. The page
-!> docs/explanation/algorithm.md proves that this criterion for valid windows is sufficient.
+!> docs/explanation/algorithm.md proves that the criterion for valid windows is sufficient.
 module domain_borders
   use kinds, only: int16, int32, int64
   use domains, only: correction_t, domain_t, forever, list_copies, slot_of_copy

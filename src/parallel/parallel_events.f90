@@ -37,8 +37,8 @@ module parallel_events
     !> Template of the serial engine, which is copied when the serial engine is needed.
     type(event_driven_t) :: serial
     type(partition_t) :: parts
-    !> Smallest number of disks in a domain. In a periodic box, in which domains have neighbouring domains on all sides, a domain
-    !> must contain at least twice as many disks.
+    !> Smallest number of disks in a domain. In a periodic box, in which domains have neighbouring domains on all sides, the
+    !> smallest number is twice as large.
     integer(int32) :: least_disks = 1250
     integer(int32) :: most_disks = 62000           !! largest number of disks in a domain that fits into the cache
     !> Average number of active cores below which the serial engine is faster than several threads.
@@ -184,9 +184,9 @@ contains
       n = max(1, int(most_windows*self%parts%shortening**4))
     end function most_windows_now
 
-    !> Makes windows longer after a call in which all windows were valid. The length of windows is constant within a call. If
-    !> windows became longer during a call, the last window of every call could be invalid. All windows of every call would then be
-    !> discarded, and the run would make no progress.
+    !> Makes windows longer after a call in which all windows were valid. The length of windows is constant within a call of
+    !> `run_domains`. If windows became longer during a call, the last window of every call could be invalid. The run would make no
+    !> progress, because an invalid window invalidates all windows of a call.
     subroutine lengthen_windows(windows)
       integer, intent(in) :: windows               !! number of windows in the last call
 
@@ -208,10 +208,10 @@ contains
     end subroutine shorten_windows
 
     !> Selects the serial engine for a period. A period of the serial engine is twice as long as the previous period, unless the
-    !> domains have executed more events since the previous period than the serial engine in that period. Because of the repeated
-    !> doubling, a run that is unsuitable for domains takes hardly longer than with the serial engine alone.
+    !> domains have executed more events since the previous period than the serial engine in that period. Because the length of the
+    !> periods doubles, a run that is unsuitable for domains takes hardly longer than with the serial engine alone.
     subroutine use_serial_engine(periods)
-      integer(int64), intent(in) :: periods(2)      !! limits of the period [events per disk]
+      integer(int64), intent(in) :: periods(2)      !! shortest and longest period [events per disk]
 
       if (sim%tally%events - self%serial_until > self%serial_period*sim%n_disks()) self%serial_period = 0
       self%serial_period = min(max(2*self%serial_period, periods(1)), periods(2))

@@ -50,7 +50,7 @@ module partition
     type(domain_t), allocatable :: domain(:)
     real(real64) :: event_rate = 0.0_real64        !! number of events per unit of time; 0 if not known yet [1/time]
     real(real64) :: iterations_per_event = 10.0_real64  !! number of iterations of an engine per event
-    real(real64) :: shortening = 1.0_real64        !! factor of the length of windows after invalid windows
+    real(real64) :: shortening = 1.0_real64        !! factor by which invalid windows have shortened later windows
     integer(int32) :: widening = 0                 !! increase of the width of the halo after invalid windows [cells]
     real(real64) :: cores = 0.0_real64             !! recent average of the number of active cores; 0 if not known yet
   contains

@@ -165,9 +165,10 @@ contains
     end associate
   end subroutine apply_tangential_impulse_at_wall
 
-  !> Adds a collision with a side or obstacle to the counters and sums. The energy of the disk changes by the work of the moving
-  !> surface and by a second contribution. At a thermal wall, the energy change of the disk minus the work of the surface is the
-  !> transferred heat. At any other wall, the work of the surface minus the energy change of the disk is the dissipated energy.
+  !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk consists of the work of the
+  !> moving surface, and of transferred heat or dissipated energy. At a thermal wall, the energy change of the disk minus the work
+  !> of the surface is the transferred heat. At any other wall, the work of the surface minus the energy change of the disk is the
+  !> dissipated energy.
   pure subroutine add_wall_sums(sim, i, k, heats, u, v, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

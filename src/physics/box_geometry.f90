@@ -33,8 +33,8 @@ module box_geometry
     logical :: periodic(2) = .false.            !! periodic boundary along each axis
     real(real64) :: gravity(2) = 0.0_real64     !! [length/time**2]
     real(real64) :: shear_rate = 0.0_real64     !! shear rate of a box with Lees-Edwards boundary conditions [1/time]
-    !> The sides in the order left, right, bottom, top, followed by the groups of obstacles. The elements of periodic sides are not
-    !> used.
+    !> The sides in the order left, right, bottom, top, followed by the groups of obstacles. Elements that belong to periodic sides
+    !> are not used.
     type(surface_t), allocatable :: surface(:)
     type(obstacle_t), allocatable :: obstacle(:)   !! the obstacles of one group have consecutive indices
     ! State of the box that changes during a run. The input determines the initial state of the sides.
@@ -300,8 +300,7 @@ contains
   pure subroutine next_obstacle(box, disk, last, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    !> Last collision partner of the disk: its component `last_partner`, which is the code of an obstacle after a collision with
-    !> that obstacle.
+    !> Last collision partner of the disk (`last_partner`), which can be the code of an obstacle
     integer(int32), intent(in) :: last
     integer(int32), intent(in) :: list(:)       !! codes of the obstacles to be tested, in descending order
     real(real64), intent(inout) :: t
@@ -326,8 +325,7 @@ contains
   pure subroutine find_image_contact(box, disk, last, obstacle, shift, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    !> Last collision partner of the disk: its component `last_partner`, which is the code of an obstacle after a collision with
-    !> that obstacle.
+    !> Last collision partner of the disk (`last_partner`), which can be the code of an obstacle
     integer(int32), intent(in) :: last
     integer(int32), intent(in) :: obstacle      !! code of the obstacle
     real(real64), intent(in) :: shift(2)        !! shift from the obstacle to its image [length]

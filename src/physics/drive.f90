@@ -18,7 +18,7 @@ module drive
     real(real64) :: strength = 0.0_real64
     logical :: keep_momentum = .false.  !! whether white noise conserves the total momentum; .false. for other kinds of driving
     real(real64) :: fraction = 1.0_real64            !! mean fraction of the disks that a kick of 'andersen' affects
-    !> KT of the distribution from which velocities are drawn; 0 if velocities are not drawn [energy]
+    !> Temperature kT of the distribution from which velocities are drawn; 0 if velocities are not drawn [energy]
     real(real64) :: temperature = 0.0_real64
     real(real64) :: speed = 0.0_real64               !! self-propulsion speed of active disks [length/time]
     real(real64) :: rotational_diffusion = 0.0_real64   !! rotational diffusion coefficient of active disks [1/time]

@@ -174,8 +174,8 @@ contains
     restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(j)%species)
     if (sim%law%contact_time > 0 .or. .not. restitution < 1) return
     last_partner = sim%tag([i, j])%last_partner
-    ! Each disk stores the number of collisions in its series of simultaneous collisions. If a collision with a wall has erased this
-    ! number for one of two disks, the number of the other disk is used.
+    ! Each disk stores the number of collisions in its series of simultaneous collisions. If a collision with a wall has erased the
+    ! number of collisions that one disk stores, the number that the other disk stores is used.
     n = minval(merge(repeats(last_partner), most_repeats, last_partner > 0)) + 1
     fastest = max(magnitude(sim%disk(i)%v), magnitude(sim%disk(j)%v))
     if (impact_velocity(sim, i, j, t) > max(rounded*(1 - restitution)*fastest, slowest)) n = min(n, most_visible)
@@ -314,7 +314,7 @@ contains
     type(images_t) :: images
     type(image_t) :: image
 
-    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! the pair itself is nearest in nearly all calls
+    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! the image of disk j in the box is usually the nearest
     images = sim%images()
     image = images%image(images%nearest_image(dx, t))
     dx = dx + [image%shift(1) + image%velocity*t, image%shift(2)]

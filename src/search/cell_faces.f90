@@ -22,7 +22,7 @@ module cell_faces
   !> the patch of a domain consists of a part of the cells of the box, and may extend across a periodic side. An outer face of a
   !> patch that is not a side of the box is open: a disk that crosses an open face leaves the patch.
   type :: patch_t
-    integer(int32) :: whole(2) = 0                 !! numbers of columns and rows in the box
+    integer(int32) :: whole(2) = 0                 !! numbers of columns and rows in the whole box
     !> First column and row of the patch. The values are less than 1 if the patch begins beyond a periodic side of the box.
     integer(int32) :: first(2) = 1
     integer(int32) :: n(2) = 0                     !! numbers of columns and rows in the patch
@@ -313,7 +313,7 @@ contains
   !> that the side can reach. If the side is a piston, the cell is unbounded towards the piston.
   pure subroutine rectangle(self, cell, n, low, high)
     class(cell_faces_t), intent(in) :: self
-    integer(int32), intent(in) :: cell(2)          !! column and row in the box
+    integer(int32), intent(in) :: cell(2)          !! column and row in the grid of the whole box
     integer(int32), intent(in) :: n(2)             !! numbers of columns and rows in the box
     real(real64), intent(out) :: low(2), high(2)   !! relative to the lower left corner of the box [length]
 
@@ -335,8 +335,8 @@ contains
     cell(2) = cell(2) + ahead(self%row, self%overlap(2), disk%x(2), disk%v(2), gravity(2), s, cell(2))
   end subroutine choose_cell
 
-  !> Change of the column or row if a disk is assigned to the next cell in its direction of motion along one axis: 1 or -1 if the
-  !> next cell also contains the disk, otherwise 0.
+  !> Change of the column or row of a disk along one axis: 1 or -1 if the next cell in the direction of motion also contains the
+  !> disk, otherwise 0.
   pure function ahead(line, overlap, x, v, g, s, cell) result(step)
     type(line_t), intent(in) :: line(0:1, *)
     real(real64), intent(in) :: overlap, x, v, g, s

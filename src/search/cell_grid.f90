@@ -54,7 +54,7 @@ module cell_grid
 
 contains
 
-  !> Chooses the cells, and lists the disks and obstacles in each cell. Lists of obstacles for the same cells remain valid.
+  !> Chooses the cells, and lists the disks in each cell and, unless the cells are unchanged, the obstacles in each cell.
   subroutine build(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -166,7 +166,8 @@ contains
     if (near%n > 0) call test_through_image(sim, known, images%image(number), near)
   end subroutine scan_cells
 
-  !> Adds the disks in the linked list of a crowded cell to the candidates. The first disk of the linked list is also in a slot.
+  !> Adds the disks in the linked list of a crowded cell to the candidates. The first disk of the linked list is also in a slot of
+  !> the cell.
   subroutine add_chain(cells, sim, c, images, number, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim

@@ -1,10 +1,10 @@
 !> Neighbour lists. The list of a disk contains the disks that it can touch while both disks stay in their neighbourhoods.
 !>
-!> The neighbourhood of a disk is the part of a square that is inside its cell and inside the box. The centre of the square is the
-!> position at which the disk received its neighbour list. Two disks are in each other's lists if they can touch somewhere in their
-!> neighbourhoods. An event occurs when a disk leaves its neighbourhood: the nine cells around the disk are then searched, and the
-!> disk receives a new neighbourhood and a new list. A prediction therefore tests only a few neighbours, however many disks the
-!> cells contain (Donev, Torquato and Stillinger, Journal of Computational Physics 202, 737 (2005)).
+!> The neighbourhood of a disk is the part of a square that is inside the cell of the disk and inside the box. The centre of the
+!> square is the position at which the disk received its neighbour list. Two disks are in each other's lists if they can touch
+!> somewhere in their neighbourhoods. An event occurs when a disk leaves its neighbourhood: the nine cells around the disk are then
+!> searched, and the disk receives a new neighbourhood and a new list. A prediction therefore tests only a few neighbours, however
+!> many disks the cells contain (Donev, Torquato and Stillinger, Journal of Computational Physics 202, 737 (2005)).
 !>
 !> Neighbour lists only save time and do not change results. A list without space for a further neighbour is marked as incomplete
 !> until the disk receives a new list. While the list of a disk is incomplete, each prediction searches the nine cells around the
@@ -22,7 +22,7 @@ module neighbour_lists
   private
   public :: neighbour_lists_t
 
-  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! marks stored instead of a number of entries
+  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! values in place of the number of entries of a list
   !> Number of array elements that are copied from every list, even if the list is shorter, so that copying a short list needs no
   !> branch.
   integer(int32), parameter :: always_copied = 15
@@ -76,7 +76,7 @@ module neighbour_lists
 contains
 
   !> Allocates the neighbour lists if they are expected to save time. With neighbour lists, a prediction after a collision tests
-  !> fewer disks. On the other hand, neighbour lists must be renewed, and more frequently so at lower densities. The limit
+  !> fewer disks. The disadvantage of neighbour lists is that they must be renewed, more frequently at lower densities. The limit
   !> `least_candidates` and the width of the neighbourhoods were optimised for polydisperse disks.
   subroutine prepare(self, disk, tag, lower, edges, patch)
     class(neighbour_lists_t), intent(inout) :: self

@@ -129,8 +129,7 @@ contains
     clock = d%clock; radius = d%radius
   end subroutine read_state
 
-  !> A coordinate of a disk after a flight of duration s. On a straight path the calculation of the coordinate needs fewer
-  !> operations.
+  !> A coordinate of a disk after a flight of duration s. Without gravity the coordinate is calculated with fewer operations.
   elemental function moved(x, v, g, s, falling) result(there)
     real(real64), intent(in) :: x, v, g, s
     logical, intent(in) :: falling            !! whether gravity acts; if not, g is zero

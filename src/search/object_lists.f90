@@ -47,7 +47,7 @@ module object_lists
     !> obstacles nor big disks.
     integer(int32), allocatable :: first(:, :)
     type(entry_t), allocatable :: entry(:)
-    integer(int32), private :: vacant = 0        !! head of the list of free entries
+    integer(int32), private :: vacant = 0        !! first entry in the list of free entries
     type(patch_t), private :: patch              !! patch of cells for which the lists of obstacles were made
     !> Lower left and upper right corner of the rectangle that contains all cells of the box [length]
     real(real64), private :: span(2, 2) = 0.0_real64

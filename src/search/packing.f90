@@ -190,7 +190,8 @@ contains
     integer(int32), intent(in) :: k
     integer, intent(in) :: axis                     !! 1 for x, 2 for y
     integer, intent(in) :: sense                    !! 1 for a motion to the right or upwards, -1 for the opposite direction
-    !> In: distance up to which the procedure searches. Out: distance to the contact, or unchanged if no disk is touched. [length]
+    !> Distance up to which the procedure searches. If a disk is touched, the procedure sets this argument to the distance to the
+    !> contact. [length]
     real(real64), intent(inout) :: distance
     integer(int32), intent(out) :: partner          !! disk that is touched; 0 if no disk is touched
     integer :: s

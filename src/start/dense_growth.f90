@@ -46,8 +46,8 @@ contains
     real(real64), intent(in) :: full(:)                 !! (n) radii to be reached, in the order of species [length]
     type(random_stream_t), intent(inout) :: stream
     class(status_line_t), intent(inout) :: line         !! status line that shows the progress
-    !> (2,n) positions of the disks, species by species. In: initial positions, or an array of shape (2,0) for random initial
-    !> positions. Out: final positions. [length]
+    !> (2,n) positions of the disks, species by species [length]. The argument contains the initial positions, or has the shape
+    !> (2,0) for random initial positions, and returns the final positions.
     real(real64), allocatable, intent(inout) :: x(:, :)
     type(error_t), allocatable, intent(out) :: error
     type(simulation_t) :: sim                           ! elastic disks

@@ -10,7 +10,7 @@
 !> the chain does not depend on the positions.
 !>
 !> Along an axis with sides, a disk that reaches a side reverses its direction and continues (straight event chains in a box with
-!> walls; Li et al., 2022, doi:10.1063/5.0126437). The state of a chain along an axis with sides includes the direction of the
+!> walls, Li et al., 2022, doi:10.1063/5.0126437). The state of a chain along an axis with sides includes the direction of the
 !> chain. Each state has exactly one predecessor even with reflections, because a disk that touches a side and moves away from the
 !> side has just been reflected. The first direction of a chain between two sides is drawn at random, because the uniform
 !> distribution is stationary only if both directions are equally probable. If a chain between two sides is reversed at its end, the
@@ -32,14 +32,14 @@ module event_chains
   real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! packing fraction of the triangular lattice
   integer, parameter :: stream_number = 8         !! number that identifies the random streams of this module
   integer, parameter :: chains_per_look = 1024    !! number of chains between two updates of the status line
-  !> Fraction of the length of a chain that `usual_steps` successive moves must cover. A chain that moves more slowly is considered
+  !> Smallest fraction of the length of a chain that `usual_steps` successive moves must cover; if they cover less, the chain is
   !> jammed and ends.
   real(real64), parameter :: jammed = 1.0e-3_real64
 
 contains
 
-  !> Equilibrates the disks of a packing without overlaps. The random numbers are a function of the seed and of the number of the
-  !> sweep.
+  !> Equilibrates the disks of a packing without overlaps. The random numbers of a sweep depend only on the seed of the run and on
+  !> the number of the sweep.
   subroutine relax(box, radius, seed, sweeps, line, x)
     type(box_t), intent(in) :: box                !! box without obstacles; its gravity and shear are ignored
     real(real64), intent(in) :: radius(:)         !! (n) [length]

@@ -91,7 +91,7 @@ contains
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
-    character(len=:), allocatable :: misfit                   ! name of the variable and problem, separated by ": "
+    character(len=:), allocatable :: misfit                   ! name of the variable, a colon, and the problem
     real(real64) :: beyond(2, 2)
     integer :: o(2), s(2), k
 
@@ -242,7 +242,7 @@ contains
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: m                           !! index of the obstacle
     type(group_t), intent(in) :: group
-    character(len=*), intent(in) :: misfit                    !! name of the variable and problem, separated by ": "
+    character(len=*), intent(in) :: misfit                    !! name of the variable, a colon, and the problem
     type(problem_list_t), intent(inout) :: problems
     integer :: colon, number
 

@@ -61,7 +61,7 @@ contains
     !> .true. to leave out the placement of 'relaxed' species: all their disks are then at the centre of the box
     logical, intent(in) :: unrelaxed
     class(status_line_t), intent(inout) :: line             !! status line that shows the progress of the placement
-    !> In: simulation with its box, and with the disks in the order of the input.
+    !> Simulation that contains its box, and the disks in the order of the input
     type(simulation_t), intent(inout) :: sim
     type(problem_list_t), intent(inout) :: problems
     type(packing_t) :: packing
@@ -220,8 +220,8 @@ contains
       associate (me => species(s))
         call stream%seed(seed, [s, stream_number])
         call centre_range(me%region, packing%box, me%radius, lower, upper)
-        ! The number of disks that fit varies between attempts. Small species are given more attempts, because the number of placed
-        ! disks varies more in relation to its mean if the species has few disks.
+        ! The number of disks that fit varies between attempts. If the species has few disks, more attempts are made, because the
+        ! number of placed disks varies more in relation to its mean.
         do trial = 1, merge(1, max(1, many_trials/me%count), me%polydispersity > 0)
           call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
           call insert_at_random(packing, int(s, int32), 1 + disks_before(species, s), radius, stream, line, placed)

@@ -129,7 +129,7 @@ contains
     do k = 1, size(me%in_file%rows)
       do row = 1, mass_row
         associate (number => me%in_file%table(row, k))
-          wrong = .not. ieee_is_finite(number)                ! NaN is excluded first: debug builds stop if it is compared
+          wrong = .not. ieee_is_finite(number)                ! debug builds stop if NaN is compared
           if (.not. wrong) wrong = number > largest .or. number < merge(smallest, -largest, row >= radius_row)
           if (.not. wrong) cycle
         end associate

@@ -47,8 +47,8 @@ module variable_rows
     character(len=name_length) :: name
     character(len=8) :: kind                 !! type of the values, 'integer', 'real', 'logical' or 'text'
     integer :: size                          !! required number of values; 0 if any number of values is allowed
-    character(len=8) :: status               !! see the end of this file
-    character(len=24) :: value  !! default or example, as written in an input file; see the end of this file
+    character(len=8) :: status               !! a status that is explained at the end of this file
+    character(len=24) :: value  !! default or example, as written in an input file
     character(len=help_length) :: help       !! help text in full sentences; the first sentence names the quantity
     type(range_t) :: range = anything        !! range of numbers
     character(len=16) :: unit = ""
