@@ -100,7 +100,7 @@ def test_the_page_has_every_case_of_the_report_and_the_worst_value_of_each():
 def test_sources_are_written_in_words():
     assert report.source("EX, eq. 7; D, R") == "exam, eq. 7; derived, reference program"
     found = {word for case in CASES for word in re.findall(r"\b[A-Z]{1,4}\b", case.source)}
-    assert found - report.SOURCES.keys() <= {"B", "DSMC", "E", "J", "N"}, "names of journals and letters"
+    assert found - report.SOURCES.keys() <= {"B", "DSMC", "E", "J", "N"}, "unexplained words"
 
 
 def test_other_seeds_give_other_runs(program, tmp_path):
