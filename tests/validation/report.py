@@ -231,7 +231,7 @@ def outcome(cases: list[dict], seconds: float) -> str:
 ROUNDING = """
 ## Cases that agree to rounding
 
-The columns are as above. *Values* is the number of compared values.
+The columns have the same meaning as in the first table. *Values* is the number of compared values.
 
 | case | quantity | values | source | tolerance | verdict |
 |---|---|---|---|---|---|
