@@ -126,10 +126,10 @@ int ricochet_set_velocities(ricochet *, const double *velocities, char *message,
 int ricochet_set_positions(ricochet *, const double *positions, char *message, int room);
 
 /* Copies a text that describes the simulation at the present time.
-   what:  "input": an input file that includes overrides and changes
-          "parameters": a line GROUP.VARIABLE = JSON for each variable that has a value
-          "changes": a line TIME GROUP.VARIABLE=VALUE for each change
-          "note": a note about inelastic collapses, or about disks that are too slow to continue; may be empty
+   what:  "input" for an input file that includes overrides and changes;
+          "parameters" for a line GROUP.VARIABLE = JSON for each variable that has a value;
+          "changes" for a line TIME GROUP.VARIABLE=VALUE for each change;
+          "note" for a note about inelastic collapses, or about disks that are too slow to continue (may be empty)
    text:  buffer of `room` bytes
    Returns the length of the text in bytes, without the zero at the end. Nothing is copied unless `room` is larger
    than this length. */
