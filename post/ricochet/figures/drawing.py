@@ -71,7 +71,7 @@ def by_chance(runs: list[Run]) -> set[str]:
 
     They belong to species of random radii with the same number of disks, mean radius and region.
     """
-    given: dict[str, set[tuple]] = {}
+    given: dict[str, set[tuple[bool, str]]] = {}
     for run in runs:
         for kind in run.names:
             own = run.parameters.get("species", {}).get(kind, {})
