@@ -266,6 +266,14 @@ def test_a_correlator_keeps_few_samples_and_looks_at_many_lags(tmp_path, rng, mo
     assert lags[1] == 0.5 and np.allclose(2 * lags % 1, 0) and len(lags) > 40
 
 
+def test_lags_with_few_pairs_beside_lags_with_many_are_left_out():
+    """Frames at powers of ten have one pair at each lag, frames at equal intervals have many."""
+    decades = np.append(0, np.geomspace(0.001, 100, 51))
+    lags = pairs.lags_of(np.unique(np.round(np.append(decades, np.arange(1, 101.0)), 9)))
+    assert sum(lags < 1) > 25 and np.all(lags[lags > 1] % 1 == 0)
+    assert lags[-1] > 90 and sum(lags > 1) > 15
+
+
 def test_what_makes_no_lags_is_refused(tmp_path, rng):
     for times in ([], [1.0], [0.0, 1.0, 1.0], [2.0, 1.0]):
         with pytest.raises(ValueError, match="at least two times"):
@@ -316,6 +324,28 @@ def test_what_is_found_on_the_fly_and_in_parts_is_that_of_the_file(simulated, tm
         assert other.done == len(times)
         np.testing.assert_array_equal(other.sums, whole.sums)
         np.testing.assert_array_equal(other.pairs, whole.pairs)
+
+
+def test_the_figure_of_a_mixture_names_all_curves_and_marks_those_without_error(simulated):
+    """A single run has no error of long lags.  Its curves of species differ by colour."""
+    run = simulated(MIXED.format(seed=1, packing=0.2, until=0.6))
+    found = correlations.analysed([run], 0.0)
+    groups = [(0.4, [run])]
+    rows, _ = correlations.table(groups, [found])
+    figure = correlations.draw(groups, [found], rows, 6.28)
+    panels = {axes.get_ylabel(): axes for axes in figure.axes}
+    for label, pieces in (("F_s", ["all", "a", "b"]), ("S(k)", ["all", "a, a", "a, b", "b, b"])):
+        (axes,) = (own for text, own in panels.items() if label in text)
+        handles, names = axes.get_legend_handles_labels()
+        assert names == pieces
+        assert len({handle.get_color() for handle in handles}) == len(pieces)
+    (axes,) = (own for text, own in panels.items() if "F_s" in text)
+    pale, known = axes.lines[:2]
+    assert pale.get_alpha() < 1 and np.all(np.isfinite(pale.get_ydata()))
+    error = found.curves["F_s"].error
+    assert np.array_equal(np.isnan(known.get_ydata()), np.isnan(error)) and np.isnan(error[-1])
+    edges = correlations.bins(run)["g"]
+    assert np.all(np.diff(edges) > 0) and edges[1] - edges[0] < 0.011
 
 
 def test_disks_that_differ_by_their_mass_alone_have_the_structure_of_equal_ones(simulated):

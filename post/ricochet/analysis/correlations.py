@@ -19,15 +19,17 @@ Along axes where the velocity of the centre of mass is conserved, or changed onl
 (drive.keep_momentum = .false.), displacements and velocities are relative to the centre of mass.
 
 Lags are spaced logarithmically: each power of ten is divided into twelve intervals, and from each
-interval the lag with the largest number of pairs of samples is used.  This choice of lags suits
-samples at equal intervals, samples at logarithmic intervals, samples in bursts, and combinations of
-these schedules.  For a given lag, each sample at a time t0 is used as an origin if there is also a
-sample at t0 plus the lag.  If the sums over all origins would take too long, time is divided into
-intervals of one sixteenth of the lag, and only the first sample in each interval is an origin.  If
-fewer samples are origins, the correlations of displacements are equally accurate, but the
-correlations of velocities are less accurate at lags of many mean free times.  The method is the
-multiple-tau correlator of Ramirez et al., Journal of Chemical Physics 133, 154103 (2010), but
-without means over neighbouring samples, so that each lag is exact.
+interval the lag with the largest number of pairs of samples is used.  An interval whose lag has few
+pairs compared with a shorter lag is left out, because its noise would hide the course of the
+function.  This choice of lags suits samples at equal intervals, samples at logarithmic intervals,
+samples in bursts, and combinations of these schedules.  For a given lag, each sample at a time t0
+is used as an origin if there is also a sample at t0 plus the lag.  If the sums over all origins
+would take too long, time is divided into intervals of one sixteenth of the lag, and only the first
+sample in each interval is an origin.  If fewer samples are origins, the correlations of
+displacements are equally accurate, but the correlations of velocities are less accurate at lags of
+many mean free times.  The method is the multiple-tau correlator of Ramirez et al., Journal of
+Chemical Physics 133, 154103 (2010), but without means over neighbouring samples, so that each lag
+is exact.
 
 Errors follow from the scatter of the runs.  For a single run, errors follow from the scatter of
 sixteen parts of the run.  Lags above an eighth of the duration of a single run have no error (NaN).
@@ -58,6 +60,7 @@ __all__ = [
 ]
 
 PER_DECADE = 12
+FEW_PAIRS = 0.125  # smallest number of pairs of a lag divided by that of a shorter lag
 ORIGINS = 16  # origins per lag if not every sample is an origin
 BLOCKS = 16  # blocks of time, for errors
 REACH = 0.3  # mean diameters
@@ -81,7 +84,8 @@ def lags_of(times: np.ndarray) -> np.ndarray:
     -------
     numpy.ndarray
         (L,) lags [time]: 0, and the most frequent lag in each interval of a twelfth of a power of
-        ten
+        ten; an interval is left out if its lag has less than an eighth of the pairs of a shorter
+        lag, apart from the decrease in proportion to the rest of the duration
 
     Raises
     ------
@@ -105,7 +109,10 @@ def lags_of(times: np.ndarray) -> np.ndarray:
     part = np.floor(PER_DECADE * np.log10(apart[first] / apart.min()) + CLOSE)
     order = np.lexsort((first, -pairs, part))
     _, best = np.unique(part[order], return_index=True)
-    return np.append(0, apart[first[order[best]]])
+    lags, pairs = apart[first[order[best]]], pairs[order[best]]
+    rest = 1 + (apart.min() - lags) / (times[-1] - times[0])  # in proportion to the largest number
+    enough = pairs / rest >= FEW_PAIRS * np.maximum.accumulate(pairs / rest)
+    return np.append(0, lags[enough])
 
 
 def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
