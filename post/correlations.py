@@ -3,7 +3,8 @@
     python post/correlations.py runs/state/memory_*.h5 -o correlations.png --csv correlations.csv
 
 The script accepts runs without obstacles and without gravity.  Runs of equal packing fraction are
-combined; lines show means over the runs, and bands show errors.  The frames may be spaced equally
+combined; lines show means over the runs, and bands show errors.  Pale parts of lines have no error:
+a single run has errors up to an eighth of its duration.  The frames may be spaced equally
 or logarithmically in time (use --equilibration 0 if the run begins in equilibrium).  The unit of
 time is the mean free time 1/w, and the unit of length is the mean diameter.  Equilibrium begins
 after the first X collisions per disk, where X is the value of --equilibration, or by default when
@@ -49,7 +50,7 @@ not decay in a crystal.
 """
 
 from itertools import combinations_with_replacement, cycle
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ricochet import Run, RunError, hard_disks, transport
 from ricochet.analysis.correlations import correlators, curves as curves_of
@@ -72,12 +73,21 @@ from ricochet.analysis.structure import (
 )
 from ricochet.analysis.equilibrium import all_settle, later, motion_notes
 from ricochet.analysis.thermodynamics import FLUID, mean_free_time
-from ricochet.figures.drawing import band, caption, colours, dilute_limit, noise_band, plt
+from ricochet.figures.drawing import (
+    COLOURS,
+    band,
+    caption,
+    colours,
+    dilute_limit,
+    noise_band,
+    plt,
+)
 from ricochet.predictions.theory import RELAXATION
 from ricochet.reading.nature import Refused, allow
 from ricochet.script import by_packing, command_line, launch, measured, over_runs, points, report
 
 import numpy as np
+from matplotlib.ticker import LogLocator
 
 PLAIN = {"walls"}  # the only special property allowed for Enskog's D
 #: Traits of a run that exclude equilibrium, but not the calculation of structure functions.
@@ -91,6 +101,8 @@ RESTLESS = (
     "active",
     "sliding_surfaces",
 )
+FINE, COARSE = 0.01, 0.035  # widths of bins of distance, in mean diameters
+NEAR = 1.6  # distance up to which bins are narrow
 NUMBERS = ("D_displacement", "D_velocities", "psi6_local", "psi6_global")
 
 
@@ -100,6 +112,7 @@ class Found(NamedTuple):
     members: dict[str, list[SeriesMean]]
     curves: dict[str, Curve]
     lag: float | None  # lag of the diffusion coefficients [mean free times], or None
+    unit: float | None  # w sigma^2, in which D(t) is drawn if Enskog's D does not apply, or None
 
 
 def check(run: Run, first: Run) -> None:
@@ -118,10 +131,18 @@ def bins(run: Run) -> dict[str, np.ndarray]:
     half = 0.5 * run.edges.min() / (2 * run.radius.mean())
     least = float(run.radius.min() / run.radius.mean())
     found = {
-        "g": np.linspace(least, max(1.1, min(6.0, 0.9 * half)), 151),
+        "g": distances(least, max(1.1, min(6.0, 0.9 * half))),
         "g6": np.geomspace(1, max(1.1, half), 41),
     }
     return found | ({"S": np.linspace(0, 20, 101)} if run.periodic.all() else {})
+
+
+def distances(least: float, most: float) -> np.ndarray:
+    """Return the edges of bins of distance, which are narrow up to NEAR: there g(r) is steep."""
+    near = np.arange(least, min(NEAR, most), FINE)
+    return np.append(
+        near, np.linspace(near[-1] + FINE, most, 1 + round(max(0, most - NEAR) / COARSE))
+    )
 
 
 def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Curve]]:
@@ -209,7 +230,9 @@ def analysed(runs: list[Run], skip: float | None, wave: float = 2 * np.pi) -> Fo
         apart = runs[0].time[frames[0].start + 1] - runs[0].time[frames[0].start]
         lag = steps * float(apart / free_time(runs, frames))
     orders, shown = structure(runs, frames)
-    return Found(members | orders, curves | shown, lag)
+    moved = "D_displacement(t)" in curves
+    unit = (2 * runs[0].radius.mean()) ** 2 / free_time(runs, frames) if moved else None
+    return Found(members | orders, curves | shown, lag, unit)
 
 
 def table(groups: list, results: list[Found]) -> tuple[list[dict], list[str]]:
@@ -256,6 +279,7 @@ AXES = {
     "S": {"xlabel": "$k\\,\\sigma$", "ylabel": "structure factor $S(k)$"},
     "g6": {"xlabel": "$r\\,/\\,\\sigma$", "ylabel": "$g_6(r)$", "xscale": "log", "yscale": "log"},
 }
+PALE = 0.3  # opacity of parts without an error
 LINES = ("-", "--", ":", "-.")  # line styles of all disks, and of species
 
 
@@ -265,35 +289,53 @@ def parts(shown: dict[str, Curve], panel: str) -> dict[str, Curve]:
     return {one[len(panel) + 1 :]: shown[one] for one in names if one != "vacf_tail"}
 
 
+def in_time(axes: plt.Axes, curve: Curve, label: str | None = None, **style: Any) -> None:
+    """Draw a function of time with its error band; parts without an error are pale."""
+    axes.plot(*curve[:2], **style, alpha=PALE)
+    known = np.isfinite(curve.error)
+    band(axes, *(np.where(known, part, np.nan) for part in curve), label=label, **style)
+
+
 def draw_group(
-    panels: dict[str, plt.Axes], found: Found, row: dict, colour: str, count: int, keyed: bool
+    panels: dict[str, plt.Axes], found: Found, row: dict, colour: str, count: int, keyed: str
 ) -> None:
-    """Draw the curves of one packing fraction; each run has `count` disks."""
+    """Draw the curves of one packing fraction; each run has `count` disks.
+
+    Species have names in the legends if `keyed` is not empty, and colours if it is "colours".
+    """
     line, label, shown = {"color": colour, "lw": 1}, f"η = {row['packing']:.3g}", found.curves
 
     def positive(curve: Curve) -> Curve:
         return Curve(*(part[curve.y > 0] for part in curve))
 
     for panel in ("vacf", "msd", "F_s", "alpha2", "g", "S"):
-        dots = {} if panel in ("g", "S") else {"marker": "."}
+        own, drawing = parts(shown, panel), band if panel in ("g", "S") else None
         mean, error = row["D_displacement"], row["D_displacement_error"]
         spread = f"{label},  D = {mean:.4g} ± {error:.2g}" if mean and panel == "msd" else label
-        for (of, curve), dash in zip(parts(shown, panel).items(), cycle(LINES), strict=False):
-            key = of.replace("_", ", ") if keyed else None
-            named = key if of else spread if panel == "msd" or panel == "vacf" else None
-            band(panels[panel], *curve, ls=dash, label=named, **line, **dots)
+        shades = ["black", *COLOURS] if keyed == "colours" and len(own) > 1 else [colour]
+        for (of, curve), dash, shade in zip(own.items(), cycle(LINES), cycle(shades)):
+            named = of.replace("_", ", ") if of else "all" if len(own) > 1 else None
+            named = named if keyed else None
+            if not of and panel in ("msd", "vacf"):
+                named = spread + ", all" * bool(named)
+            style = line | {"color": shade, "ls": dash, "label": named}
+            if drawing is None:
+                in_time(panels[panel], curve, marker=".", **style)
+            else:
+                drawing(panels[panel], *curve, **style)
     if "vacf" in shown:
-        band(panels["tail"], *positive(shown["vacf"]), marker=".", **line)
+        in_time(panels["tail"], positive(shown["vacf"]), marker=".", **line)
         if "vacf_tail" in shown:
             wt, tail, _ = shown["vacf_tail"]
             panels["tail"].plot(wt[wt > 3], tail[wt > 3], ls="--", **line)
     for name, marker in (("D_displacement(t)", "."), ("D_velocities(t)", "x")):
         if name in shown:
             x, y, error = shown[name]
-            unit = row["D_enskog"] or y.max()
-            band(panels["D"], x, y / unit, error / unit, marker=marker, ms=4, **line)
-    band(panels["a2"], *shown["a2"], **line)
-    noise_band(panels["a2"], count, colour)
+            unit = row["D_enskog"] or found.unit
+            in_time(panels["D"], Curve(x, y / unit, error / unit), marker=marker, ms=4, **line)
+    if "a2" in panels:
+        band(panels["a2"], *shown["a2"], **line)
+        noise_band(panels["a2"], count, colour)
     order = f"{label},  ψ₆ {row['psi6_local']:.2f} of a disk, {row['psi6_global']:.2f} of all"
     band(panels["g6"], *positive(shown["g6"]), marker=".", label=order, **line)
 
@@ -303,6 +345,8 @@ def draw(
 ) -> plt.Figure:
     """Draw all available time correlations, and below them the available structure functions."""
     there = set().union(*(one.curves for one in results))
+    if max(len(one.curves["a2"].x) for one in results) < 2:  # the runs begin in equilibrium
+        there.remove("a2")
     of = {"tail": "vacf", "D": "D_displacement(t)"}
     shown = {name: style for name, style in AXES.items() if of.get(name, name) in there}
     columns = (len(shown) + 1) // 2
@@ -313,7 +357,8 @@ def draw(
     shades = colours(len(rows))
     for (_, runs), found, row, colour in zip(groups, results, rows, shades, strict=True):
         count = sum(run.n_disks for run in runs)
-        draw_group(panels, found, row, colour, count, keyed=row is rows[0])
+        keyed = "" if row is not rows[0] else "colours" if len(rows) == 1 else "dashes"
+        draw_group(panels, found, row, colour, count, keyed)
     for name, style in shown.items():
         panels[name].set(**{"xlabel": "$w\\,t$", **style})
     known = groups[0][1][0].nature <= PLAIN
@@ -326,31 +371,34 @@ def draw(
         panels["F_s"].set_title(f"$k\\sigma$ = {wave:.3g}")
     if "D" in panels:
         if not known:
-            panels["D"].set_ylabel("$D(t)$ / its largest value")
+            panels["D"].set_ylabel("$D(t)\\,/\\,(w\\,\\sigma^2)$")
+        panels["D"].set_ylim(0, 1.3 * panels["D"].dataLim.y1)  # below the legend
         panels["D"].plot([], [], color="black", marker=".", label="from displacements")
         if "D_velocities(t)" in there:
             panels["D"].plot([], [], color="black", marker="x", label="from velocities")
     start = min(found.curves["a2"].y[0] for found in results)
-    if start < -0.4 and known:
+    if start < -0.4 and known and "a2" in panels:
         dilute_limit(panels["a2"], RELAXATION)
     for name, level in (
         ("vacf", 0),
         ("F_s", 0),
         ("alpha2", 0),
-        ("D", 1),
+        ("D", 1 if known else 0),
         ("a2", 0),
         ("g", 1),
         ("S", 1),
     ):
         if name in panels:
             panels[name].axhline(level, color="0.6", lw=0.8, zorder=0)
-            if name in ("D", "g"):
+            if name == "g":
                 panels[name].set_ylim(0, None)
-    panels["g6"].set_ylim(1e-5, 30)
+    panels["g6"].set_ylim(1e-5, 1.5)
+    panels["g6"].xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    panels["g6"].xaxis.set_major_formatter("{x:g}")
     panels["g6"].xaxis.set_minor_formatter("")
     for name in panels:
         if panels[name].get_legend_handles_labels()[0]:
-            panels[name].legend()
+            panels[name].legend(loc={"g6": "lower left", "D": "upper left"}.get(name, "best"))
     figure.suptitle(caption([run for _, runs in groups for run in runs]))
     return figure
 
