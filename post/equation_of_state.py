@@ -15,13 +15,15 @@ The factor Z that follows from the force on the walls is calculated with the are
 reach, and differs from Z far from the walls by a fraction of about 1/sqrt(N).  For disks of many
 radii r, the curves show the equation of state of fluids derived by Santos, Yuste and Lopez de Haro
 (1999).  The equation of Santos, Yuste and Lopez de Haro depends on the radii only through the ratio
-<r>^2 / <r^2>, which must be the same for all runs.
+<r>^2 / <r^2>, which must be the same for all runs.  The curve of such disks ends at the packing
+fraction 0.648, because equal disks freeze at 0.70; the lower panel then names the packing fractions
+that have no reference.
 """
 
 from ricochet import Run, RunError, hard_disks
 from ricochet.analysis.statistics import combine_runs
 from ricochet.analysis.thermodynamics import z_ways
-from ricochet.figures.drawing import COLOURS, caption, plt
+from ricochet.figures.drawing import COLOURS, caption, listed, plt
 from ricochet.script import by_packing, columns, command_line, launch, measured, over_runs, report
 
 import numpy as np
@@ -67,19 +69,23 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
     """Draw Z in the upper panel, and its deviation from a reference equation in the lower panel."""
     figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(8, 8), height_ratios=(2, 1))
     alike, fluid, solid = likeness(runs), np.linspace(0, 0.72, 200), np.linspace(0.715, 0.86, 100)
+    found = {name: np.array(values, dtype=float) for name, values in columns(rows).items()}
+    eta, expected = found["packing"], found["Z_reference"]
+    if alike < 1:  # such fluids do not freeze where equal disks do
+        fluid = np.linspace(0, max(0.72, float(eta.max())), 200)
     laws = (hard_disks.henderson(fluid), hard_disks.simulated(fluid))
     henderson, published = (hard_disks.of_sizes(z, fluid, alike) for z in laws)
     label = "Kolafa and Rottner 2006; up to 0.65 Erpenbeck and Luban 1985; then this program"
     if alike < 1:
-        label = "Santos, Yuste and López de Haro 1999, from those of equal disks"
-    above.plot(fluid, henderson, color="0.6", label="Henderson 1975")
+        published = np.where(fluid <= hard_disks.FLUID[-1, 0], published, np.nan)
+        label = "Santos et al. 1999, from simulations of equal disks"
+    rough = "Henderson 1975" if alike == 1 else "Santos et al. 1999, from Henderson's equation"
+    above.plot(fluid, henderson, color="0.6", label=rough)
     above.plot(fluid, published, color="black", lw=1, label=label)
     if alike == 1:
         label = "crystal, Alder, Hoover and Young 1968"
         above.plot(solid, hard_disks.crystal(solid), color="black", lw=1, ls="--", label=label)
     below.plot(fluid, 100 * (henderson / published - 1), color="0.6")
-    found = {name: np.array(values, dtype=float) for name, values in columns(rows).items()}
-    eta, expected = found["packing"], found["Z_reference"]
     for (name, way), marker, colour in zip(WAYS.items(), "oxs", COLOURS, strict=False):
         z, error = found[f"Z_{name}"], found[f"Z_{name}_error"]
         if not np.isnan(z).all():
@@ -87,6 +93,9 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
             above.errorbar(eta, z, error, label=f"by {way}", **style)
             below.errorbar(eta, 100 * (z / expected - 1), 100 * error / expected, **style)
     below.axhline(0, color="black", lw=1, zorder=0)
+    if np.isnan(expected).any():
+        words = f"no reference for η = {listed(set(eta[np.isnan(expected)]))}"
+        below.text(0.99, 0.97, words, ha="right", va="top", transform=below.transAxes)
     largest = 3 * np.nanmax(np.abs(100 * (found["Z_virial"] / expected - 1)), initial=0.1)
     below.set(xlabel="packing fraction $\\eta$", ylabel="deviation (%)", ylim=(-largest, largest))
     most = np.nanmax([found[f"Z_{name}"] for name in WAYS])  # from the data, as the curves diverge

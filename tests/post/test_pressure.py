@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from synthetic_run import written
 
+import equation_of_state
 import ricochet
-from ricochet import RunError
+from ricochet import RunError, hard_disks
 
 GAS = "&species name = 'a' radius = 0.02 count = 40 temperature = 1 /\n&stop time = 2 /\n"
 OFTEN = "&output observables_every_time = 0.125 virial_tensor = .true. /\n"
@@ -87,3 +88,17 @@ def test_the_means_are_over_time(tmp_path):
     for times in ((0, 0.1), (2, 0), (1, 1)):
         with pytest.raises(RunError, match="no two samples"):
             run.pressure(*times)
+
+
+def test_the_curve_of_a_mixture_ends_before_equal_disks_freeze(tmp_path):
+    """Above it Henderson's equation goes on, and the figure names what has no reference."""
+    x, radius = np.random.default_rng(1).uniform(size=(1, 4, 2)), np.array([1, 1, 1.4, 1.4])
+    run = written(tmp_path / "a.h5", x, x, radius=0.01 * radius)
+    ways = {f"Z_{name}{end}": 20.0 for name in equation_of_state.WAYS for end in ("", "_error")}
+    rows = [{"packing": 0.78, "Z_reference": None, **ways}]
+    above, below = equation_of_state.draw(rows, [run]).axes
+    henderson, published = (line.get_xydata() for line in above.lines[:2])
+    assert henderson[-1, 0] == pytest.approx(0.78)
+    known = published[np.isfinite(published[:, 1]), 0]
+    assert 0.63 < known.max() <= hard_disks.FLUID[-1, 0]
+    assert "no reference for η = 0.78" in [text.get_text() for text in below.texts]
