@@ -19,12 +19,14 @@ from ricochet.figures.drawing import (
     colour_map,
     disk_collection,
     draw_box,
+    exceeded,
     label_of,
     limits_of,
     moment,
     note_on_size,
     plt,
     radius_marks,
+    sample_of,
     scale_top,
     species_colours,
     species_legend,
@@ -90,7 +92,9 @@ def animate(
     if colour == "species":
         species_legend(figure, run)
     else:
-        beyond = {"psi6": "neither", "spin": "both"}.get(colour, "max")
+        beyond = (
+            "neither" if colour == "psi6" else exceeded(sample_of(run, frames, colour), *limits)
+        )
         figure.colorbar(disks, label=label_of(run, colour), shrink=0.8, extend=beyond)
         species_legend(figure, run, by_outline=True)
     warn(figure, [run.termination_note] if run.termination_note else [])

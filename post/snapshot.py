@@ -38,10 +38,10 @@ def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
         top = np.quantile(np.abs(values), 0.995) or 1.0
         return Normalize(*drawing.limits_of(colour, top))
     moved = values[values > 0]
-    if not len(moved):
-        return Normalize(0, 1)
+    if not len(moved) or not log:
+        return Normalize(0, drawing.top_of(moved))
     low, top = np.quantile(moved, (0.005, 0.995))
-    return LogNorm(min(low, top / 1.01), top) if log else Normalize(0, top)
+    return LogNorm(min(low, top / 1.01), top)
 
 
 def draw_key(axes: plt.Axes, run: Run, arrows: Quiver, longest: float) -> None:
@@ -65,8 +65,7 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
     if colour != "species":
         values = np.array([drawing.values_of(run, frame, colour) for frame in frames])
         whole = scale(values, args.log, colour)
-        beyond = {"psi6": "neither", "spin": "both"}.get(colour, "both" if args.log else "max")
-        bar = {"label": drawing.label_of(run, colour), "extend": beyond}
+        bar = {"label": drawing.label_of(run, colour)}
     longest = max(float(np.max(run.speed(frame))) for frame in frames) or 1.0
     # The longest velocity arrow is as long as a tenth of the box.
     arrows = {"angles": "xy", "scale_units": "xy", "scale": longest / (0.1 * run.edges.max())}
@@ -89,7 +88,8 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
         disks = drawing.disk_collection(axes, run, run.position[frames[k]], **style)
         drawing.radius_marks(axes, run, frames[k])
         if colour != "species" and args.per_frame:
-            figure.colorbar(disks, ax=axes, shrink=0.7, **bar)
+            beyond = drawing.exceeded(values[k], norm.vmin, norm.vmax)
+            figure.colorbar(disks, ax=axes, shrink=0.7, extend=beyond, **bar)
         if args.quiver:
             drawn = axes.quiver(*run.position[frames[k]].T, *run.velocity[frames[k]].T, **arrows)
             if k == 0:
@@ -100,8 +100,10 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
     else:
         drawing.species_legend(figure, run, by_outline=True)
     if colour != "species" and not args.per_frame:
-        figure.colorbar(disks, ax=panels, shrink=0.8, aspect=30, **bar)
-    dense = f",  η = {packing(run):.4g}" if colour == "psi6" else ""
+        beyond = drawing.exceeded(values, whole.vmin, whole.vmax)
+        figure.colorbar(disks, ax=panels, shrink=0.8, aspect=30, extend=beyond, **bar)
+    fluid = not run.nature & {"gravity", "obstacles"} and run.n_disks > 1
+    dense = f",  η = {packing(run):.4g}" if fluid else ""
     larger = drawing.note_on_size(panels.flat[0], run)
     figure.suptitle(drawing.caption([run]) + dense + larger)
     return figure

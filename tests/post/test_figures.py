@@ -293,6 +293,30 @@ def test_panels_contain_the_number_of_events_before_the_frame(tmp_path, figures,
         assert figures[-1].axes[0].get_title("left").startswith("t = ")
 
 
+def test_equal_speeds_have_a_colour_of_the_middle_of_the_scale(simulated, tmp_path, figures):
+    """No end of the colour bar is an arrow, as no speed is beyond the scale."""
+    run = simulated("&species count = 9 radius = 0.05 speed = 3 /&stop events = 0 time = 0 /")
+    words = ("--frames", "0", "--colour", "speed", "-o", tmp_path / "a.png")
+    assert run_script("snapshot", run.path, *words) == 0
+    *_, disks = (c for c in figures[0].axes[0].collections if isinstance(c, EllipseCollection))
+    np.testing.assert_allclose(disks.norm(disks.get_array()), 0.5)
+    assert disks.colorbar.extend == "neither"
+    assert drawing.exceeded(np.array([1.0, 3.0]), 0, 2) == "max"
+
+
+def test_outlines_are_inside_the_disks(tmp_path, rng):
+    x = rng.uniform(0.2, 0.8, (1, 6, 2))
+    kinds = {"species": [1, 1, 1, 2, 2, 2], "names": ("a", "b"), "radius": 0.05}
+    run = read_run(write_run(tmp_path / "a.h5", x, x, **kinds))
+    _, axes = plt.subplots()
+    drawing.draw_box(axes, run)
+    disks = drawing.disk_collection(axes, run, x[0], array=np.arange(6.0))
+    outside = np.array(disks.get_linewidths()) / drawing.points_per_length(axes)
+    assert outside[-1] > 0 and 2 * disks._widths + outside == pytest.approx(np.full(6, 0.1))
+    assert not any(lines.get_snap() for lines in axes.collections[:2])
+    plt.close("all")
+
+
 def test_spins_have_a_colour(tmp_path, rng, figures, capsys, simulated):
     """The scale has 0 in its middle; disks that cannot rotate have no spin to draw."""
     rough = "&contact tangential_restitution = 0 /"

@@ -30,10 +30,11 @@ from ..reading.reader import SIDES, Run
 STYLE = Path(__file__).with_name("style.mplstyle")
 COLOURS = matplotlib.rc_params_from_file(STYLE)["axes.prop_cycle"].by_key()["color"]
 LEAST_SHARE = 0.12  # smallest drawn diameter divided by the mean distance of disks
-OUTLINE = 0.12  # width of an outline divided by the diameter
+OUTLINE = 0.08  # width of an outline divided by the diameter
 LEAST_POINTS = 4.0  # largest drawn diameter of enlarged disks
 ARC_POINTS = 181  # points of the line that represents an arc
-WALL: dict[str, Any] = {"color": "0.25", "linewidth": 1.2}
+# Not moved to whole pixels: a straight wall would have a step where an arc begins.
+WALL: dict[str, Any] = {"color": "0.25", "linewidth": 1.2, "snap": False}
 
 #: Quantities that can determine the colours of disks, each with its label and its dimension.
 COLOURINGS = {
@@ -175,10 +176,32 @@ def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
     values in the last frame.  If the colours show any other quantity, the quantile is computed from
     the values in about 40 frames.
     """
+    values = sample_of(run, frames, colour)
+    return top_of(np.abs(values[values != 0]))
+
+
+def sample_of(run: Run, frames: Sequence[int], colour: str) -> np.ndarray:
+    """Return the values (F, N) in the frames from which `scale_top` finds a colour scale."""
     some = [] if colour == "displacement" else frames[:: max(1, len(frames) // 40)]
-    values = values_of(run, sorted({*some, frames[-1]}), colour)
-    moved = np.abs(values[values != 0])
-    return float(np.quantile(moved, 0.995)) if len(moved) else 1.0
+    return values_of(run, sorted({*some, frames[-1]}), colour)
+
+
+def top_of(moved: np.ndarray) -> float:
+    """Return the upper end of a colour scale for positive values: their 99.5 % quantile.
+
+    If all values are equal, the result is twice their value: the lightest colour of the scale is
+    hardly visible on white.
+    """
+    if len(moved) == 0:
+        return 1.0
+    top = float(np.quantile(moved, 0.995))
+    return 2 * top if np.ptp(moved) <= 1e-9 * top else top
+
+
+def exceeded(values: np.ndarray, low: float, top: float) -> str:
+    """Return at which ends of a colour scale some values are beyond it, as for `colorbar`."""
+    ends = bool(np.any(values < low)), bool(np.any(values > top))
+    return {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[ends]
 
 
 def limits_of(colour: str, top: float) -> tuple[float, float]:
@@ -343,14 +366,16 @@ def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) ->
 
     The keyword argument `array` (N,) contains values that a colour map converts to colours, and
     `facecolors` contains colours.  If disks are coloured by value, all species except the first
-    have a black outline.
+    have a black outline, which is inside the disk.
     """
     which, places = with_images(run, position)
     diameters = drawn_diameters(axes, run)
     size, flat = diameters[which], np.zeros(len(which))
     if "array" in style and len(run.names) > 1:
         widths = np.clip(OUTLINE * diameters * points_per_length(axes), 0, 1.5)
-        style = {"edgecolors": "black", "linewidths": (widths * (run.species > 1))[which], **style}
+        widths = (widths * (run.species > 1))[which]
+        size = size - widths / points_per_length(axes)  # half of an outline is outside its ellipse
+        style = {"edgecolors": "black", "linewidths": widths, **style}
     for name in style.keys() & {"array", "facecolors"}:
         style[name] = np.asarray(style[name])[which]
     style = {"linewidths": 0, "units": "xy", "offset_transform": axes.transData, **style}
