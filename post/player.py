@@ -31,10 +31,10 @@ from contextlib import suppress
 from pathlib import Path
 
 from ricochet import Run, RunError
-from ricochet.analysis.paths import BENT, seen, turns_between, why_unknown
+from ricochet.analysis.paths import seen, turns_between, why_no_log_tells, why_unknown
 from ricochet.figures.drawing import COLOURS, caption, chosen_colour, label_of, scale_top
 from ricochet.reading.files import destination
-from ricochet.reading.nature import KICKED, known, rows_of
+from ricochet.reading.nature import known, rows_of
 from ricochet.reading.box import groups_of_rows
 from ricochet.reading.reader import SIDES
 from ricochet.reading.records import span
@@ -163,8 +163,8 @@ def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[st
         log = run.event_log()
     except RunError:  # a film can be made without an event log
         facts["collisions"] = run.collisions_per_disk_at(run.time)[frames].tolist()
-        kicked = run.nature & KICKED
-        return facts | {"note": BENT if kicked else "output.event_log tells the paths between"}, {}
+        reason = why_no_log_tells(run) or "output.event_log tells the paths between"
+        return facts | {"note": reason}, {}
     ends, pairs = seen(run, log, frames), np.append(0, np.cumsum(log.j > 0))
     facts["collisions"] = (2 / run.n_disks * pairs[ends]).tolist()
     some = slice(ends[0], ends[-1])
@@ -183,6 +183,15 @@ def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[st
         numbers = np.column_stack([share, turns.velocity])
         blocks["turns"] = numbers.astype("<f8" if exact else "<f4")
     return facts, blocks
+
+
+def names_of(run: Run, kind: str) -> list[str]:
+    """Return the names of all obstacles or walls: 'wall floor', or 'wall 1' without a name."""
+    names = run.parameters.get(kind, {}).get("name", ())
+    return [
+        f"{kind} {names[k] if names[k] != f'{kind}{k + 1}' else k + 1}"
+        for k in groups_of_rows(run.parameters, kind)
+    ]
 
 
 def species(run: Run) -> list[dict]:
@@ -253,6 +262,7 @@ def scene(run: Run) -> tuple[dict, dict]:
     facts = {
         "exact": run.n_disks <= FEW_DISKS,
         "settles": run.nature.in_equilibrium,
+        "heated": bool(run.nature & {"thermal_walls", "thermostatted"}),
         "recycling": "recycled" in run.nature,
         "gravity": run.gravity.tolist(),
         "lower": run.bounds[0].tolist(),
@@ -269,8 +279,8 @@ def scene(run: Run) -> tuple[dict, dict]:
         "radii": radii.tolist(),
         "surfaces": [
             *(f"the {side} side" for side in SIDES),  # names of partners j <= 0
-            *(f"obstacle {k + 1}" for k in range(len(run.obstacles))),
-            *(f"wall {k + 1}" for k in range(len(run.walls))),
+            *names_of(run, "obstacle"),
+            *names_of(run, "wall"),
         ],
     }
     blocks = {

@@ -31,8 +31,6 @@ function prepareFilm() {
   $('coming').hidden = !film.events;
   $('speeds').hidden = !counted.length;
   $('sofar').hidden = film.speeds.rest;
-  if (!film.speeds.rest) $('bars').textContent = 'Bars: share of the disks per unit of speed.'
-    + (film.settles ? ' Curves: Maxwell’s law at the mean kinetic energy of the species.' : '');
   $('event').hidden = !source.hasEvents();
 }
 

@@ -149,6 +149,9 @@ function plotLines(canvas, lines, now) {
 
 const FEWEST = 10;  // least number of disks of a species for a histogram
 let counted;        // species that have a histogram
+// Tells whether Maxwell's law applies: disks that never collide and that no heat bath touches keep their speeds.
+const settled = () => film.settles && (film.heated || past.at(-1).collisions > 0);
+
 let sums;           // the histograms of all frames so far, and the number of the last of these frames
 
 // Defines the histogram bins from zero to a given maximum speed. If many disks are at rest, the axis is logarithmic: on a linear
@@ -184,7 +187,8 @@ function drawHistogram() {
     drawSpeedsAndRest(plot, counts, others);
     return;
   }
-  const top = Math.max(edges.at(-1), ...others.map(one => one.edges.at(-1))), width = edges[1], energy = s => film.settles ? film.curves?.mean?.[s] ?? moment.kinetic[s] : moment.kinetic[s];
+  tellBars();
+  const top = Math.max(edges.at(-1), ...others.map(one => one.edges.at(-1))), width = edges[1], energy = s => settled() ? film.curves?.mean?.[s] ?? moment.kinetic[s] : moment.kinetic[s];
   const peak = Math.max(...counted.map(s => Math.sqrt(kinds[s].mass / (energy(s) || Infinity)) * Math.exp(-0.5)));
   const { x, y } = axes(plot, [0, top], [0, peak > 0 ? 1.6 * peak : 4 / top], 'speed');
   pen.save();
@@ -200,7 +204,7 @@ function drawHistogram() {
     pen.fill();
   }
   pen.globalAlpha = 1;
-  for (const s of film.settles ? counted : []) {
+  for (const s of settled() ? counted : []) {
     const b = kinds[s].mass / energy(s);
     if (!isFinite(b)) continue;
     Object.assign(pen, { lineWidth: 2, strokeStyle: css(speciesColour(kinds[s])) });
@@ -215,6 +219,11 @@ function drawHistogram() {
   const density = (n, bin, one, s) => y(n / (one.kinds[s].count * one.samples * (one.edges[bin + 1] - one.edges[bin])));
   others.forEach(one => drawOutline(pen, one, x, density, 0));
   pen.restore();
+}
+
+function tellBars() {
+  const words = 'Bars: share of the disks per unit of speed.' + (settled() ? ' Curves: Maxwell’s law at the mean kinetic energy of the species.' : '');
+  if ($('bars').textContent !== words) $('bars').textContent = words;
 }
 
 // Returns the histogram of speeds of this film, for drawing in other films that are shown at the same time.
@@ -280,8 +289,9 @@ function drawEnergies() {
 }
 
 function drawPressure() {
-  const { time, pressure } = source.curves(), colour = ink.accent;
-  const lines = overlaid.filter(({ curves }) => curves.pressure).map(({ letter, curves }) => ({ time: curves.time, values: curves.pressure, colour, letter }));
+  const { time, pressure: measured } = source.curves(), colour = ink.accent;
+  const falls = film.gravity.some(Boolean), pressure = falls ? null : measured;  // under gravity it depends on the height
+  const lines = overlaid.filter(({ curves }) => curves.pressure && !falls).map(({ letter, curves }) => ({ time: curves.time, values: curves.pressure, colour, letter }));
   if (pressure?.some(one => one !== null)) lines.push({ time, values: pressure, colour });
   $('pressures').hidden = !lines.length;
   if (lines.length) plotLines($('pressure'), lines, overlaid.length ? Infinity : moment.time);

@@ -360,7 +360,7 @@ def test_events_to_come_are_those_of_the_log(simulated, playing, box):
     rows = browser.run("return [...$('queue').children].map(row => row.textContent)")
     assert len(rows) == 20
     others = [f"the {name} side" for name in ("left", "right", "bottom", "top")]
-    others += ["obstacle 1", "wall 1"]
+    others += ["obstacle c"] if box == "container" else ["obstacle post", "wall ramp"]
     for row, k in zip(rows, range(7, 27), strict=True):
         other = f"disk {events.j[k]}" if events.j[k] > 0 else others[-events.j[k]]
         assert row.split("t =")[0] == f"disk {events.i[k]} and {other}"

@@ -7,8 +7,6 @@ import numpy as np
 from ..reading.nature import KICKED
 from ..reading.reader import EventLog, Run
 
-BENT = "the driving bends the paths between"  # reason why paths between frames are unknown
-
 
 class Turns(NamedTuple):
     """Velocities of disks after their collisions, sorted by frame, then by disk, then by time."""
@@ -19,12 +17,19 @@ class Turns(NamedTuple):
     velocity: np.ndarray  # (M, 2) afterwards
 
 
+def why_no_log_tells(run: Run) -> str:
+    """Return why no event log determines the paths of a run, or '' if a log determines them."""
+    if "recycled" in run.nature:
+        return "recycled disks jump between frames"
+    return "the driving bends the paths between" if run.nature & KICKED else ""
+
+
 def why_unknown(run: Run, log: EventLog) -> str:
     """Return the reason why paths cannot be computed from the event log, or '' if they can."""
     if log.momentum_change is None:
         return "the log has no momentum_change"
-    if run.nature & KICKED:
-        return BENT
+    if reason := why_no_log_tells(run):
+        return reason
     return "images slide" if run.shear_rate else ""
 
 
