@@ -25,8 +25,10 @@ samples; the speeds in each sample are divided by the thermal speed of this samp
 (docs/explanation/statistics.md).  Frames that are close in time contain correlated speeds;
 therefore the number of `independent` speeds is reduced by the statistical inefficiency.  The
 statistical tests do not apply to disks that conserve their angular momentum in a round container.
-The last panel shows the second Sonine coefficient a2 = <v^4> / (2 <v^2>^2) - 1 against the number
-of collisions per disk.
+The table contains the mean of u, and the mean of u^4 as `kurtosis`, which is 2 for the Maxwell
+distribution; speeds are scaled so that the mean of u^2 is 1.  The column `a2` contains the second
+Sonine coefficient a2 = <v^4> / (2 <v^2>^2) - 1 of all speeds that are used, with its error.  The
+last panel shows a2 of single frames against the number of collisions per disk.
 """
 
 from typing import NamedTuple
@@ -126,6 +128,7 @@ def pooled(
     for k, axis in enumerate("xy") if parts else ():
         means = [correlated_mean(track) for track in tracks_of(runs, picked, name, k)]
         parts |= measured(f"kT_{axis}", combine_runs(means))
+    fourth = moment(members, 4, test.independent)
     row = {
         "N": runs[0].n_disks,
         **({"species": name} if several else {}),
@@ -137,7 +140,8 @@ def pooled(
         "kT_first": ends[0],
         "kT_last": ends[1],
         **measured("mean_u", moment(members, 1, test.independent)),
-        **measured("kurtosis", moment(members, 4, test.independent)),
+        **measured("kurtosis", fourth),
+        **measured("a2", Estimate(fourth.mean / 2 - 1, fourth.error / 2)),
         "law": test.law,
         "KS_D": test.ks,
         "KS_p": test.ks_p,
@@ -208,9 +212,11 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
     axes.set(xlabel="collisions per disk", ylabel=A2)
     low, high = axes.get_ylim()
-    axes.set_ylim(low - 0.25 * (high - low), high)  # space for the explanation
+    low -= 0.32 * (high - low)  # space for the explanation below the points
+    legend = 0.04 + 0.08 * len(axes.get_legend_handles_labels()[0])  # its share of the panel
+    axes.set_ylim(low, low + (high - low) / (1 - legend))
     axes.text(0.98, 0.02, ABOUT_A2, ha="right", va="bottom", fontsize=8, transform=axes.transAxes)
-    axes.legend(loc="center right")
+    axes.legend(loc="upper right")
 
 
 def cooling(row: dict) -> str:

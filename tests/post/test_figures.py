@@ -218,6 +218,9 @@ def test_the_coefficient_of_speeds_is_explained_beside_its_band(tmp_path, rng, f
         for count, end in ends.items():
             band = shown[f"95 % in equilibrium{end}"].get_facecolor()
             assert band[:3] == colors.to_rgb(shown[f"N = {count}"][0].get_color())
+        figure.draw_without_rendering()
+        legend, curves = figure.axes[3].get_legend().get_window_extent(), figure.axes[3].lines
+        assert not any(line.get_window_extent().overlaps(legend) for line in curves)
 
 
 # --- pictures of disks ---

@@ -113,6 +113,18 @@ def test_a_gas_that_cools_is_not_called_equilibrium(tmp_path, rng, capsys, figur
     assert "cool.h5: differs in kind from" in refusal(capsys, "speeds", calm, cool)
 
 
+def test_the_table_contains_the_second_sonine_coefficient(tmp_path, rng, capsys):
+    """The speeds v^(1/2) of a Maxwellian gas have <v^2> = sqrt(pi) / 2 and <v^4> = 1."""
+    path = gas(tmp_path / "a.h5", rng, count=2000)
+    with h5py.File(path, "r+") as file:
+        velocity = file["particles/disks/velocity/value"]
+        velocity[...] /= np.sqrt(np.linalg.norm(velocity[()], axis=2, keepdims=True))
+    drawn(tmp_path, "speeds", path)
+    row = {name: float(cell) for name, cell in cells(capsys.readouterr().out).items() if "a2" in name}
+    assert 0 < row["a2_error"] < 0.005
+    assert abs(row["a2"] - (2 / np.pi - 1)) < 4 * row["a2_error"]
+
+
 def test_fewer_frames_than_asked_for_are_said(tmp_path, rng, capsys):
     path = gas(tmp_path / "a.h5", rng)
     for frames, words in (("10:30", "takes 3 of 20 frames, from t = 15"), ("3", "none of the fr")):
