@@ -18,6 +18,11 @@ only its density is calculated.  The table contains kT, stress and heat flux onl
 at least three disks remain if any one block of time is left out.  With --species, the fields of one
 species are calculated, relative to the mean flow of that species.
 
+The flow velocity u is a mean over time.  A flow that varies with time, such as the oscillation of a
+shaken bed, is therefore part of the temperatures, the stress and the heat flux.  The script prints
+a warning if the oscillation of the centre of mass alone is more than 5 % of the kinetic energy
+along an axis.  The panel of the temperature shows kT_x and kT_y if they differ significantly.
+
 With --grid, the script also draws the stream function psi of the particle flux j = n u, where j_x =
 d psi / dy and j_y = -d psi / dx.  The contour lines of psi are the streamlines of the mean flow.
 The longest arrow represents the largest significant flow.  Arrows are pale in cells without
@@ -39,7 +44,14 @@ import argparse
 from typing import NamedTuple
 
 from ricochet import Run
-from ricochet.analysis.fields import ACROSS, fields, has_theory, places, prediction
+from ricochet.analysis.fields import (
+    ACROSS,
+    fields,
+    has_theory,
+    oscillation_notes,
+    places,
+    prediction,
+)
 from ricochet.analysis.statistics import Estimate
 from ricochet.analysis.streams import stream_function
 from ricochet.analysis.equilibrium import motion_notes
@@ -54,12 +66,17 @@ from matplotlib.patches import Circle
 MOST_CELLS = 100_000
 LEAST_FLOW = 0.2  # smallest range of the axis of a flow velocity [thermal speeds]
 SIGNIFICANT = 5.99  # 95 % quantile of chi^2 with two degrees of freedom
+UNEQUAL = (
+    9.0  # mean of the squared difference of kT_x and kT_y [squared errors] that is significant
+)
 #: Text and unit of the axis label of each field.
 LABELS = {
     "density": ("number density n", "number density"),
     "flow_x": ("flow $u_x$", "speed"),
     "flow_y": ("flow $u_y$", "speed"),
     "temperature": ("kT", "energy"),
+    "kT_x": ("$kT_x$", "energy"),
+    "kT_y": ("$kT_y$", "energy"),
     "rotational_temperature": ("$kT_{rot}$", "energy"),
     "stress_xx": ("kinetic stress, xx", "stress"),
     "stress_xy": ("kinetic stress, xy", "stress"),
@@ -70,13 +87,24 @@ LABELS = {
 PANELS = {"density": "A", "flow": "B", "temperature": "C"}  # panels with a prediction
 
 
-def draw_profile(runs: list[Run], axis: int, x: np.ndarray, found: dict, law) -> plt.Figure:
+def heading(runs: list[Run], species: str | None) -> str:
+    """Return the title of a figure, which names the species whose disks are measured."""
+    if species is None:
+        return titled(runs)
+    count = np.sum(runs[0].of_species(species))
+    return f"{titled(runs)}\nfields of the species '{species}' ({count} disks)"
+
+
+def draw_profile(
+    runs: list[Run], axis: int, x: np.ndarray, found: dict, law, title: str
+) -> plt.Figure:
     """Draw density, flow, temperatures, stress and heat flux against the position along an axis."""
     run, flow = runs[0], f"flow_{'yx'[axis]}"
     figure, panels = plt.subplot_mosaic("AABBCC;DDDEEE", figsize=(12, 7))
     draw_fields(panels["A"], run.units, x, found, "density")
     draw_fields(panels["B"], run.units, x, found, flow)
-    draw_fields(panels["C"], run.units, x, found, "temperature", "rotational_temperature")
+    parts = ("kT_x", "kT_y") if unequal(found) else ()
+    draw_fields(panels["C"], run.units, x, found, "temperature", *parts, "rotational_temperature")
     draw_fields(panels["D"], run.units, x, found, "stress_xx", "stress_yy", "stress_xy")
     draw_fields(panels["E"], run.units, x, found, f"heat_{'xy'[axis]}")
     for name, panel in PANELS.items() if law is not None else ():
@@ -95,8 +123,17 @@ def draw_profile(runs: list[Run], axis: int, x: np.ndarray, found: dict, law) ->
         axes.set_xlim(run.lower[axis], run.upper[axis])
         if len(axes.get_legend_handles_labels()[0]) > 1:
             axes.legend()
-    figure.suptitle(titled(runs))
+    figure.suptitle(title)
     return figure
+
+
+def unequal(found: dict[str, Estimate]) -> bool:
+    """Return whether kT_x and kT_y differ by more than their errors explain."""
+    x, y = found["kT_x"], found["kT_y"]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        chi2 = (x.mean - y.mean) ** 2 / (x.error**2 + y.error**2)
+    chi2 = chi2[np.isfinite(chi2)]
+    return len(chi2) > 0 and float(chi2.mean()) > UNEQUAL
 
 
 def draw_fields(axes: plt.Axes, units: Units, x: np.ndarray, found: dict, *names: str) -> None:
@@ -105,7 +142,7 @@ def draw_fields(axes: plt.Axes, units: Units, x: np.ndarray, found: dict, *names
     for name in there:
         label = LABELS[name][0] if len(there) > 1 else "measured"
         axes.errorbar(x, *found[name], fmt="o", ms=3, label=label)
-    words = " and ".join(dict.fromkeys(LABELS[name][0].partition(",")[0] for name in there))
+    words = ", ".join(dict.fromkeys(LABELS[name][0].partition(",")[0] for name in there))
     axes.set_ylabel(units.label(words, LABELS[there[0]][1]))
 
 
@@ -181,7 +218,7 @@ def draw_arrows(axes: plt.Axes, run: Run, cells: tuple[int, int], flow: Flow, co
 
 
 def draw_grid(
-    runs: list[Run], cells: tuple[int, int], found: dict[str, Estimate], flow: Flow
+    runs: list[Run], cells: tuple[int, int], found: dict[str, Estimate], flow: Flow, title: str
 ) -> plt.Figure:
     """Draw maps of density and temperature, and a map of the stream function with arrows."""
     run = runs[0]
@@ -202,7 +239,7 @@ def draw_grid(
     label = run.units.label("stream function ψ of the flux n u", "rate")
     figure.colorbar(filled, ax=panels[2], label=label, shrink=0.8, format="%.2g", ticks=levels[::3])
     draw_arrows(panels[2], run, cells, flow, "black")
-    figure.suptitle(titled(runs))
+    figure.suptitle(title)
     return figure
 
 
@@ -215,7 +252,7 @@ def cells_of(text: str) -> tuple[int, ...]:
 
 
 def main() -> None:
-    parser = command_line(__doc__, "fields.png", equilibration=None)
+    parser = command_line(__doc__, "fields.png", equilibration="the first half of each run")
     parser.add_argument("--across", choices=("x", "y"), default="x", help="axis of the profile [x]")
     shape = parser.add_mutually_exclusive_group()
     whole = {
@@ -237,6 +274,8 @@ def main() -> None:
     cooling = [run.path.name for run in runs if run.nature.cooling]
     notes = motion_notes(runs)
     notes += [f"{name} loses energy and gains none: its state is not steady" for name in cooling]
+    notes += oscillation_notes(runs, args.equilibration, args.species)
+    title = heading(runs, args.species)
     own = fields(runs, args.equilibration, cells, args.species)
     found = own.found
     middles = places(runs[0], cells)
@@ -248,7 +287,7 @@ def main() -> None:
         )
         data |= {"stream_function": middle.ravel() / 4}
         data |= {"flow_significant": flow.significant.astype(int)}
-        figure = draw_grid(runs, cells, found, flow)
+        figure = draw_grid(runs, cells, found, flow, title)
     else:
         x, law = data["xy"[axis]], None
         if has_theory(runs, axis):
@@ -266,7 +305,7 @@ def main() -> None:
             notes.append(
                 "no profile agrees with these fluxes and the temperature in the middle: run longer"
             )
-        figure = draw_profile(runs, axis, x, found, law)
+        figure = draw_profile(runs, axis, x, found, law, title)
         tables = [{name: v for name, v in data.items() if "stress" not in name}, *tables]
     report(args, figure, *tables, data=data, notes=notes)
 

@@ -185,7 +185,8 @@ def command_line(
     `repeated` is true.  Unfinished runs are ignored, except in a script that sets the parser
     default `paired` to true.  If `csv` is true, the script has the option --csv.  Each further
     keyword argument names one of the `OPTIONS` and specifies its default.  The default None means
-    that the option has no default value.
+    that the option has no default value.  A default text describes what the script does without the
+    option, where this differs from the help text in `OPTIONS`; the default value is None.
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
@@ -205,6 +206,8 @@ def command_line(
     parser.add_argument("--units", type=unit_names, default=UNNAMED, metavar="NAMES", help=names)
     for name, default in defaults.items():
         convert, value, meaning = OPTIONS[name]
+        if isinstance(default, str):
+            meaning, default = f"{meaning.partition(' [')[0]} [{default}]", None
         meaning += "" if default is None else f" [{default:g}]"
         names = [f"--{name.replace('_', '-')}", *SPELLINGS.get(name, [])]
         parser.add_argument(*names, type=convert, default=default, metavar=value, help=meaning)

@@ -80,6 +80,9 @@ def test_captions_name_what_varies(tmp_path):
     assert caption(many) == "N = 2,  ξ = 1,  3 seeds"
     many = [run(k, packing_fraction=k / 10, polydispersity=0.2, radius=k) for k in range(1, 4)]
     assert "packing_fraction = 0.1, 0.2, 0.3" in caption(many)
+    rough = {"restitution": 0.9, "tangential_restitution": 0.0, "friction": 0.5}
+    grains = written(tmp_path / "rough.h5", x, x, parameters={"contact": rough})
+    assert caption([grains]).startswith("N = 2,  ξ = 0.9,  β = 0,  μ = 0.5,  ")
 
 
 def test_what_is_no_number_has_its_reason(tmp_path, rng, capsys):

@@ -1,5 +1,7 @@
 """Fields of density, flow, temperature and stress, and the script fields."""
 
+import re
+
 import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
@@ -8,7 +10,7 @@ from scipy.stats import binom
 import fields as fields_script
 from gas_inputs import PERIODIC
 from ricochet import RunError, estimates, fields, hard_disks as hd, statistics, thermodynamics as td
-from synthetic_run import ROOT, drawn, written
+from synthetic_run import ROOT, drawn, run_script, written
 
 SHEARED = """&box upper = 20, 10 boundary = 'wall', 'periodic' /
 &side name = 'left' temperature = 2 /
@@ -177,3 +179,37 @@ def test_a_profile_and_a_map_are_drawn_with_their_numbers(simulated, tmp_path, c
     early = simulated(ROOT / "input/fourier.nml", *soon, name="early").path
     assert "flow_expected" not in drawn(tmp_path, "fields", early)[0]
     assert "warning: no profile agrees with these fluxes" in capsys.readouterr().err
+
+
+def test_the_oscillation_of_a_bed_is_told_apart_from_heat(tmp_path, rng, capsys, monkeypatch):
+    """The mean velocity along y oscillates with an amplitude of 2, and kT is 1."""
+    place = rng.uniform(0.1, 0.9, (300, 60, 2))
+    v = rng.normal(size=place.shape)
+    calm = written(tmp_path / "calm.h5", place, v, radius=0.01).path
+    v[..., 1] += 2 * np.sin(0.7 * np.arange(300))[:, None]
+    kinds = {"species": np.repeat([1, 2], 30), "names": ("grain", "other")}
+    bed = written(tmp_path / "bed.h5", place, v, radius=0.01, **kinds).path
+    shown: list = []
+    monkeypatch.setattr(
+        fields_script, "report", lambda args, figure, *_, **__: shown.append(figure)
+    )
+    for path, words in ((calm, []), (bed, ["--species", "grain"])):
+        assert run_script("fields", path, "--across", "y", "-o", tmp_path / "a.png", *words) == 0
+    labels = [figure.axes[2].get_legend_handles_labels()[1] for figure in shown]
+    assert labels == [["measured"], ["kT", "$kT_x$", "$kT_y$"]]
+    assert "fields of the species 'grain' (30 disks)" in shown[1].get_suptitle()
+    monkeypatch.undo()
+    capsys.readouterr()
+    drawn(tmp_path, "fields", calm)
+    assert capsys.readouterr().err == ""
+    drawn(tmp_path, "fields", bed, "--species", "grain")
+    share = "centre of mass is 6[5-9] % of the mean kT_y"  # 2 of 3
+    assert re.search(share, capsys.readouterr().err)
+
+
+def test_the_help_states_which_frames_are_used(capsys):
+    assert run_script("fields", "--help") == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert (
+        "are left out [the first half of each run]" in said and "no observable drifts" not in said
+    )

@@ -120,7 +120,9 @@ def test_the_table_contains_the_second_sonine_coefficient(tmp_path, rng, capsys)
         velocity = file["particles/disks/velocity/value"]
         velocity[...] /= np.sqrt(np.linalg.norm(velocity[()], axis=2, keepdims=True))
     drawn(tmp_path, "speeds", path)
-    row = {name: float(cell) for name, cell in cells(capsys.readouterr().out).items() if "a2" in name}
+    row = {
+        name: float(cell) for name, cell in cells(capsys.readouterr().out).items() if "a2" in name
+    }
     assert 0 < row["a2_error"] < 0.005
     assert abs(row["a2"] - (2 / np.pi - 1)) < 4 * row["a2_error"]
 

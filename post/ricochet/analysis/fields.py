@@ -37,6 +37,7 @@ __all__ = [
 MOST_BLOCKS = 16  # largest number of blocks of a run
 FEWEST_BLOCKS = 3  # smallest number of blocks of all runs that is required for an error
 FEWEST_DISKS = 3  # fewest disks in a cell without any one block, for kT, stress, heat
+OSCILLATION = 0.05  # share of the centre of mass in the kinetic energy that is not thermal motion
 FLOW_LEAST = -0.5  # smallest correlation of neighbouring blocks of the flow
 LONG = 1.5  # length of a block in units of the statistical inefficiency
 POINTS = 1 << 16  # used with obstacles to find the accessible area
@@ -142,6 +143,29 @@ def own_motion(run: Run, frames: list[int]) -> np.ndarray:
     if "random_walk" in run.nature:
         v -= (unforced(run) * np.average(v, axis=1, weights=run.mass))[:, None]
     return v
+
+
+def oscillation_notes(runs: list[Run], skip: float | None, species: str | None) -> list[str]:
+    """Return a note for each run whose flow oscillates, which increases the measured temperatures.
+
+    The kinetic energy of the centre of mass of N disks that move independently is the fraction 1/N
+    of their kinetic energy.  A larger fraction belongs to a flow that varies with time.
+    """
+    notes = []
+    for run in runs:
+        frames = steady_frames(run, skip)
+        own = run.species > 0 if species is None else run.of_species(species)
+        v, mass = own_motion(run, frames)[:, own], run.mass[own]
+        mean = np.average(v, axis=1, weights=mass)
+        scatter = np.average(np.mean((v - mean.mean(axis=0)) ** 2, axis=0), axis=0, weights=mass)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.nan_to_num(mean.var(axis=0) / scatter)
+        for axis in np.flatnonzero(share > OSCILLATION + FEWEST_DISKS / own.sum()).tolist():
+            notes.append(
+                f"{run.path.name}: kT_{'xy'[axis]} contains a flow that varies with time; the motion "
+                f"of the centre of mass is {100 * share[axis]:.0f} % of the mean kT_{'xy'[axis]}"
+            )
+    return notes
 
 
 def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:

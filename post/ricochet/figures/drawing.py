@@ -47,11 +47,15 @@ COLOURINGS = {
 
 
 def caption(runs: list[Run]) -> str:
-    """Return a caption with the number of disks, restitution, seeds, and differing parameters."""
+    """Return a caption with the number of disks, contact law, seeds, and differing parameters."""
     parts = [f"N = {listed({run.n_disks for run in runs})}"]
     restitutions = {run.restitution for run in runs}
     if all(map(np.isfinite, restitutions)):
         parts.append(f"ξ = {listed(restitutions)}")
+    for name, symbol, absent in (("tangential_restitution", "β", -1.0), ("friction", "μ", None)):
+        common = {run.parameter("contact", name, absent) for run in runs}
+        if len(common) == 1 and common != {absent}:
+            parts.append(f"{symbol} = {common.pop():g}")
     values: dict[str, set[float]] = {}
     for run in runs:
         for name, value in numbers_of(run).items():
