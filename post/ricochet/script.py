@@ -206,11 +206,14 @@ def command_line(
     parser.add_argument("--units", type=unit_names, default=UNNAMED, metavar="NAMES", help=names)
     for name, default in defaults.items():
         convert, value, meaning = OPTIONS[name]
-        if isinstance(default, str):
-            meaning, default = f"{meaning.partition(' [')[0]} [{default}]", None
-        meaning += "" if default is None else f" [{default:g}]"
         names = [f"--{name.replace('_', '-')}", *SPELLINGS.get(name, [])]
-        parser.add_argument(*names, type=convert, default=default, metavar=value, help=meaning)
+        text = isinstance(default, str)
+        if text:
+            meaning = f"{meaning.partition(' [')[0]} [{default}]"
+        elif default is not None:
+            meaning += f" [{default:g}]"
+        start = None if text else default
+        parser.add_argument(*names, type=convert, default=start, metavar=value, help=meaning)
     return parser
 
 

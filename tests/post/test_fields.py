@@ -203,7 +203,7 @@ def test_the_oscillation_of_a_bed_is_told_apart_from_heat(tmp_path, rng, capsys,
     drawn(tmp_path, "fields", calm)
     assert capsys.readouterr().err == ""
     drawn(tmp_path, "fields", bed, "--species", "grain")
-    share = "centre of mass is 6[5-9] % of the mean kT_y"  # 2 of 3
+    share = "centre of mass is 6[5-9] % of kT_y"  # 2 of 3
     assert re.search(share, capsys.readouterr().err)
 
 
