@@ -82,7 +82,7 @@ def draw(rows: list[dict]) -> plt.Figure:
     label = r"$\dots + 4.519\,(n\,\ln n)^2$"
     axes.plot(fine, expansion(fine), color=COLOURS[2], lw=1.2, ls="--", label=label)
     axes.errorbar(n, ratio, error, ls="", marker="o", color=COLOURS[0], label="simulation")
-    axes.set(xscale="log", xlabel="density of scatterers $nR^2$", ylabel="$D/D_0$")
+    axes.set(xscale="log", xlabel="density of scatterers $n$, for $R = 1$", ylabel="$D/D_0$")
     axes.legend(loc="lower left")
     return figure
 

@@ -65,6 +65,12 @@ def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarra
     return np.concatenate(rows)
 
 
+def has_every_event(run: Run, frames: list[int]) -> bool:
+    """Return whether straight lines through the frames are the exact paths of the disks."""
+    all_events = run.parameter("output", "frames_every_events", 0) == 1
+    return all_events and bool(np.all(np.diff(frames) == 1)) and "gravity" not in run.nature
+
+
 def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) -> None:
     """Draw the paths of the chosen disks, and all disks at their last positions."""
     draw_box(axes, run, run.time[frames[-1]])
@@ -78,8 +84,9 @@ def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) ->
         axes.plot(*path.T, color=colour, lw=0.8, alpha=alpha, zorder=1)
         axes.plot(*path[0], marker="x", color=colour, zorder=4)
         axes.add_patch(Circle(path[-1], sizes[disk] / 2, color=colour, lw=0, zorder=0.9))
+    lines = "" if has_every_event(run, frames) else ",  lines join frames"
     axes.set_title(
-        f"{run.parameter('run', 'title') or run.path.stem}\n{caption([run])}\n"
+        f"{run.parameter('run', 'title') or run.path.stem}\n{caption([run])}{lines}\n"
         f"t = {run.time[frames[0]]:.4g} (crosses) to {run.time[frames[-1]]:.4g} (disks)"
         f"{note_on_size(axes, run)}",
         parse_math=False,

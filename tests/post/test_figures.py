@@ -275,6 +275,20 @@ def test_titles_and_labels_of_paths_are_inside_the_figure(tmp_path, rng, figures
     assert min(x0, y0) >= 0 and x1 <= width and y1 <= height
 
 
+def test_the_title_of_paths_says_when_lines_are_not_the_exact_path(tmp_path, figures, simulated):
+    gas = "&species count = 2 radius = 0.02 speed = 1 / &stop events = 12 / "
+    gas += "&output frames_every_{} = {} /"
+    every = simulated(gas.format("events", 1), name="every").path
+    timed = simulated(gas.format("time", 0.3), name="timed").path
+    for run, more, exact in (
+        (every, (), True),
+        (every, ("--frames", "::2"), False),
+        (timed, (), False),
+    ):
+        assert run_script("trajectory", run, *more, "-o", tmp_path / "a.png") == 0
+        assert ("lines join frames" not in figures[-1].axes[0].get_title("left")) is exact
+
+
 def test_panels_contain_the_number_of_events_before_the_frame(tmp_path, figures, simulated):
     """The numbers agree with the event log, also for the last frame, which follows earlier."""
     gas = "&species count = 20 radius = 0.02 speed = 1 / &stop events = 57 / "
