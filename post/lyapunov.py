@@ -74,7 +74,9 @@ def draw(found: Divergence, units: Units) -> plt.Figure:
     for track in found.logarithm:
         axes.semilogy(found.time, np.exp(track), color=COLOURS[0], lw=0.6, alpha=0.4)
     mean = found.logarithm.mean(axis=0)
-    axes.plot(found.time, np.exp(mean), color="black", label=f"{len(found.slope)} pairs, mean")
+    axes.plot(
+        found.time, np.exp(mean), color="black", label=f"{len(found.slope)} pairs: geometric mean"
+    )
     inside = (found.time >= found.begin) & (found.time <= found.end)
     t = found.time[inside]
     line = mean[inside].mean() + found.exponent.mean * (t - t.mean())
