@@ -130,7 +130,8 @@ under certain conditions. A number in parentheses is the standard error of the l
 - **P15-21, discharge of a hopper.** The tolerance allows the values of the literature, k between 1
   and 2. The values of k and of the exponent were each fitted with the other one fixed, because they
   are strongly correlated. Smooth grains do not obey Beverloo's law: for 2000 smooth grains the
-  fitted exponent is 1.29(3), with k = 1.3(2). """
+  fitted exponent is 1.29(3), with k = 1.3(2).
+"""
 
 
 def number(value: float, digits: int = 9) -> str:
