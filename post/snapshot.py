@@ -45,13 +45,22 @@ def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
 
 
 def draw_key(axes: plt.Axes, run: Run, arrows: Quiver, longest: float) -> None:
-    """Draw a reference arrow above a panel, with the speed that corresponds to its length."""
+    """Draw a reference arrow above a panel, with the speed that corresponds to its length.
+
+    The arrow is above the title of the panel if both do not fit side by side.
+    """
     power = 10.0 ** np.floor(np.log10(longest))
     speed = max(step * power for step in (1, 2, 5) if step * power <= longest)
     unit = run.units.name("speed")
     words = f"speed {speed:g}" + f" {unit}" * (unit != UNNAMED.name("speed"))
     place = {"coordinates": "axes", "labelpos": "W", "color": "black"}
-    axes.quiverkey(arrows, 0.9, 1.04, speed, words, **place)
+    title = axes.get_title("left")
+    panel, size = axes.get_window_extent(), axes.title.get_fontsize() * axes.figure.dpi / 72
+    beside = 0.6 * size * len(title + words) < 0.75 * panel.width  # 0.6: width of a character
+    if not beside:
+        axes.set_title(f"\n{title}")
+    height = 0.04 if beside else 0.03 + 1.5 * size / panel.height
+    axes.quiverkey(arrows, 0.9, 1 + height, speed, words, **place)
 
 
 def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> plt.Figure:
@@ -90,11 +99,11 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
         if colour != "species" and args.per_frame:
             beyond = drawing.exceeded(values[k], norm.vmin, norm.vmax)
             figure.colorbar(disks, ax=axes, shrink=0.7, extend=beyond, **bar)
+        axes.set_title(drawing.moment(run, frames[k]))
         if args.quiver:
             drawn = axes.quiver(*run.position[frames[k]].T, *run.velocity[frames[k]].T, **arrows)
             if k == 0:
                 draw_key(axes, run, drawn, longest)
-        axes.set_title(drawing.moment(run, frames[k]))
     if colour == "species":
         drawing.species_legend(figure, run)
     else:

@@ -262,6 +262,32 @@ def test_arrows_have_a_scale_and_a_second_species_an_outline(tmp_path, rng, figu
     assert np.all(np.array(widths) == np.array([0, 0, 0, 1, 1, 1]) * widths[-1]) and widths[-1] > 0
 
 
+@pytest.mark.parametrize(
+    ("frames", "edges"), [(2, (1, 1)), (4, (1, 2)), (12, (1, 2)), (12, (2, 1))]
+)
+def test_the_scale_of_arrows_is_beside_or_above_the_title(tmp_path, rng, figures, frames, edges):
+    x = rng.uniform(0.2, 0.8, (frames, 3, 2)) * edges
+    path = write_run(tmp_path / "a.h5", x, 10 * x, edges=edges, radius=0.01)
+    words = (
+        "--quiver",
+        "--units",
+        "length=m,time=s",
+        "--frames",
+        ",".join(map(str, range(frames))),
+    )
+    assert run_script("snapshot", path, "-o", tmp_path / "a.png", *words) == 0
+    (figure,) = figures
+    figure.draw_without_rendering()
+    (key,) = [one for one in figure.axes[0].artists if isinstance(one, QuiverKey)]
+    title = figure.axes[0]._left_title
+    assert title.get_text().strip() == "t = 0 s"
+    extent = title.get_window_extent()
+    if title.get_text().startswith("\n"):
+        extent.y1 -= extent.height / 2  # the empty line
+    assert not extent.overlaps(key.text.get_window_extent())
+    assert not figure._suptitle.get_window_extent().overlaps(key.text.get_window_extent())
+
+
 @pytest.mark.parametrize(("count", "edges"), [(1, (1, 1)), (2, (1, 1)), (2, (1, 2)), (3, (2, 1))])
 def test_titles_and_labels_of_paths_are_inside_the_figure(tmp_path, rng, figures, count, edges):
     paths = []

@@ -106,7 +106,7 @@ def count_at(run: Run, frame: int) -> dict[str, int]:
 def moment(run: Run, frame: int) -> str:
     """Return the title of a panel: the number of events or collisions (if known), and the time."""
     counts = [f"{name[:-1]} {number},  " for name, number in count_at(run, frame).items()]
-    return "".join(counts) + f"t = {run.time[frame]:.4g}"
+    return "".join(counts) + f"t = {run.time[frame]:.4g} {run.units.time}".rstrip()
 
 
 def titled(runs: list[Run]) -> str:
