@@ -129,14 +129,22 @@ module disk_variables
     variable_t("contact", "contact_time", "real", 1, "default", "0", &
       "Contact duration t_c of the TC model, which prevents inelastic collapse: a collision is elastic if one of its partners " &
       //"had another collision less than t_c ago. The value 0 switches the TC model off. Choose t_c far below the mean time " &
-      //"between collisions. The TC model cannot be combined with stop.at_rest.", not_negative, "time", may_change=in_motion), &
+      //"between collisions and, for grains of diameter d that rest under gravity g, below sqrt(d/g). The TC model does not " &
+      //"prevent the collapse of resting grains with friction or with a tangential restitution between -1 and 1, which " &
+      //"dissipate energy even in these elastic collisions. The TC model cannot be combined with stop.at_rest.", &
+      not_negative, "time", may_change=in_motion), &
     variable_t("contact", "tangential_restitution", "real", 1, "default", "-1", &
       "Coefficient of tangential restitution of collisions of two disks: -1 for smooth surfaces, 0 if a collision stops the " &
-      //"slip of the surfaces, 1 if a collision reverses the slip. With a value above -1 the disks are rough and rotate.", &
+      //"slip of the surfaces, 1 if a collision reverses the slip. With a value above -1 the disks are rough and rotate. A " &
+      //"value between -1 and 1 dissipates energy even in collisions that the TC model (contact_time) makes elastic; grains " &
+      //"that rest in a dense bed then collapse or collide millions of times. Use -1 or 1 for such grains.", &
       tangential, may_change=in_motion), &
     variable_t("contact", "friction", "real", 1, "optional", "0.3", &
       "Coulomb friction coefficient of collisions of two disks: upper limit of the ratio of the tangential impulse to the " &
-      //"normal impulse. Friction needs rough disks (tangential_restitution > -1).", not_negative, may_change=in_motion, &
+      //"normal impulse. Friction needs rough disks (tangential_restitution > -1). Friction dissipates energy even in " &
+      //"collisions that the TC model (contact_time) makes elastic; grains that rest in a dense bed then collapse or collide " &
+      //"millions of times. Use tangential_restitution = 1 without friction for such grains.", &
+      not_negative, may_change=in_motion, &
       otherwise="the tangential impulse has no limit"), &
     variable_t("contact", "inertia", "real", 1, "default", "0.5", &
       "Moment of inertia of a disk divided by its mass times its radius squared: 0.5 for a uniform disk, 1 for a ring. The " &
