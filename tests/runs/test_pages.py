@@ -95,7 +95,16 @@ def test_the_code_of_a_page_works(page, program, tmp_path):
     if "libricochet" in text and not (program.parent / "libricochet.so").exists():
         pytest.skip("make library builds it")
     make_project(tmp_path, program)
+    before = {path.name for path in tmp_path.iterdir()}
     execute(blocks_of(text), tmp_path, program)
+    assert {path.name for path in tmp_path.iterdir()} == before, "files belong in runs/"
+
+
+def test_the_figures_of_the_inputs_are_written_to_their_folder():
+    """Without -o the script in the comment of an input would write to the top folder."""
+    comments = [path.read_text() for path in sorted((ROOT / "input").glob("*.nml"))]
+    drawn = [line for text in comments for line in re.findall(r"^! +.*python post/.*", text, re.M)]
+    assert drawn and [line for line in drawn if " -o runs/" not in line] == []
 
 
 def test_each_block_names_its_language():
