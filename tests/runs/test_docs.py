@@ -411,10 +411,13 @@ def test_completion_knows_ensembles(program, tmp_path):
     ran("bash", "-c", known, "bash", COMPLETION, check=True)
 
 
-def replace_lines(text: str, old: list[str], new: list[str]) -> str:
-    """Replace complete lines of a text, which are found without regard to their indentation."""
+def replace_lines(name: str, text: str, old: list[str], new: list[str]) -> str:
+    """Replace complete lines of a file, which are found without regard to their indentation."""
     pattern = "".join(rf"^( *){re.escape(line.strip())}\n" for line in old)
-    (found,) = re.finditer(pattern, text, re.MULTILINE)
+    places = [*re.finditer(pattern, text, re.MULTILINE)]
+    how = f"{name} contains these lines of a recipe {len(places)} times instead of once"
+    assert len(places) == 1, f"{how}; adapt docs/explanation/recipes.md:\n" + "\n".join(old)
+    (found,) = places
     lines = [f"{found[1]}{line}\n" if line.strip() else "\n" for line in new]
     return text[: found.start()] + "".join(lines) + text[found.end() :]
 
@@ -430,9 +433,17 @@ def carry_out_recipes(page: str, root: Path) -> int:
                 old = [line[1:] for line in lines if line[0] != "+"]
                 new = [line[1:] for line in lines if line[0] != "-"]
                 file = root / name
-                file.write_text(replace_lines(file.read_text(), old, new))
+                file.write_text(replace_lines(name, file.read_text(), old, new))
                 changes += 1
     return changes
+
+
+def test_a_recipe_that_does_not_fit_the_sources_is_named(tmp_path):
+    (tmp_path / "a.f90").write_text("call one()\ncall three()\n")
+    page = "```diff\n--- a.f90\n call one()\n+call two()\n```\n"
+    assert carry_out_recipes(page, tmp_path) == 1
+    with pytest.raises(AssertionError, match=r"a\.f90 contains .* 0 times .*\n *call 1"):
+        carry_out_recipes(page.replace("one", "1"), tmp_path)
 
 
 def look_at_bars(run, folder):
