@@ -36,9 +36,11 @@ module observables
   integer, parameter :: own_kinetic = 9, own_momentum = 10
   integer, parameter :: flux = 12  !! kinetic flux relative to the velocity profile, five components: see `tally: kinetic_flux`
   integer, parameter :: tensor(*) = flux + [0, 1, 1, 2]                    !! components xx, xy, yx, yy of the momentum flux
+  !> Last of the sums that each disk adds a term to. A new sum follows the kinetic flux and becomes the last one.
+  integer, parameter :: last_term = flux + 4
   !> Total energy (`energy`), and the rounding error of its summation (`lost`). The sums `energy` and `lost` are computed only in
   !> driven simulations.
-  integer, parameter :: energy = 17, lost = 18
+  integer, parameter :: energy = last_term + 1, lost = last_term + 2
 
 contains
 
@@ -226,7 +228,7 @@ contains
   pure subroutine add_up(sim, sums)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(out) :: sums(:, 0:)
-    real(real64) :: term(flux + 4), v(2), own_v(2)
+    real(real64) :: term(last_term), v(2), own_v(2)
     logical :: falling, sheared, driven
     integer(int32) :: i
     integer :: s, k
@@ -250,7 +252,7 @@ contains
       if (sim%features%rotation) term(rotational) = 0.5_real64*sim%inertia_of(i)*sim%spin(i)**2
       term(own_kinetic) = 0.5_real64*term(mass)*dot_product(own_v, own_v)
       term(own_momentum:own_momentum + 1) = term(mass)*own_v
-      if (sim%features%stress) term(flux:) = kinetic_flux(term(mass), own_v)
+      if (sim%features%stress) term(flux:flux + 4) = kinetic_flux(term(mass), own_v)
       sums(:size(term), s) = sums(:size(term), s) + term
       if (.not. driven) cycle
       do k = kinetic, rotational

@@ -261,6 +261,13 @@ def test_every_script_of_post_is_in_the_list():
     assert [name for name in scripts if not re.search(rf"^\|.*`{name}`.*\| ", page, re.M)] == []
 
 
+def test_every_observable_is_on_the_page_on_output():
+    source = (ROOT / "src" / "physics" / "observables.f90").read_text()
+    names = re.findall(r'call list%add\((?:(?:group|path)//)?"/?(\w+)"', source)
+    known = section("output", "## /observables")
+    assert len(names) > 20 and [name for name in names if f"{name}`" not in known] == []
+
+
 def test_the_script_of_a_recipe_works(tmp_path):
     page = section("recipes", "## An observable")
     script = re.search(r'    """The largest speed in time.*?launch\(main\)\n', page, re.DOTALL)[0]
