@@ -94,6 +94,10 @@ def test_fluxes_that_forget_have_the_coefficient_and_the_errors_they_should():
     assert mean.mean() == pytest.approx(truth, abs=4 * mean.std() / np.sqrt(300))
     held = np.mean(np.abs(mean - truth) < error)
     assert held == pytest.approx(2 * estimates.ONE_SIGMA - 1, abs=0.1)
+    few = [tp.coefficient(fluctuating(rng, 1400, 6.0), 1.0, 100) for _ in range(1200)]
+    mean, error = np.array([(one.mean, one.error) for one in few]).T
+    assert np.mean(np.abs(mean - truth) < error) == pytest.approx(0.68, abs=0.03)
+    assert np.mean(error) == pytest.approx(np.std(mean), rel=0.08)
     slopes = tp.running(fluctuating(np.random.default_rng(5), 400000, 6.0), 0.5, [1, 40, 80])
     assert slopes[0] == pytest.approx(1, rel=0.02)  # <flux^2> step / 2
     assert slopes[-1] == pytest.approx(2 * truth, rel=0.05)

@@ -184,17 +184,42 @@ def running(moment: np.ndarray, step: float, at: np.ndarray) -> np.ndarray:
     return np.diff(mean, prepend=0) / np.diff(at, prepend=0) / (2 * step)
 
 
+def relative_error(samples: int, lag: int) -> float:
+    """Return the relative standard error of a coefficient that one component of a moment yields.
+
+    The moment has `samples` values and is a random walk, because the fluxes decay in a time much
+    shorter than `lag`.  The coefficient is then a quadratic form of independent Gaussian steps,
+    whose variance is known: the covariance of two squared increments is twice the square of the
+    number of steps that both have in common.
+    """
+    half, origins = lag // 2, samples - lag
+    apart = np.arange(-lag, lag + 1)  # origin of the second increment minus that of the first
+    pairs = np.maximum(0, origins - np.abs(apart))
+
+    def common(first: int, second: int) -> np.ndarray:
+        return np.maximum(0, np.minimum(first, apart + second) - np.maximum(0, apart))
+
+    square = common(lag, lag) ** 2 - 2 * common(lag, half) ** 2 + common(half, half) ** 2
+    return float(np.sqrt(2 * np.sum(pairs * square)) / (origins * (lag - half)))
+
+
 def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
-    """Estimate a transport coefficient from the increments of a Helfand moment.
+    """Estimate a transport coefficient from the increments of a Helfand moment (T, C).
 
     The estimate is half the slope of the mean squared increment, as a function of the lag, between
     `lag` / 2 and `lag`.  Every sample at which an interval of the length `lag` can start yields one
-    value of a series; the error of the mean of the series includes the correlations between the
-    values.
+    value of a series.  Few of these values are independent, and their distribution is far from
+    Gaussian; an error that is estimated from the series is therefore too small on average.  The
+    error follows from `relative_error` instead, with C independent components.  Only the drift is
+    taken from the series.
     """
     half = lag // 2
     near, far = squares(moment, half), squares(moment, lag)
-    return correlated_mean((far - near[: len(far)]) / (2 * step * (lag - half)))
+    series = (far - near[: len(far)]) / (2 * step * (lag - half))
+    found = correlated_mean(series)
+    error = abs(found.mean) * relative_error(len(moment), lag) / np.sqrt(moment.shape[1])
+    samples = float(np.var(series)) / error**2 if error > 0 else float(len(series))
+    return found._replace(error=float(error), samples=samples, freedom=np.inf)
 
 
 # --- coefficients divided by Enskog's coefficients ---
