@@ -9,6 +9,10 @@
 !> Neighbour lists only save time and do not change results. A list without space for a further neighbour is marked as incomplete
 !> until the disk receives a new list. While the list of a disk is incomplete, each prediction searches the nine cells around the
 !> disk.
+!>
+!> If the radii differ so much that nine cells contain very many disks, the disks with small neighbourhoods are also listed in a
+!> second grid of narrow cells, according to the centres of their neighbourhoods. A new list of such a disk then needs only the nine
+!> narrow cells around its centre, and the few disks with large neighbourhoods in the nine wide cells.
 module neighbour_lists
   use, intrinsic :: iso_fortran_env, only: real32
   use kinds, only: int16, int32, int64, pi, real64
@@ -30,6 +34,10 @@ module neighbour_lists
   integer(int32), parameter :: image_unit = 2**27
   !> Largest number of disks for which neighbour lists are used, so that 32-bit integers can number all entries.
   integer(int32), parameter :: most_listed = image_unit/4
+
+  !> Smallest width of narrow cells, in units of the radius plus margin of a disk with the mean radius. The width exceeds 2, so that
+  !> most disks can be in narrow cells.
+  real(real64), parameter :: narrow_width = 2.2_real64
 
   !> The region around a disk for which its neighbour list is valid. When the centre of a disk leaves its neighbourhood, the disk
   !> receives a new list.
@@ -59,9 +67,15 @@ module neighbour_lists
     integer(int32), allocatable :: entry(:)
     !> (0:) for the entry of disk j in the list of disk i, the position of the entry of disk i in the list of disk j.
     integer(int32), allocatable :: back(:)
+    integer(int32) :: parts = 1                    !! number of narrow cells per cell along each axis; 1 without narrow cells
+    real(real32) :: narrow_extent = 0.0_real32     !! largest radius plus margin of disks in narrow cells [length]
+    type(patch_t) :: narrow_patch                  !! the narrow cells, which are parts of the cells of the whole box
+    type(cell_contents_t) :: narrow                !! disks in narrow cells
+    type(cell_contents_t) :: wide                  !! all other disks with lists, in wide cells
   contains
     procedure :: prepare
     procedure, private :: make_room
+    procedure, private :: cut_cells
     procedure :: lay
     procedure :: enter
     procedure :: leave
@@ -107,6 +121,7 @@ contains
     self%mean_radius = radii(1)/n
     self%margin = max(0.6_real64 + 2.5_real64*(0.72_real64 - packing), 0.3_real64)*self%mean_radius
     call self%make_room(disk, lower, edges)
+    call self%cut_cells(patch, int(minval(patch%width)/(narrow_width*(self%mean_radius + self%margin)), int32))
   end subroutine prepare
 
   !> Allocates empty lists for all disks. Larger disks have longer lists, because larger disks have more neighbours.
@@ -140,6 +155,47 @@ contains
       allocate (self%entry(0:self%first(n + 1) - 1 + always_copied), self%back(0:self%first(n + 1) - 1))
     self%entry(self%first(:n)) = unlisted
   end subroutine make_room
+
+  !> Divides each cell of a patch into parts x parts narrow cells without disks.
+  subroutine cut_cells(self, patch, parts)
+    class(neighbour_lists_t), intent(inout) :: self
+    type(patch_t), intent(in) :: patch
+    integer(int32), intent(in) :: parts
+    integer(int32) :: n
+
+    self%parts = 1
+    if (parts < 2 .or. any(patch%n /= patch%whole .or. patch%first /= 1) .or. maxval(patch%n)*parts > huge(1_int16) - 2) return
+    self%parts = parts
+    associate (narrow => self%narrow_patch)
+      narrow = patch
+      narrow%whole = parts*patch%whole
+      narrow%n = narrow%whole
+      narrow%width = patch%width/parts
+      call narrow%find_sides(patch%last > 0)
+      self%narrow_extent = 0.5_real32*real(minval(narrow%width), real32)*(1 - 4*epsilon(1.0_real32))
+      n = size(self%neighbourhood, kind=int32)
+      call self%narrow%empty(narrow%n(1) + 2, narrow%n(2) + 2, n)
+      call self%wide%empty(patch%n(1) + 2, patch%n(2) + 2, n)
+    end associate
+  end subroutine cut_cells
+
+  !> Whether disk i belongs into a narrow cell.
+  pure function is_narrow(self, i) result(yes)
+    type(neighbour_lists_t), intent(in) :: self
+    integer(int32), intent(in) :: i
+    logical :: yes
+
+    yes = self%extent(3, i) + self%extent(4, i) <= self%narrow_extent
+  end function is_narrow
+
+  !> The narrow cell that contains the centre of the neighbourhood of disk i.
+  pure function narrow_cell(self, i) result(cell)
+    type(neighbour_lists_t), intent(in) :: self
+    integer(int32), intent(in) :: i
+    integer(int16) :: cell(2)
+
+    cell = int(self%narrow_patch%cell_at(self%origin + self%extent(:2, i)), int16)
+  end function narrow_cell
 
   !> Sets up a new neighbourhood around disk i, whose position is x.
   pure subroutine lay(self, i, radius, x, faces, cell)
@@ -178,20 +234,42 @@ contains
     end function clipped
   end subroutine lay
 
-  !> Finds the disks that disk i can touch in its new neighbourhood, among the disks in the nine cells around disk i. The procedure
-  !> adds disk i to the list of each disk found, and each disk found to the list of disk i. Pairs with a disk that has no list yet
-  !> are added later, when the list of that disk is made.
+  !> Finds the disks that disk i can touch in its new neighbourhood, and makes the list of disk i.
   subroutine enter(self, i, cells, patch, cell)
     class(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
     integer(int16), intent(in) :: cell(2)          !! cell of disk i
+
+    self%entry(self%first(i)) = 0
+    if (self%parts == 1) then
+      call search(self, i, cells, patch, cell)
+    else if (is_narrow(self, i)) then
+      associate (home => narrow_cell(self, i))
+        call search(self, i, self%narrow, self%narrow_patch, home)
+        call search(self, i, self%wide, patch, cell)
+        call self%narrow%insert(self%narrow%number(home), i)
+      end associate
+    else
+      call search(self, i, cells, patch, cell)
+      call self%wide%insert(self%wide%number(cell), i)
+    end if
+  end subroutine enter
+
+  !> Searches a cell and its eight neighbours for disks that disk i can touch in its neighbourhood. The procedure adds disk i to
+  !> the list of each disk found, and each disk found to the list of disk i. Pairs with a disk that has no list yet are added later,
+  !> when the list of that disk is made.
+  subroutine search(self, i, cells, patch, cell)
+    type(neighbour_lists_t), intent(inout) :: self
+    integer(int32), intent(in) :: i
+    type(cell_contents_t), intent(in) :: cells
+    type(patch_t), intent(in) :: patch
+    integer(int16), intent(in) :: cell(2)          !! cell around which disks are searched
     integer(int32) :: candidate(list_capacity), around(9), image(9), c, k, row
     integer(int64) :: n                            ! number of candidates
     real(real32) :: own(4)                         ! extent of disk i [length]
 
-    self%entry(self%first(i)) = 0
     own = self%extent(:, i)
     self%extent(4, i) = -(2*own(4) + 4*own(3))     ! excludes disk i itself from the candidates
     n = 0
@@ -264,7 +342,7 @@ contains
       end do
       n = 0
     end subroutine test_candidates
-  end subroutine enter
+  end subroutine search
 
   !> Adds disk j to the list of disk i, and disk i to the list of disk j. `image` is the periodic image in which disk i can touch
   !> disk j. If disk j has no list yet, nothing is added.
@@ -301,6 +379,13 @@ contains
     integer(int16), intent(in) :: cell(2)          !! cell of disk i
     integer(int32) :: at, k, m, around(9), image(9), j, n
 
+    if (self%parts > 1) then
+      if (is_narrow(self, i)) then
+        call self%narrow%remove(self%narrow%number(narrow_cell(self, i)), i)
+      else
+        call self%wide%remove(self%wide%number(cell), i)
+      end if
+    end if
     at = self%first(i)
     n = self%entry(at)
     self%entry(at) = unlisted
