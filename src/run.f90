@@ -181,7 +181,8 @@ contains
     deallocate (run%evolution)                             ! the completion of the output may need the memory
   end subroutine follow
 
-  !> Wall time, rate and number of serial events of this part of the run, as the argument `cost` of `output: write_end`.
+  !> Returns the wall time of this part of the run, its rate, and its number of serial events. These are the values of the argument
+  !> `cost` of `output: write_end`.
   function cost_of(run) result(cost)
     type(run_t), intent(in) :: run
     real(real64) :: cost(3)
@@ -207,8 +208,8 @@ contains
     call run%line%start(run%sim, run%stop_rule, run%started)
     limits%time = run%sim%time()
     call run%output%tighten(limits)
-    ! If no further event can occur, the run ends with a last sample. The call of `advance_once` is needed to detect that no further
-    ! event can occur, if a run had been stopped just after its last sample.
+    ! If no further event can occur, the run ends with a last sample. A resumed run that was stopped just after its last sample has
+    ! to call `advance_once` to detect that no further event can occur.
     if (run%sim%events_done .and. limits%sampled >= run%sim%time()) call advance_once(run%evolution, run%sim, limits, error)
     do while (.not. (run%stop_rule%is_over(run%sim, run%evolution) .or. allocated(error)))
       limits = run%stop_rule%limits

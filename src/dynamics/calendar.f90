@@ -20,7 +20,7 @@ module calendar
   integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]
   integer(int32), parameter :: stages = size(windows_ahead)
   integer(int32), parameter :: most_coming = windows_ahead(1)*bucket_capacity
-    !! largest number of disks that a stage of prefetching lists in a call
+    !! largest number of disks in the list that one stage of prefetching makes
   integer(int32), parameter :: window_none = -1    !! value of tag%window if the event is not in the calendar
 
   type :: bucket_t                                 ! one cache line

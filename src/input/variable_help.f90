@@ -206,7 +206,8 @@ contains
   end function default_of
 
   !> Condition under which a variable has an effect, such as a choice of another variable; empty if the variable always has an
-  !> effect. In `&species`, a variable that depends on a choice also sets the choice, unless the user has set the choice.
+  !> effect. If a variable of `&species` needs a certain choice of another variable, and the
+  !> user has not set that other variable, the program makes the choice.
   pure function condition_of(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text

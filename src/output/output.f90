@@ -423,8 +423,8 @@ contains
     if (.not. broken) call put_last_checkpoint(self%file, sim, before)
   end subroutine write_end
 
-  !> Completes the output of a run that broke off, including the last state of the run. The name of the file remains the name of an
-  !> unfinished output, OUT.h5.part.
+  !> Completes the output of a run that broke off, including the last state of the run. The file keeps the name of an unfinished
+  !> output, OUT.h5.part.
   subroutine break_off(self, sim, cost, note)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -220,7 +220,7 @@ contains
     if (equal) deallocate (self%own_mass)
   end subroutine simplify_masses
 
-  !> The periodic images of the box, for times relative to the time origin `box%epoch`.
+  !> Returns the periodic images of the box. Their times are relative to the time origin `box%epoch`.
   pure function images_now(self) result(images)
     class(simulation_t), intent(in) :: self
     type(images_t) :: images

@@ -35,7 +35,7 @@ module cell_grid
     type(images_t) :: images                       !! periodic images of the box
     integer(int32) :: n_listed = 0                 !! number of disks inserted into cells
     type(neighbour_lists_t), public :: lists       !! neighbour lists of the small disks, used if cells contain many disks
-    real(real64) :: plain_radius = 0.0_real64  !! largest radius of disks whose crossings change no list, or -1 [length]
+    real(real64) :: plain_radius = 0.0_real64  !! largest radius for which a crossing of a disk changes no list, or -1 [length]
   contains
     procedure :: build
     procedure :: predict

@@ -279,7 +279,7 @@ contains
       if (first < 0 .and. image(1) == image(first)) last = 1
     end function last_alike
 
-    !> Tests the disks in a block of cells that belong to the same image.
+    !> Tests the disks in a block of cells. All cells of the block belong to the same periodic image.
     subroutine scan_block()
       integer(int64) :: n
       integer(int32) :: c, k, m, fullest

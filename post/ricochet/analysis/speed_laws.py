@@ -124,7 +124,7 @@ def statistics_of(values: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def by_chance(sample: Sample) -> np.ndarray:
-    """Return n D^2 and chi^2 (2, DRAWN) of random samples."""
+    """Return an array (2, DRAWN) with n D^2 and chi^2 of random samples."""
     rng, law, parts = np.random.default_rng(1), sample.law(), []
     for _ in range(10):
         parts.append(statistics_of(law(np.sqrt(sample.draw(rng, DRAWN // 10)))))

@@ -108,7 +108,7 @@ def moment(members: Sequence[np.ndarray], power: int, independent: float) -> Est
     The argument `members` contains the speeds (F, n) of n disks in F frames of each run.  The error
     follows from the time series of the mean of u^power over the disks of each frame, corrected for
     the scaling of the speeds.  If a single run has too few frames for a time series, the error is
-    calculated for a sample of `independent` uncorrelated speeds.
+    that of a sample of uncorrelated speeds whose number is `independent`.
     """
     u = np.concatenate([one.ravel() for one in members])
     mean = np.mean(u**power)
