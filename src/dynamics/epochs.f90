@@ -11,7 +11,8 @@ module epochs
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: are_crushed, restart_epoch, begin_first_epoch, is_at_rest, last_time, most_events, move_epoch, stands_still
+  public :: are_crushed, restart_epoch, begin_first_epoch, ends_by_event, is_at_rest, last_time, most_events, move_epoch
+  public :: stands_still
 
   !> Intended number of collisions per disk in an epoch. The time origin moves at the end of each epoch, so that times keep their
   !> precision.
@@ -26,6 +27,9 @@ module epochs
   real(real64), parameter :: last_time = 0.5_real64*never
   real(real64), parameter :: crushing = 1.0e6_real64 !! growth factor of the energy above which disks are considered crushed
   real(real64), parameter :: densest = 0.9_real64  !! largest packing fraction used in the estimate of the event rate
+  !> Largest factor by which a single event may increase the speed of the fastest disk, and largest number of edges of the box that
+  !> a disk may travel in an epoch thereafter. With larger numbers, rounding errors of the time would displace disks noticeably.
+  real(real64), parameter :: farthest = 1.0e3_real64
 
 contains
 
@@ -45,7 +49,7 @@ contains
       end associate
     end do
     mean = mean + sim%fastest_drive()**2
-    sim%negligible_time = 1.0e-9_real64*minval(sim%disk%radius)/sqrt(max(fastest, tiny(fastest)))
+    sim%negligible_time = time_to_move(sim, sqrt(fastest))
     call begin_epoch(sim, events_per_epoch(sim)/(sqrt(max(mean, tiny(mean)))*sim%n_disks()*events_per_path()))
     sim%last_advance = sim%now
     sim%events_then = sim%tally%events
@@ -62,6 +66,15 @@ contains
         + sum(1/sim%box%edges())
     end function events_per_path
   end subroutine begin_first_epoch
+
+  !> Time within which a disk of a given speed does not move noticeably.
+  pure function time_to_move(sim, speed) result(time)
+    type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: speed              !! [length/time]
+    real(real64) :: time                           !! [time]
+
+    time = 1.0e-9_real64*minval(sim%disk%radius)/max(speed, sqrt(tiny(speed)))
+  end function time_to_move
 
   !> Intended number of events in an epoch.
   pure function events_per_epoch(sim) result(n)
@@ -85,8 +98,11 @@ contains
   !> procedure also sorts the disks by cells, because all events have to be predicted again after a shift of the time origin in any
   !> case. The next epoch ends at a fixed time and not after a fixed number of events, so that domains that run independently of
   !> each other end the epoch at the same time.
-  subroutine move_epoch(sim)
+  !> If a single event has ended the epoch (see `ends_by_event`), a disk can be much faster than before. The time origin then moves
+  !> exactly to the present time.
+  subroutine move_epoch(sim, by_event)
     type(simulation_t), intent(inout) :: sim
+    logical, intent(in) :: by_event                !! whether a single event has ended the epoch
     real(real64) :: shift, length
 
     if (sim%now - sim%last_advance >= sim%negligible_time) then
@@ -96,6 +112,10 @@ contains
     length = (sim%now - sim%epoch_begin)*min(2.0_real64, &
       events_per_epoch(sim)/real(max(sim%tally%events - sim%epoch_events, 1_int64), real64))
     shift = scale(aint(scale(fraction(sim%now), significant_bits)), exponent(sim%now) - significant_bits)
+    if (by_event) then
+      shift = sim%now
+      sim%negligible_time = min(sim%negligible_time, time_to_move(sim, fastest_disk(sim)))
+    end if
     call renumber(sim)
     call move_origin(sim, shift)
     call begin_epoch(sim, length)
@@ -142,6 +162,36 @@ contains
 
     n = sim%epoch_events + 2*events_per_epoch(sim)
   end function most_events
+
+  !> Whether the first event ends the epoch, because this event can make a disk so fast that the time since the time origin is no
+  !> longer exact enough. Slow disks become fast if they are rough and rotate fast, or if they reach a boundary that moves or is
+  !> hot. The result must depend on the state alone. It is therefore .false. if velocities also change without events.
+  pure function ends_by_event(sim) result(yes)
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+    real(real64) :: possible                       ! highest speed that an event can cause [length/time]
+    integer(int32) :: i
+
+    yes = .false.
+    if (sim%tally%events > sim%epoch_events .or. sim%box%has_gravity() .or. sim%box%is_sheared()) return
+    possible = sim%box%highest_speed()
+    if (sim%box%highest_temperature() > 0) possible = max(possible, sqrt(sim%box%highest_temperature()/minval(sim%masses())))
+    if (sim%law%tangential%is_rough() .or. sim%box%has_rough_walls()) &
+      possible = max(possible, maxval([(abs(sim%spin(i))*sim%disk(i)%radius, i=1, sim%n_disks())]))
+    if (possible*sim%epoch_end > farthest*maxval(sim%box%edges())) yes = possible > farthest*fastest_disk(sim)
+  end function ends_by_event
+
+  !> Speed of the fastest disk.
+  pure function fastest_disk(sim) result(speed)
+    type(simulation_t), intent(in) :: sim
+    real(real64) :: speed                          !! [length/time]
+    integer(int32) :: i
+
+    speed = 0
+    do i = 1, sim%n_disks()
+      speed = max(speed, magnitude(sim%disk(i)%v))
+    end do
+  end function fastest_disk
 
   !> Whether moving sides compress the disks beyond close packing, so that their energy grows without limit. The result is .false.
   !> for simulations in which driving or thermal walls supply energy to the disks.

@@ -4,7 +4,7 @@
 module timeline
   use encounters, only: encounter_text
   use box_geometry, only: wall_normal
-  use epochs, only: are_crushed, is_at_rest, last_time, most_events, move_epoch, stands_still
+  use epochs, only: are_crushed, ends_by_event, is_at_rest, last_time, most_events, move_epoch, stands_still
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t, is_full
   use evolution, only: evolution_t, limits_t
@@ -52,7 +52,7 @@ contains
     real(real64) :: due, until, kick_time, before  ! [time]
     integer(int64) :: events
     integer(int32), allocatable :: kicked(:)
-    logical :: arrived, epoch_is_over
+    logical :: arrived, epoch_is_over, by_event
 
     events = sim%tally%events
     before = sim%time()
@@ -62,14 +62,17 @@ contains
     until = due - sim%box%epoch
     if (sim%box%epoch + until < due) until = nearest(until, 1.0_real64)   ! rounding up ensures that `due` is reached
     goal%time = until
+    by_event = .false.
     if (sim%epoch_end > 0) then                    ! time-stepped dynamics has no epochs
+      by_event = ends_by_event(sim)
       goal%time = min(goal%time, sim%epoch_end)
-      goal%events = min(goal%events, most_events(sim))
+      goal%events = min(goal%events, merge(events + 1, most_events(sim), by_event))
     end if
     call evolution%advance(sim, goal, error, log)
     arrived = evolution%arrived
     if (sim%epoch_end > 0 .and. .not. allocated(error)) then
-      epoch_is_over = sim%tally%events >= most_events(sim)
+      by_event = by_event .and. sim%tally%events > events
+      epoch_is_over = by_event .or. sim%tally%events >= most_events(sim)
       if (arrived .and. evolution%idle) then
         call wait()
       else if (arrived .and. until > sim%epoch_end) then
@@ -111,7 +114,7 @@ contains
           call fail(error, exit_broken, standstill(sim, i, code))
         end associate
       else
-        call move_epoch(sim)
+        call move_epoch(sim, by_event)
         call evolution%start(sim)
       end if
     end subroutine end_epoch

@@ -400,13 +400,37 @@ def test_a_gas_that_was_slow_for_long_is_exact_when_it_is_fast_again(factor):
     gas = Simulation({"species": disks}).advance(time=0.5)
     gas.velocity = factor * gas.velocity
     gas.advance(events=gas.events + 100).velocity = gas.velocity / factor
-    deepest = 0.0
-    for _ in range(60):
+    assert deepest_overlap(gas, 60) < 1e-12 * 2 * gas.radius[0]
+
+
+@pytest.mark.parametrize(
+    "group",
+    [
+        {"side": {"name": "left", "temperature": 1}},
+        {"obstacle": {"centre": [0.5, 0.5], "radius": 0.1, "temperature": 1e6}},
+        {"side": {"name": "left", "motion": "sawtooth", "velocity": 1}},
+        {"contact": {"tangential_restitution": 0.5}},
+    ],
+)
+@pytest.mark.parametrize("speed", [1e-6, 1e-12])
+def test_slow_disks_that_an_event_makes_fast_are_exact(group, speed):
+    """A hot or moving boundary, or friction of fast rotating disks, makes slow disks fast."""
+    disks = {"count": 50, "packing_fraction": 0.1, "speed": speed, "angular_velocity": 30}
+    gas = Simulation({"species": disks, **group})
+    while np.abs(gas.velocity).max() < 1e3 * speed:
         gas.advance(events=gas.events + 1)
-        one, other = np.triu_indices(50, 1)
+    assert gas.time > 1e-4 / speed
+    assert deepest_overlap(gas, 200) < DEEPEST
+
+
+def deepest_overlap(gas: Simulation, events: int) -> float:
+    """Return the largest overlap of two disks of equal size during a number of events."""
+    deepest, (one, other) = 0.0, np.triu_indices(gas.n_disks, 1)
+    for _ in range(events):
+        gas.advance(events=gas.events + 1)
         apart = np.hypot(*(gas.position[one] - gas.position[other]).T)
         deepest = max(deepest, np.max(2 * gas.radius[0] - apart))
-    assert deepest < 1e-12 * 2 * gas.radius[0]
+    return deepest
 
 
 @pytest.mark.parametrize(
