@@ -84,7 +84,9 @@ def depth(found: Found) -> float:
         return 0.0
     places = found["/particles/disks/position/value"]
     lower, edges, _ = of_box(found)
-    known = (PLACE if places.dtype == np.float64 else 1e-6) * np.max(np.abs([lower, lower + edges]))
+    # A piston can push disks out of the box.
+    farthest = max(np.max(np.abs([lower, lower + edges])), np.max(np.abs(places), initial=0))
+    known = (PLACE if places.dtype == np.float64 else 1e-6) * farthest
     deepest = 0.0
     for time, place in zip(found["/particles/disks/position/time"], places, strict=True):
         for gap, width in (*pair_gaps(found, time, place), *wall_gaps(found, time, place)):
