@@ -80,7 +80,8 @@ contains
     self%rare = left
   end subroutine make_coarser
 
-  !> Adds a term, which is truncated to a multiple of the unit.
+  !> Adds a term, which is rounded to a multiple of the unit. Without rounding, the errors of many small terms would have the same
+  !> sign.
   elemental subroutine add(self, term)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: term
@@ -88,7 +89,7 @@ contains
 
     units = term*self%per_one
     if (abs(units) < most_units) then
-      self%units = self%units + int(units, int64)
+      self%units = self%units + int(units + sign(0.5_real64, units), int64)
     else if (abs(units) < rare_unit) then              ! two conversions to 64 bits are faster than one to 128 bits
       upper = aint(units/most_units)
       self%units = self%units + int(upper, int64)*2_int128**digits_of_bound + int(units - upper*most_units, int64)

@@ -63,6 +63,21 @@ def sums_and_logs(found: dict) -> dict:
     return result
 
 
+def test_the_energy_balance_is_closed_for_different_masses(ricochet, tmp_path):
+    """The energies that thousands of collisions of light disks dissipate are added without bias."""
+    (tmp_path / "gas.nml").write_text(
+        """&species name = 'light' count = 7 mass = 0.01 radius = 0.067 speed = 1 /
+        &species name = 'heavy' count = 1 mass = 100 radius = 0.073 velocities = 'rest' /
+        &contact restitution = 0.97 / &stop events = 5000 /"""
+    )
+    assert ricochet("gas.nml", "-o", "gas.h5").returncode == FINISHED
+    found = contents(tmp_path / "gas.h5")
+    first, last = found["/observables/total_energy/value"][[0, -1]]
+    lost = found["/observables/dissipated_energy/value"][-1]
+    assert lost > 0.5 * first
+    assert last + lost == pytest.approx(first, rel=1e-12, abs=0)
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_sums_agree_with_the_log_for_all_masses(ricochet, tmp_path, seed):
     text = masses(random.Random(seed))
