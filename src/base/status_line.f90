@@ -24,6 +24,7 @@ module status_line
     procedure :: show
     procedure :: show_share
     procedure :: clear
+    procedure :: tell
   end type status_line_t
 
 contains
@@ -74,6 +75,17 @@ contains
     write (percent, "(f5.1,a)") 100*share, " %"
     call self%show(task//": "//trim(adjustl(percent)))
   end subroutine show_share
+
+  !> Writes a message that stays, unless the program is quiet.
+  subroutine tell(self, message)
+    class(status_line_t), intent(inout) :: self
+    character(len=*), intent(in) :: message
+
+    if (self%quiet) return
+    call self%clear()
+    write (error_unit, "(a)") message
+    flush (error_unit)
+  end subroutine tell
 
   !> Erases the status line on the terminal, so that the next message starts on an empty line.
   subroutine clear(self)

@@ -24,6 +24,7 @@ module event_chains
   use packing, only: packing_t
   use random_stream, only: random_stream_t
   use status_line, only: status_line_t
+  use texts, only: written
   implicit none
   private
   public :: relax, shuffle
@@ -51,6 +52,7 @@ contains
     real(real64) :: mean_length(2), u
     integer(int64) :: sweep
     integer(int32) :: n, k, first, other
+    integer(int64) :: swapped(2)                  ! numbers of attempted and of accepted swaps
     integer :: axis, sense, usual_steps
     logical :: swaps
 
@@ -59,6 +61,7 @@ contains
     usual_steps = ceiling(sqrt(real(n, real64))) + 10
     mean_length = min(sqrt(real(n, real64))*mean_step(box, radius), 0.5_real64*box%edges())
     swaps = minval(radius) < maxval(radius)
+    swapped = 0
     do sweep = 1, sweeps
       call stream%seed(seed, [0, stream_number, int(ibits(sweep, 0, 31)), int(ibits(sweep, 31, 31))])
       do k = 1, n
@@ -74,7 +77,7 @@ contains
         if (swaps) then
           call stream%draw_index(n, first)
           call stream%draw_index(n, other)
-          call try_swap(packing, first, other)
+          call try_swap(packing, first, other, swapped)
         end if
         if (modulo(k, chains_per_look) == 0 .or. k == n) call line%show_share("relaxing the packing", &
           (sweep - 1 + real(k, real64)/n)/sweeps)
@@ -83,7 +86,17 @@ contains
     do k = 1, n
       x(:, k) = packing%disk(k)%x
     end do
+    call line%tell(report(sweeps, swapped))
   end subroutine relax
+
+  !> Text about a relaxation. The share of accepted swaps shows whether disks of different radii have been mixed.
+  pure function report(sweeps, swapped) result(text)
+    integer(int64), intent(in) :: sweeps, swapped(2)
+    character(len=:), allocatable :: text
+
+    text = "the packing was relaxed: "//written(sweeps)//" sweeps"
+    if (swapped(1) > 0) text = text//", "//written(swapped(2))//" of "//written(swapped(1))//" swaps of different radii accepted"
+  end function report
 
   !> Fills a packing with disks. The disks are divided into layers, and the radii in one layer differ by less than a factor of two.
   subroutine fill(packing, box, radius, x)
@@ -187,13 +200,15 @@ contains
 
   !> Exchanges the positions of two disks of different radii, unless the larger disk would overlap another disk or a side. The
   !> smaller disk always fits at the position of the larger disk.
-  pure subroutine try_swap(packing, i, j)
+  pure subroutine try_swap(packing, i, j, swapped)
     type(packing_t), intent(inout) :: packing
     integer(int32), intent(in) :: i, j
+    integer(int64), intent(inout) :: swapped(2)   !! numbers of attempted and of accepted swaps
     real(real64) :: place(2, 2)                   ! positions of the smaller disk and of the larger disk [length]
     integer(int32) :: small, large, blocker
 
     if (.not. abs(packing%disk(i)%radius - packing%disk(j)%radius) > 0) return
+    swapped(1) = swapped(1) + 1
     small = i
     large = j
     if (packing%disk(i)%radius > packing%disk(j)%radius) then
@@ -208,7 +223,10 @@ contains
       call packing%remove(small)
       call packing%remove(large)
       call packing%find_blocker(place(:, 1), [0.0_real64, 0.0_real64], disk(large)%radius, blocker)
-      if (blocker == 0) place = place(:, [2, 1])
+      if (blocker == 0) then
+        place = place(:, [2, 1])
+        swapped(2) = swapped(2) + 1
+      end if
       call packing%add(small, disk(small)%species, place(:, 1), disk(small)%radius)
       call packing%add(large, disk(large)%species, place(:, 2), disk(large)%radius)
     end associate

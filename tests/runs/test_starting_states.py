@@ -1,6 +1,7 @@
 """Initial states from files, with stretched boxes, compression, or an exact temperature."""
 
 import math
+import re
 
 import h5py
 import numpy as np
@@ -173,6 +174,18 @@ def test_check_leaves_the_relaxation_out(ricochet, tmp_path):
     assert run.returncode == FINISHED and "valid; 300 disks" in run.stdout
     run = ricochet("gas.nml", "--check", "--set", "species.large.radius=0.04")
     assert run.returncode == USAGE and "fill at most 0.9" in one_line(run)
+
+
+def test_a_relaxation_is_reported_with_the_swaps_of_different_radii(ricochet, tmp_path):
+    write_input(tmp_path, relaxed(20))
+    said = ricochet("gas.nml", "-o", "gas.h5").stderr
+    found = re.search(r"the packing was relaxed: 20 sweeps, (\d+) of (\d+) swaps of differ", said)
+    accepted, tried = map(int, found.groups())
+    assert 0 < accepted < tried < 20 * 300 and tried > 20 * 300 / 3
+    assert ricochet("gas.nml", "-o", "gas.h5", "--force", "--quiet").stderr == ""
+    write_input(tmp_path, relaxed(7).replace("0.026", "0.02"))
+    said = ricochet("gas.nml", "-o", "gas.h5", "--force").stderr
+    assert said.startswith("the packing was relaxed: 7 sweeps\n")
 
 
 def test_twenty_sweeps_move_most_disks_by_a_diameter(ricochet, tmp_path):
