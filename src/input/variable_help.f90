@@ -95,7 +95,8 @@ contains
     if (now /= "") then
       call fail(error, exit_usage, "--explain "//shown(name)//": is called "//now//" now")
     else
-      call fail(error, exit_usage, "--explain "//shown(name)//": no variable, choice or help contains this; " &
+      call fail(error, exit_usage, "--explain "//shown(name)//": no variable, choice or help contains this (the pages " &
+        //"in docs/ have a search: make docs); " &
         //suggestion(wanted, [character(len=len(full)) :: table%name, full, group_names], group_names))
     end if
   end subroutine explain

@@ -96,8 +96,8 @@ module choices
       //"distribution."), &
     choice_t("kind", "active", "Active Brownian disks: as 'brownian', with an additional velocity (self_propulsion_speed) " &
       //"along the orientation of each disk, which diffuses."), &
-    choice_t("kind", "recycle", "Recycling: each disk in from_region moves to a random free position in to_region, with a new " &
-      //"velocity. Displacements of disks are not defined in such a run."), &
+    choice_t("kind", "recycle", "Recycling, as in a hopper that is refilled: each disk in from_region moves to a random free " &
+      //"position in to_region, with a new velocity. Displacements of disks are not defined in such a run."), &
     choice_t("frame_columns", "position", "Positions of the disks."), &
     choice_t("frame_columns", "velocity", "Velocities of the disks."), &
     choice_t("frame_columns", "event_count", "Number of events of each disk since the start."), &

@@ -324,6 +324,13 @@ def test_a_full_disk_behind_stdout_is_reported(ricochet, tmp_path, command):
     assert lines_of(run) == ["standard output: cannot be written: No space left on device"]
 
 
+def test_explain_finds_the_words_of_users_or_names_the_documentation(ricochet):
+    assert "drive.kind = 'recycle'" in ricochet("--explain", "refill").stdout
+    assert "sqrt(d/g)" in ricochet("--explain", "contact_time").stdout.replace("\n", " ")
+    run = ricochet("--explain", "tracers")
+    assert run.returncode == USAGE and "make docs" in run.stderr
+
+
 @pytest.mark.parametrize("command", [["--help"], ["--version"], ["--explain", "restitution"]])
 def test_questions_are_answered_on_stdout(ricochet, command):
     run = ricochet(*command)
