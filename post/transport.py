@@ -20,20 +20,22 @@ is the time in which sound crosses the box, as in correlations.py.
 
 Enskog's coefficients are calculated after Gass (1971), and for mixtures after Lopez de Haro, Cohen
 and Kincaid (1983).  The value of the pair correlation function at contact is taken from Henderson
-or, for mixtures, from Jenkins and Mancini (1987).  In the table, the units of all coefficients are
-formed from the mean mass, the mean diameter and kT.  Enskog's theory assumes that the velocities of
-colliding disks are independent.  Unless the gas is dense, the viscosities and the conductivity of
-Enskog's theory are accurate to a few per cent, whereas the predicted D is less accurate.  In two
-dimensions no coefficient converges for long times in large boxes.  A fixed total energy of the N
-disks makes the coefficients smaller (docs/explanation/laws.md).  The relative decrease of the
-conductivity is about 6 / N, that of the bulk viscosity 5 / N, and that of the shear viscosity 2 /
-N.
+or, for mixtures, from Jenkins and Mancini (1987).  In the table, the units of the columns `value`
+and `enskog` are formed from the mean mass m, the mean diameter sigma and kT; the column `unit`
+contains them.  Enskog's theory assumes that the velocities of colliding disks are independent.
+Unless the gas is dense, the viscosities and the conductivity of Enskog's theory are accurate to a
+few per cent, whereas the predicted D is less accurate.  In two dimensions no coefficient converges
+for long times in large boxes.  A fixed total energy of the N disks makes the coefficients smaller
+(docs/explanation/laws.md).  The relative decrease of the conductivity is about 6 / N, that of the
+bulk viscosity 5 / N, and that of the shear viscosity 2 / N.
 """
 
 from ricochet.analysis.statistics import combine_runs
 from ricochet.analysis.transport import Found, coefficients
 from ricochet.figures.drawing import COLOURS, band, caption, colours, plt
 from ricochet.script import by_packing, command_line, launch, measured, over_runs, points, report
+
+import numpy as np
 
 NO_CONDUCTIVITY = (
     "no conductivity and no D for a mixture: diffusing species also transport energy; "
@@ -44,6 +46,13 @@ LABELS = {
     "conductivity": "heat conductivity",
     "bulk_viscosity": "bulk viscosity",
     "D": "diffusion coefficient",
+}
+#: Units of the coefficients in the table.
+UNITS = {
+    "viscosity": "sqrt(m*kT)/sigma",
+    "conductivity": "sqrt(kT/m)/sigma",
+    "bulk_viscosity": "sqrt(m*kT)/sigma",
+    "D": "sigma*sqrt(kT/m)",
 }
 Results = list[tuple[float, dict[str, Found]]]
 
@@ -56,6 +65,7 @@ def table(results: Results) -> tuple[list[dict], list[str]]:
             members, theory, about = found[name].members, found[name].enskog, f"η = {eta:g}, {name}"
             row = {"packing": eta, "runs": len(members), "what": name}
             row |= measured("value", combine_runs(members).scaled(theory)) | {"enskog": theory}
+            row |= {"unit": UNITS[name]}
             rows.append(row | over_runs("ratio", members, notes, about))
             if found[name].lag < found[name].memory / 4:
                 unsettled.append(
@@ -79,17 +89,25 @@ def draw(results: Results, rows: list[dict]) -> plt.Figure:
         line = {"color": colour, "lw": 1, "marker": ".", "ms": 3, "label": f"η = {eta:.3g}"}
         for name, one in found.items():
             band(panels[name], *one.curve, **line)
-    for (name, label), marker in zip(LABELS.items(), "osv^", strict=True):
+    packing = [eta for eta, _ in results]
+    apart = 0.015 * (max(np.ptp(packing), 0.1))  # of points that would otherwise cover each other
+    for k, ((name, label), marker) in enumerate(zip(LABELS.items(), "osv^", strict=True)):
         if name not in panels:
             continue
         panels[name].set(xlabel="$w\\,t$", xscale="log", xlim=(0.03, None))
         panels[name].set(ylabel=f"{label} / Enskog's", ylim=(0, 1.6))
         own = [row for row in rows if row["what"] == name]
-        bars = ([row[key] for row in own] for key in ("packing", "ratio", "ratio_error"))
-        panels["all"].errorbar(*bars, marker=marker, ms=4, lw=1, label=label)
-    panels["all"].set(xlabel="packing fraction η", ylabel="over Enskog's")
-    for name in ("viscosity", "all"):
-        panels[name].legend()
+        eta, *ratio = (
+            np.array([row[x] for row in own]) for x in ("packing", "ratio", "ratio_error")
+        )
+        style = {"marker": marker, "ms": 4, "lw": 1, "label": label}
+        panels["all"].errorbar(eta + (k - 1.5) * apart, *ratio, **style)
+    panels["all"].set(xlabel="packing fraction η", ylabel="coefficient / Enskog's")
+    panels["all"].set_xlim(min(packing) - 5 * apart, max(packing) + 5 * apart)
+    low, high = panels["all"].get_ylim()
+    panels["all"].set_ylim(low, high + 0.3 * (high - low))  # space for the legend
+    panels["viscosity"].legend()
+    panels["all"].legend(loc="upper center", ncols=2)
     for axes in panels.values():
         axes.axhline(1, color="black", ls="--", lw=1, zorder=0)
     return figure

@@ -1,10 +1,13 @@
 """Transport coefficients from Helfand moments, and the script transport."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 import driven
+import transport as transport_script
 from gas_inputs import GAS, UNLIKE, USUAL
 from ricochet import (
     RunError,
@@ -110,6 +113,24 @@ def test_squares_allow_for_the_mean_growth_that_is_taken_away():
     assert tp.squares(moment, 20).mean() == pytest.approx(20, rel=0.05)
 
 
+@pytest.mark.parametrize("packings", [(0.3,), (0.1, 0.3, 0.5)])
+def test_neither_points_nor_the_legend_cover_other_points(packings):
+    """All coefficients have the same values and errors."""
+    names = ("viscosity", "conductivity", "bulk_viscosity", "D")
+    own = {"ratio": 1.0, "ratio_error": 0.05}
+    rows = [{"what": name, "packing": eta, **own} for eta in packings for name in names]
+    curve = estimates.Curve(*np.ones((3, 5)))
+    found = {name: SimpleNamespace(curve=curve) for name in names}
+    figure = transport_script.draw([(eta, found) for eta in packings], rows)
+    figure.draw_without_rendering()
+    (axes,) = (one for one in figure.axes if "packing" in one.get_xlabel())
+    at = np.sort(np.concatenate([part[0].get_xdata() for part in axes.containers]))
+    assert len(at) == 4 * len(packings)
+    assert np.diff(axes.transData.transform(np.stack([at, at], axis=1))[:, 0]).min() > 2
+    top = axes.transData.transform((0, 1.05))[1]
+    assert axes.get_legend().get_window_extent().y0 > top
+
+
 def test_coefficients_are_drawn_with_their_numbers_and_doubted(gas, tmp_path, capsys):
     runs = [gas(f"gas{k}", packing=packing).path for k, packing in enumerate((0.1, 0.3))]
     rows = drawn(tmp_path, "transport", *runs)
@@ -118,7 +139,8 @@ def test_coefficients_are_drawn_with_their_numbers_and_doubted(gas, tmp_path, ca
     assert {(row["what"], float(row["packing"])) for row in means} == coefficients
     assert all(float(row["error"]) > 0 for row in means)
     assert all(float(row["wt"]) > 0 for row in rows if row["what"].endswith("(t)"))
-    assert "before it has settled" not in capsys.readouterr().err
+    printed, said = capsys.readouterr()
+    assert "before it has settled" not in said and "sigma*sqrt(kT/m)" in printed
     drawn(tmp_path, "transport", gas(length=20).path)
     assert "before it has settled" in capsys.readouterr().err
 
