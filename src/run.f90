@@ -43,6 +43,7 @@ module run
     type(progress_line_t) :: line
     real(real64) :: started = 0.0_real64                   !! time when the program started, by the clock `seconds` [s]
     real(real64) :: rate = 0.0_real64                      !! collisions per processor time in this part of the run [1/s]
+    real(real64) :: event_rate = 0.0_real64                !! events per processor time in this part of the run [1/s]
     !> Number of events that the serial engine executed in this part of a parallel run.
     integer(int64) :: serial_events = 0
   end type run_t
@@ -168,15 +169,17 @@ contains
   subroutine follow(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
-    integer(int64) :: collisions
+    integer(int64) :: collisions, events
     real(real64) :: cpu(2)                                 ! [s]
 
     collisions = run%sim%tally%collisions
+    events = run%sim%tally%events
     call cpu_time(cpu(1))
     call run%evolution%start(run%sim)
     call main_loop(run, error)
     call cpu_time(cpu(2))
     run%rate = (run%sim%tally%collisions - collisions)/max(cpu(2) - cpu(1), 1.0e-9_real64)
+    run%event_rate = (run%sim%tally%events - events)/max(cpu(2) - cpu(1), 1.0e-9_real64)
     run%serial_events = run%evolution%serial_events
     deallocate (run%evolution)                             ! the completion of the output may need the memory
   end subroutine follow
@@ -262,6 +265,8 @@ contains
         eol//"dissipated_energy = "//written(sim%tally%total(dissipated))// &
         eol//"wall_time = "//written(seconds() - run%started)// &
         eol//"collisions_per_second = "//written(run%rate)
+      ! A disk in a billiard collides with boundaries only.
+      if (sim%tally%collisions == 0) text = text//eol//"events_per_second = "//written(run%event_rate)
       if (run%input%settings%run%threads_asked > 1) text = text//eol//"threads = "//written(run%input%settings%run%threads)
       if (run%input%settings%run%threads > 1) text = text//eol//"events_on_one_core = "//written(run%serial_events)
       if (sim%drive%is_on()) text = text//eol//"kicks = "//written(sim%kicks)// &

@@ -4,6 +4,7 @@ The correctness of the numbers is tested with random systems in test_random_syst
 tests/unit/.
 """
 
+import re
 import time
 
 import h5py
@@ -218,6 +219,15 @@ def test_the_summary_says_what_the_file_says(ricochet, tmp_path, turn):
     assert ("rotational_energy" in said) == bool(turn)
     rate = found["/provenance@collisions_per_second"]
     assert float(said["collisions_per_second"]) == pytest.approx(rate, rel=1e-6)
+
+
+def test_the_summary_of_a_billiard_has_a_rate_of_events(ricochet, tmp_path):
+    """A disk among boundaries has no collisions with disks, and a rate of 0 says nothing."""
+    one = "&species count = 1 radius = 0.01 speed = 1 / &stop events = 1000 /"
+    said = ricochet(write_input(tmp_path, one), "-o", "one.h5").stdout
+    rate = float(re.search(r"^events_per_second = (.+)$", said, re.M)[1])
+    assert "collisions_per_second = 0\n" in said and rate > 100
+    assert "events_per_second" not in ricochet(write_input(tmp_path), "-o", "gas.h5").stdout
 
 
 def test_the_file_of_a_small_run_is_small(ran, tmp_path):
