@@ -18,6 +18,7 @@ DOCS = Path(__file__).resolve().parent
 FIGURES = DOCS.parent / "runs" / "figures"
 #: Folder of the page that shows each figure.
 SHOWN = {
+    "crater": ".",
     "first": "tutorials",
     "scattering": "tutorials",
     "gas": "tutorials",
@@ -32,17 +33,25 @@ SHOWN = {
     "gravity_laws": "tutorials",
     "gravity_missed": "tutorials",
 }
+#: Part of a figure, from its top, that the page shows [whole figure].
+UPPER_PART = {"crater": 0.515}
 WIDTH, COLOURS = 1100, 64
 
 
-def reduced(path: Path, width: int = WIDTH) -> bytes:
-    """Return a figure as a PNG file with at most `width` pixels per row and `COLOURS` colours."""
+def reduced(path: Path, width: int = WIDTH, part: float = 1.0) -> bytes:
+    """Return a figure as a PNG file with at most `width` pixels per row and `COLOURS` colours.
+
+    The PNG file contains the fraction `part` of the figure, from the top.
+    """
     picture = Image.open(path).convert("RGB")
+    picture = picture.crop((0, 0, picture.width, round(part * picture.height)))
     if picture.width > width:
         height = round(picture.height * width / picture.width)
         picture = picture.resize((width, height), Image.Resampling.LANCZOS)
+    # The default method of Pillow (median cut) would replace colours of thin lines by others.
+    few = {"method": Image.Quantize.MAXCOVERAGE, "kmeans": 1, "dither": Image.Dither.NONE}
     file = io.BytesIO()
-    picture.quantize(COLOURS, dither=Image.Dither.NONE).save(file, format="png", optimize=True)
+    picture.quantize(COLOURS, **few).save(file, format="png", optimize=True)
     return file.getvalue()
 
 
@@ -51,7 +60,7 @@ def main() -> None:
         source = FIGURES / f"{name}.png"
         if sys.argv[1:] or source.exists():
             target = DOCS / SHOWN[name] / f"{name}.png"
-            target.write_bytes(reduced(source))
+            target.write_bytes(reduced(source, part=UPPER_PART.get(name, 1.0)))
             print(f"{target.relative_to(DOCS.parent)}: {target.stat().st_size} bytes")
 
 

@@ -1,14 +1,17 @@
 """Functions that figures of several scripts share: frames, images, paths, captions and formats."""
 
+import importlib.util
+
 import numpy as np
 import pytest
+from matplotlib import colors
 
 import trajectory
 from ricochet import RunError, read_run
-from ricochet.figures.drawing import caption, with_images
+from ricochet.figures.drawing import COLOURS, caption, plt, with_images
 from ricochet.script import chosen_frames, frame_list
 from synthetic_gases import cooled, falling, gas
-from synthetic_run import drawn, run_script, written
+from synthetic_run import ROOT, drawn, run_script, written
 
 
 def test_frames_are_chosen_by_number_range_and_count(tmp_path, rng):
@@ -100,3 +103,21 @@ def test_other_formats_are_written_too(tmp_path, rng):
     for ending, begin in {"pdf": b"%PDF", "svg": b"<?xml"}.items():
         assert run_script("snapshot", path, "-o", tmp_path / f"a.{ending}") == 0
         assert (tmp_path / f"a.{ending}").read_bytes().startswith(begin)
+
+
+def test_figures_of_the_pages_keep_the_colours_of_their_lines(tmp_path):
+    """Thin lines have few pixels; most of the 64 colours could go to shades of other areas."""
+    source = importlib.util.spec_from_file_location("page_figures", ROOT / "docs/page_figures.py")
+    pages = importlib.util.module_from_spec(source)
+    source.loader.exec_module(pages)
+    figure, axes = plt.subplots(figsize=(8, 8), dpi=100)
+    for k, colour in enumerate(COLOURS[:6]):
+        axes.plot([0, 1], [k, k], lw=2, color=colour)
+        axes.fill_between([0, 1], k + 0.1, k + 0.9, color=colour, alpha=0.25)
+    axes.scatter(*np.random.default_rng(1).uniform([0, 6], [1, 12], (4000, 2)).T, c=range(4000))
+    figure.savefig(tmp_path / "a.png")
+    small = tmp_path / "small.png"
+    small.write_bytes(pages.reduced(tmp_path / "a.png", part=0.9))
+    pixels = 255 * plt.imread(small)[..., :3].reshape(-1, 3)
+    for colour in COLOURS[:6]:
+        assert np.abs(pixels - 255 * np.array(colors.to_rgb(colour))).max(axis=1).min() < 20, colour
