@@ -35,7 +35,7 @@ SHOWN = {
 }
 #: Part of a figure, from its top, that the page shows [whole figure].
 UPPER_PART = {"crater": 0.515}
-WIDTH, COLOURS = 1100, 64
+WIDTH, COLOURS = 1100, 128
 
 
 def reduced(path: Path, width: int = WIDTH, part: float = 1.0) -> bytes:

@@ -106,7 +106,7 @@ def test_other_formats_are_written_too(tmp_path, rng):
 
 
 def test_figures_of_the_pages_keep_the_colours_of_their_lines(tmp_path):
-    """Thin lines have few pixels; most of the 64 colours could go to shades of other areas."""
+    """Thin lines have few pixels; most of the colours could go to shades of other areas."""
     source = importlib.util.spec_from_file_location("page_figures", ROOT / "docs/page_figures.py")
     pages = importlib.util.module_from_spec(source)
     source.loader.exec_module(pages)
