@@ -5,8 +5,8 @@
 Runs with the same width v0 of the initial velocity distribution are combined.  Energies are
 averaged over the runs, and over windows of time of the length --window.  The thermalisation time
 T_therm is the time at which the relative difference of the two energies falls below --within and
-stays below this value for three windows.  The error of T_therm is determined by the jackknife
-method: the value of T_therm is calculated again after leaving out each run in turn.  With few runs
+stays below this value for three windows.  The error of T_therm is determined by the bootstrap
+method: the value of T_therm is calculated again for random choices of the runs.  With few runs
 T_therm is overestimated, because noise raises the energy difference above the limit again.  The
 overestimate is 16 % on average for ten runs of 60 disks, and less than 1 % for 100 runs.  For a
 single run, the error of the relative energy difference is the fluctuation of the ratio of the two
@@ -23,11 +23,13 @@ from functools import reduce
 from typing import NamedTuple
 
 from ricochet import Run
+from ricochet.analysis.estimates import ONE_SIGMA
 from ricochet.analysis.statistics import (
     Estimate,
     estimate,
-    rounded_to_error,
     propagate_error,
+    rounded_to_error,
+    student,
     windows,
 )
 from ricochet.analysis.equilibrium import start_of_equilibrium
@@ -37,6 +39,9 @@ from ricochet.reading.nature import SETTLED, allow
 from ricochet.script import command_line, grouped, launch, measured, report
 
 import numpy as np
+
+
+RESAMPLED = 400  # random choices of the runs
 
 
 class Approach(NamedTuple):
@@ -84,17 +89,26 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
 
 
 def over_runs(of: Callable[[np.ndarray], float], both: list[np.ndarray]) -> Estimate:
-    """Return the value of a function of the mean energies (2, W) of R runs, with a jackknife error.
+    """Return the value of a function of the mean energies (2, W) of R runs, with a bootstrap error.
 
-    The argument `both` contains the energies (R, W) of the two species.  The result is NaN if the
-    function is NaN for the mean energies of all runs, or for the mean energies of all runs except
-    one.
+    The argument `both` contains the energies (R, W) of the two species.  The function is calculated
+    for many random choices of R of the runs, with replacement.  In 68 % of the choices the result
+    deviates by less than the error from the result for all runs.  The jackknife would not be
+    suitable, because the function jumps where noise raises a curve above a limit: the omission of
+    one run seldom causes a jump, and then changes the error by a large factor.  The result is NaN
+    if the function is NaN for the mean energies of all runs, or for more than 32 % of the choices.
     """
     tracks, count = np.array(both), len(both[0])
-    whole = of(tracks.mean(axis=1))
-    rests = [of(np.delete(tracks, run, axis=1).mean(axis=1)) for run in range(count)]
-    error = estimate(count * whole - (count - 1) * np.array(rests)).error
-    return Estimate(whole + 0 * error, error)
+    mean = tracks.mean(axis=1)
+    whole = of(mean)
+    chosen = np.random.default_rng(1).multinomial(count, np.full(count, 1 / count), RESAMPLED)
+    means = np.einsum("cr,krw->ckw", chosen / count, tracks)
+    spread = np.sqrt(count / (count - 1))  # resampled means scatter too little by this factor
+    values = np.array([of(mean + spread * (own - mean)) for own in means])
+    values[np.isnan(values)] = np.inf
+    apart = np.quantile(np.abs(values - whole), 2 * ONE_SIGMA - 1, method="nearest")
+    error = float(apart) * float(student(count))
+    return Estimate(whole, error) if np.isfinite(error) else Estimate(np.nan, np.nan)
 
 
 def late(runs: list[Run], name: str, skip: float | None) -> Estimate:

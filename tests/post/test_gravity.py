@@ -95,7 +95,7 @@ def test_one_run_of_many_disks_has_a_thermalisation_time_with_an_error(rng):
     assert np.abs(np.median(mean) - truth) < 0.3 * truth and np.isfinite(mean).mean() > 0.9
 
 
-def test_the_jackknife_error_of_the_thermalisation_time_is_the_scatter_of_groups(rng):
+def test_the_error_of_the_thermalisation_time_is_the_scatter_of_groups(rng):
     """The energy difference falls below 10 % at a known time; the noise is that of 20 runs."""
     time = np.arange(0.25, 12, 0.5)
     difference, truth = np.exp(-time / 3), 3 * np.log(10)
@@ -112,6 +112,22 @@ def test_the_jackknife_error_of_the_thermalisation_time_is_the_scatter_of_groups
     assert 0.56 < np.mean(np.abs(mean - truth) < error) < 0.78  # four standard deviations
     assert np.mean(error) == pytest.approx(np.std(mean), rel=0.25)
     assert abs(mean.mean() - truth) < 0.3 * np.std(mean)
+
+
+def test_the_error_of_the_thermalisation_time_is_at_most_the_size_of_a_jump(rng):
+    """Noise lets a curve whose maxima are 2.5 apart cross the limit a period early or late."""
+    time = np.arange(0.25, 12, 0.5)
+    difference = np.exp(-time / 3) * (1 + 0.6 * np.cos(2 * np.pi * time / 2.5))
+
+    def crossing(both):
+        return equipartition.entry(time, np.abs(both[1] / both[0] - 1))
+
+    errors = []
+    for _ in range(60):
+        light = 1 + 0.05 * rng.normal(size=(20, len(time)))
+        heavy = 1 + difference + 0.05 * rng.normal(size=light.shape)
+        errors.append(equipartition.over_runs(crossing, [light, heavy]).error)
+    assert np.nanmax(errors) < 1.3 * 2.5, "the jackknife multiplies a jump by 4"
 
 
 def test_one_run_does_not_say_that_energies_agree(tmp_path, rng, capsys):
