@@ -243,10 +243,10 @@ BARS = """
 The tables of this section show how often the error bars of the scripts contain the true value. The
 command `python tests/coverage_tables.py` writes these tables. The systems and quantities were
 chosen before the first run. The seeds of the tables were not used to improve the estimators, with
-four exceptions: the first tables showed that the errors of the flow, of the slopes under gravity, of
-the coefficients from Helfand moments and of the thermalisation time were wrong. The rows of these
-quantities were measured again with corrected estimators. Curves of cooling gases against time are
-compared at one fixed time.
+four exceptions: the first tables showed that the errors of the flow, of the slopes under gravity,
+of the coefficients from Helfand moments and of the thermalisation time were wrong. The rows of
+these quantities were measured again with corrected estimators. Curves of cooling gases against time
+are compared at one fixed time.
 
 An error bar belongs to a single run, or to a group of runs if the name of the system states a
 number of runs. The columns are:
