@@ -133,12 +133,16 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(progress_t) :: progress
     type(stop_rule_t) :: rule
-    logical :: finished
+    logical :: finished, found
 
     associate (command => run%command, sim => run%sim)
       call describe_system(run%input%settings, sim)
-      if (is_file(source_of(command%output)) .and. .not. command%check) call run%output%claim(command%output, error)
+      found = is_file(source_of(command%output))
+      if (.not. found) found = is_file(command%output)     ! another run may have just given the unfinished output its final name
+      if (found .and. .not. command%check) call run%output%claim(command%output, error)
       if (.not. allocated(error)) call read_checkpoint(command%output, run%input, sim, progress, finished, error)
+      if (.not. (found .or. allocated(error))) &
+        call fail(error, exit_files, command%output//": another run has just created it; repeat the command later")
       if (allocated(error)) return
       rule = stop_rule_t(run%input%settings%stop, sim)
       if (finished .and. (rule%is_met(sim) .or. rule%rests(sim))) then

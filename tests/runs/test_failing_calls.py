@@ -233,6 +233,17 @@ def test_whatever_meets_a_call_costs_nothing(program, stage, check, call, ways, 
         assert [found for found in pool.map(problem, cases) if found] == []
 
 
+@pytest.mark.parametrize("option", OPTIONS)
+def test_a_file_that_seems_to_exist_for_a_moment_is_no_danger(program, stage, option):
+    """The first of several calls fails that examine whether the unfinished output exists."""
+    lines = (stage / f"trace{option}").read_text().splitlines()
+    calls = [line for line in lines if re.match(r"\d+ +newfstatat\(", line)]
+    numbers = [number for number, line in enumerate(calls, start=1) if '"gas.h5.part"' in line]
+    for number in numbers:
+        inject = f"inject=newfstatat:error=EIO:when={number}"
+        assert outcome(check_after_failure, program, stage, option, "newfstatat", inject) == ""
+
+
 @pytest.mark.parametrize("error", ["EINTR", "EAGAIN"])
 @pytest.mark.parametrize("forever", ["", "+"])
 def test_a_reluctant_standard_output_is_no_failure(program, stage, error, forever):
