@@ -232,7 +232,7 @@ figures:  ## draws the figures of all systems in runs/figures/ (long)
 	@runs/figures.sh
 
 # The unit tests take one core; meanwhile the others build the program.
-test:  ## sets up, then unit tests and whole runs (four minutes)
+test:  ## sets up, then unit tests and whole runs (ten minutes)
 	@.ci/set-up demo test
 	@$(MAKE) $(jobs) $(unit_build) $(BUILD)/tests/unit_tests $(BUILD)/tests/four_disks
 	@$(MAKE) $(jobs) checked all

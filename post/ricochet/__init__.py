@@ -26,7 +26,7 @@ from .running.program import ProgramError, example, run
 from .running.simulation import Simulation
 from .running.starting import write_start
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 __all__ = [
     "Event",

@@ -4,5 +4,5 @@ module version
   private
   public :: program_version
 
-  character(len=*), parameter :: program_version = "0.2.0"
+  character(len=*), parameter :: program_version = "0.3.0"
 end module version
