@@ -25,7 +25,7 @@ module memory
   real(real64), parameter :: listed = 264                    !! neighbour list of a disk
   !> Memory per disk of the random numbers of the driving (`kicked`), of the test for free positions of recycled disks
   !> (`placed_anew`), and of the Verlet lists of time-stepped dynamics (`stepped`)
-  real(real64), parameter :: kicked = 16, placed_anew = 70, stepped = 100
+  real(real64), parameter :: kicked = 24, placed_anew = 70, stepped = 100
   !> Additional memory per disk if the box is divided into domains: the first number applies to a box with walls, the second number
   !> to a periodic box.
   real(real64), parameter :: divided(2) = [152, 212]
