@@ -7,8 +7,8 @@ begins after the first X collisions per disk, where X is the value of --equilibr
 when no observable drifts any longer.  Errors account for the autocorrelation of each quantity; in
 the table, `samples` is the effective number of independent samples.  Warnings explain why an error
 may be unreliable.  If the kinetic energy is conserved, kT of each run is exact, and the results of
-all runs are scaled to the mean kT.  If there are thermal walls or a thermostat, which must all have one
-temperature, or if disks rotate, kT is a measured mean with an error.
+all runs are scaled to the mean kT.  If there are thermal walls or a thermostat, which must all have
+one temperature, or if disks rotate, kT is a measured mean with an error.
 
 The pressure is measured from the virial of the pair collisions and from the momentum transfer to
 each side.  The pressure on the sides is slightly larger than the pressure from the virial, because

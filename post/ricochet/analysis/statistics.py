@@ -221,10 +221,10 @@ def periodic_waves(parts: np.ndarray, per_sample: float) -> tuple[float, int]:
     of the mean.  To the squared coefficients of a cosine transform, the bounded part contributes
     twice as much as to the variance of the mean.  To the squared coefficients of a Fourier
     transform, averaged over sines and cosines, the bounded part contributes exactly as much as to
-    the variance of the mean.  The spectral density of the bounded part increases as the square of the
-    frequency, and therefore coefficients of higher frequency would increase the bias of the mean.
-    For a small inefficiency `per_sample` fewer coefficients are used, such that the relative bias
-    is constant.
+    the variance of the mean.  The spectral density of the bounded part increases as the square of
+    the frequency, and therefore coefficients of higher frequency would increase the bias of the
+    mean.  For a small inefficiency `per_sample` fewer coefficients are used, such that the relative
+    bias is constant.
     """
     most = min(MOST_WAVES, len(parts) // 2) // 2
     pairs = int(np.clip(round(len(parts) * per_sample**0.5 / (2 * PER_WAVE)), 1, max(1, most)))

@@ -26,7 +26,7 @@ from .starting import with_start
 STOPPED = 75
 PROGRESS = "\033[?7l"  # start of each update of the program's progress line on a terminal
 PAUSE = 30.0  # interval of progress lines without a terminal [s]
-#: The two folders in which the input files can be: that of an installed package, and that of a clone.
+#: Folders in which the input files can be: that of an installed package, and that of a clone.
 INPUTS = (HERE / "input", HERE.parents[1] / "input")
 ESCAPES = re.compile(r"\033\[\??\d*[A-Za-z]")
 
