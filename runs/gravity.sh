@@ -2,7 +2,7 @@
 
 # Exercises G1 to G4 about disks in a box with gravity: energies, equipartition, exponential laws, pictures and a film.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
-units=(--units length=m,time=s,mass=kg,energy=J) # of input/gravity.nml
+units=(--units "length=m,time=s,mass=kg,energy=J") # of input/gravity.nml
 
 # G1: total energy in event-driven and time-stepped simulations, and the fraction of collisions that time-stepped simulations miss.
 runs/ensemble.sh input/gravity.nml -d "$data/events" --seeds 1 "$@"

@@ -10,10 +10,11 @@
 !> the chain does not depend on the positions.
 !>
 !> If an axis is not periodic, a disk that reaches a side reverses its direction and continues (straight event chains in a box with
-!> walls, Li et al., 2022, doi:10.1063/5.0126437). The state of such a chain includes its direction. Each state has exactly one predecessor even with reflections, because a disk that touches a side and moves away from the
-!> side has just been reflected. The first direction of a chain between two sides is drawn at random, because the uniform
-!> distribution is stationary only if both directions are equally probable. If a chain between two sides is reversed at its end, the
-!> chain leads back to its start. Chains between sides therefore also satisfy detailed balance.
+!> walls, Li et al., 2022, doi:10.1063/5.0126437). The state of such a chain includes its direction. Each state has exactly one
+!> predecessor even with reflections, because a disk that touches a side and moves away from the side has just been reflected. The
+!> first direction of a chain between two sides is drawn at random, because the uniform distribution is stationary only if both
+!> directions are equally probable. If a chain between two sides is reversed at its end, the chain leads back to its start. Chains
+!> between sides therefore also satisfy detailed balance.
 !>
 !> If the radii differ, a swap is attempted after each chain: two disks, drawn uniformly from all disks, exchange their positions
 !> unless the larger disk would overlap another disk or a side (Grigera and Parisi, 2001, doi:10.1103/PhysRevE.63.045102). Swaps

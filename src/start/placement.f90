@@ -48,7 +48,7 @@ module placement
   !> doi:10.1103/PhysRevE.87.042134). At higher packing fractions, disks of equal radii with placement 'relaxed' start on a lattice
   !> if the lattice fits into the box. A compressed fluid would become a polycrystal, which event chains equilibrate only slowly.
   real(real64), parameter :: freezing = 0.70_real64
-  integer, parameter :: most_reports = 5                    !! for one species, at most this number of problems of one kind is reported
+  integer, parameter :: most_reports = 5                    !! limit of the number of reported problems, for each kind and species
 
 contains
 
