@@ -193,12 +193,12 @@ def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
 
 
 def table(groups: list, results: list[Curves]) -> list[dict]:
-    """Return a table row with final energy and temperature ratio for each restitution."""
+    """Return the energy and temperature ratio at the last collisions per disk, by restitution."""
     return [
         {
             "restitution": xi.name,
             "runs": len(runs),
-            **measured("energy_left", in_time(found, "all"), -1),
+            **measured("energy_left", found["K_all"], -1),
             **measured("temperature_ratio", found.get("ratio"), -1),
         }
         for (xi, runs), found in zip(groups, results, strict=True)

@@ -101,6 +101,18 @@ def test_cooling_has_a_linear_panel_for_each_restitution(tmp_path, rng, figures)
     assert "estimated" in first.get_legend().get_title().get_text()
 
 
+def test_the_table_of_cooling_has_both_values_after_the_same_number_of_collisions(tmp_path, rng):
+    """The energies of both runs fall by 10 % in time, the second in twice as many collisions."""
+    runs = []
+    for k, tau in enumerate((20.0, 40.0)):
+        draws = rng.exponential(size=(5, 30))
+        draws *= 30 * (1 - 0.1 * np.arange(5)[:, None] / 4) / draws.sum(axis=1)[:, None]
+        runs.append(read_run(mixture(tmp_path / f"{k}.h5", draws, tau=tau, cooled=0.1)))
+    groups = cooling_figure.by_restitution(runs)
+    (row,) = cooling_figure.table(groups, [cooling_figure.energies(runs)])
+    assert row["energy_left"] == pytest.approx((0.9 + 0.95) / 2, abs=1e-6)
+
+
 # --- energies ---
 
 
