@@ -143,7 +143,7 @@ def test_a_crystal_is_in_order_and_points_at_random_are_not(tmp_path, rng):
     g6 = structure.bond_correlation(crystal, [0, 1], psi, np.array([40, 80, 120, 300]))
     np.testing.assert_allclose(g6, 1, atol=1e-4)
     assert run_script("snapshot", crystal.path, "--colour", "psi6", "-o", tmp_path / "a.png") == 0
-    for colour, ends in {"psi6": (-180, 180), "speed": (0, 7)}.items():
+    for colour, ends in {"psi6": (-180, 180), "speed": (0, 14)}.items():
         shown = snapshot.scale(np.full(9, 7.0), False, colour)
         assert (shown.vmin, shown.vmax) == ends
     assert run_script("player", crystal.path, "--colour", "psi6", "-o", tmp_path / "a.html") == 2
