@@ -8,7 +8,7 @@ from matplotlib import colors
 
 import trajectory
 from ricochet import RunError, read_run
-from ricochet.figures.drawing import COLOURS, caption, plt, with_images
+from ricochet.figures.drawing import COLOURS, STYLE, caption, plt, with_images
 from ricochet.script import chosen_frames, frame_list
 from synthetic_gases import cooled, falling, gas
 from synthetic_run import ROOT, drawn, run_script, written
@@ -110,7 +110,9 @@ def test_figures_of_the_pages_keep_the_colours_of_their_lines(tmp_path):
     source = importlib.util.spec_from_file_location("page_figures", ROOT / "docs/page_figures.py")
     pages = importlib.util.module_from_spec(source)
     source.loader.exec_module(pages)
-    figure, axes = plt.subplots(figsize=(8, 8), dpi=100)
+    plt.style.use(STYLE)
+    figure, axes = plt.subplots(figsize=(8, 8))
+    axes.set_ylim(-3, 12)  # the lines lie above the part of the figure that is cut off
     for k, colour in enumerate(COLOURS[:6]):
         axes.plot([0, 1], [k, k], lw=2, color=colour)
         axes.fill_between([0, 1], k + 0.1, k + 0.9, color=colour, alpha=0.25)
