@@ -191,15 +191,24 @@ def test_a_dragged_side_follows_the_mouse_and_then_stays(opened):
     steps = [[x, end[1]] for x in np.linspace(middle[0], end[0], 12).round().astype(int).tolist()]
     mouse(opened, middle, "down", *steps)
     right = "past.at(-1).sides[1]"
-    for _ in range(60):  # the side is not faster than the disks
-        if inside(opened, right) < 0.85:
-            break
+
+    def is_near_the_mouse():
         mouse(opened, [end[0] + 1, end[1]], end)
-    assert 0.75 < inside(opened, right) < 0.85
+        return inside(opened, right) < 0.85
+
+    wait_for(is_near_the_mouse)  # the side is not faster than the disks
+    assert inside(opened, right) > 0.75
     mouse(opened, "up")
     wait_for(
         lambda: opened.run("return current().changes.at(-1)[2]") == "the right side is dragged"
     )
+
+    def stays():
+        time, place = inside(opened, "past.at(-1).time"), inside(opened, right)
+        wait_for(lambda: inside(opened, "past.at(-1).time") > time)
+        return inside(opened, right) == place
+
+    wait_for(stays)  # the side moves until the worker has received that it was released
     opened.press("p")
     wait_for(lambda: not inside(opened, "state.playing"))
     place = inside(opened, right)
