@@ -217,7 +217,7 @@ class Correlator:
         partner = np.searchsorted(self.times, time + self.lags - close)
         there = np.append(self.times, np.inf)[partner] <= time + self.lags + close
         since = (time - self.times[0]) * ORIGINS / np.where(self.lags > 0, self.lags, np.inf)
-        part = np.where((self.lags > 0) & ~self.every, np.floor(since + 1e-6), now)
+        part = np.where((self.lags > 0) & (not self.every), np.floor(since + 1e-6), now)
         fresh = np.flatnonzero(there & (part > self.last))
         self.last[fresh] = part[fresh]
         for lag in fresh.tolist():
