@@ -28,6 +28,7 @@ SHOWN = {
     "lab_frames": "tutorials",
     "lab_speeds": "tutorials",
     "cost": "tutorials",
+    "discharge": "guides",
     "gravity_energy": "tutorials",
     "gravity_equipartition": "tutorials",
     "gravity_laws": "tutorials",
