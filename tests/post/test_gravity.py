@@ -95,19 +95,25 @@ def test_one_run_of_many_disks_has_a_thermalisation_time_with_an_error(rng):
     assert np.abs(np.median(mean) - truth) < 0.3 * truth and np.isfinite(mean).mean() > 0.9
 
 
+def thermalisation_time(time, light, heavy):
+    """Return the time from which mean energies (runs, T) of both species differ by at most 10 %."""
+
+    def crossing(both):
+        return equipartition.entry(time, np.abs(both[1] / both[0] - 1))
+
+    return equipartition.over_runs(crossing, [light, heavy])
+
+
 def test_the_error_of_the_thermalisation_time_is_the_scatter_of_groups(rng):
     """The energy difference falls below 10 % at a known time; the noise is that of 20 runs."""
     time = np.arange(0.25, 12, 0.5)
     difference, truth = np.exp(-time / 3), 3 * np.log(10)
 
-    def crossing(both):
-        return equipartition.entry(time, np.abs(both[1] / both[0] - 1))
-
     found = []
     for _ in range(300):
         light = 1 + 0.01 * rng.normal(size=(20, len(time)))
         heavy = 1 + difference + 0.01 * rng.normal(size=light.shape)
-        found.append(equipartition.over_runs(crossing, [light, heavy]))
+        found.append(thermalisation_time(time, light, heavy))
     mean, error = np.transpose(found)
     assert 0.56 < np.mean(np.abs(mean - truth) < error) < 0.78  # four standard deviations
     assert np.mean(error) == pytest.approx(np.std(mean), rel=0.25)
@@ -119,14 +125,11 @@ def test_the_error_of_the_thermalisation_time_is_at_most_the_size_of_a_jump(rng)
     time = np.arange(0.25, 12, 0.5)
     difference = np.exp(-time / 3) * (1 + 0.6 * np.cos(2 * np.pi * time / 2.5))
 
-    def crossing(both):
-        return equipartition.entry(time, np.abs(both[1] / both[0] - 1))
-
     errors = []
     for _ in range(60):
         light = 1 + 0.05 * rng.normal(size=(20, len(time)))
         heavy = 1 + difference + 0.05 * rng.normal(size=light.shape)
-        errors.append(equipartition.over_runs(crossing, [light, heavy]).error)
+        errors.append(thermalisation_time(time, light, heavy).error)
     assert np.nanmax(errors) < 1.3 * 2.5, "the jackknife multiplies a jump by 4"
 
 
