@@ -66,9 +66,8 @@ from matplotlib.patches import Circle
 MOST_CELLS = 100_000
 LEAST_FLOW = 0.2  # smallest range of the axis of a flow velocity [thermal speeds]
 SIGNIFICANT = 5.99  # 95 % quantile of chi^2 with two degrees of freedom
-UNEQUAL = (
-    9.0  # mean of the squared difference of kT_x and kT_y [squared errors] that is significant
-)
+#: Significant mean of the squared differences of kT_x and kT_y, in units of the squared errors.
+UNEQUAL = 9.0
 #: Text and unit of the axis label of each field.
 LABELS = {
     "density": ("number density n", "number density"),
