@@ -27,8 +27,8 @@ from ricochet.figures.drawing import (
     plt,
     radius_marks,
     sample_of,
-    scale_top,
     species_colours,
+    top_of,
     species_legend,
     values_of,
     warn,
@@ -74,7 +74,8 @@ def animate(
     figure, axes = plt.subplots(figsize=(max(width, 3.6), height + 0.75), dpi=100)
     style = {}
     if colour != "species":
-        limits = limits_of(colour, scale_top(run, frames, colour))
+        sample = sample_of(run, frames, colour)
+        limits = limits_of(colour, top_of(sample))
         style = {"cmap": colour_map(colour), "clim": limits}
 
     def show(frame: int) -> EllipseCollection:
@@ -92,9 +93,7 @@ def animate(
     if colour == "species":
         species_legend(figure, run)
     else:
-        beyond = (
-            "neither" if colour == "psi6" else exceeded(sample_of(run, frames, colour), *limits)
-        )
+        beyond = exceeded(sample, *limits)
         figure.colorbar(disks, label=label_of(run, colour), shrink=0.8, extend=beyond)
         species_legend(figure, run, by_outline=True)
     warn(figure, [run.termination_note] if run.termination_note else [])

@@ -180,8 +180,7 @@ def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
     values in the last frame.  If the colours show any other quantity, the quantile is computed from
     the values in about 40 frames.
     """
-    values = sample_of(run, frames, colour)
-    return top_of(np.abs(values[values != 0]))
+    return top_of(sample_of(run, frames, colour))
 
 
 def sample_of(run: Run, frames: Sequence[int], colour: str) -> np.ndarray:
@@ -190,12 +189,13 @@ def sample_of(run: Run, frames: Sequence[int], colour: str) -> np.ndarray:
     return values_of(run, sorted({*some, frames[-1]}), colour)
 
 
-def top_of(moved: np.ndarray) -> float:
-    """Return the upper end of a colour scale for positive values: their 99.5 % quantile.
+def top_of(values: np.ndarray) -> float:
+    """Return the upper end of a colour scale: the 99.5 % quantile of the absolute values.
 
-    If all values are equal, the result is twice their value: the lightest colour of the scale is
-    hardly visible on white.
+    Values of 0 are not counted.  If all other values are equal, the result is twice their absolute
+    value, because the lightest colour of the scale is hardly visible on white.
     """
+    moved = np.abs(values[values != 0])
     if len(moved) == 0:
         return 1.0
     top = float(np.quantile(moved, 0.995))
