@@ -309,7 +309,7 @@ def draw_group(
         return Curve(*(part[curve.y > 0] for part in curve))
 
     for panel in ("vacf", "msd", "F_s", "alpha2", "g", "S"):
-        own, drawing = parts(shown, panel), band if panel in ("g", "S") else None
+        own = parts(shown, panel)
         mean, error = row["D_displacement"], row["D_displacement_error"]
         spread = f"{label},  D = {mean:.4g} ± {error:.2g}" if mean and panel == "msd" else label
         shades = ["black", *COLOURS] if keyed == "colours" and len(own) > 1 else [colour]
@@ -319,10 +319,10 @@ def draw_group(
             if not of and panel in ("msd", "vacf"):
                 named = spread + ", all" * bool(named)
             style = line | {"color": shade, "ls": dash, "label": named}
-            if drawing is None:
-                in_time(panels[panel], curve, marker=".", **style)
+            if panel in ("g", "S"):
+                band(panels[panel], *curve, **style)
             else:
-                drawing(panels[panel], *curve, **style)
+                in_time(panels[panel], curve, marker=".", **style)
     if "vacf" in shown:
         in_time(panels["tail"], positive(shown["vacf"]), marker=".", **line)
         if "vacf_tail" in shown:
