@@ -185,7 +185,7 @@ def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[st
     return facts, blocks
 
 
-def names_of(run: Run, kind: str) -> list[str]:
+def boundary_names(run: Run, kind: str) -> list[str]:
     """Return the names of all obstacles or walls: 'wall floor', or 'wall 1' without a name."""
     names = run.parameters.get(kind, {}).get("name", ())
     return [
@@ -279,8 +279,8 @@ def scene(run: Run) -> tuple[dict, dict]:
         "radii": radii.tolist(),
         "surfaces": [
             *(f"the {side} side" for side in SIDES),  # names of partners j <= 0
-            *names_of(run, "obstacle"),
-            *names_of(run, "wall"),
+            *boundary_names(run, "obstacle"),
+            *boundary_names(run, "wall"),
         ],
     }
     blocks = {
