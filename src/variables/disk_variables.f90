@@ -79,7 +79,7 @@ module disk_variables
     variable_t("species", "position", "real", 0, "required", "0.2, 0.5, 0.8, 0.5", &
       "Positions of the disks: x1, y1, x2, y2, ..., one pair for each disk.", unit="length", goes_with="placement explicit"), &
     variable_t("species", "velocities", "text", 1, "default", "'rest'", &
-      "Method that generates the initial velocities. Without this variable, the method is that of the first of the variables " &
+      "Method that generates the initial velocities. Without this variable, the method follows from the one of the variables " &
       //"velocity, speed, temperature and file that is given. In a periodic box without obstacles and gravity, generated " &
       //"velocities have zero total momentum.", &
       choices="rest equal_speed uniform maxwell explicit file"), &
