@@ -174,16 +174,18 @@ contains
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: collisions, events
-    real(real64) :: cpu(2)                                 ! [s]
+    real(real64) :: started, ended                         ! [s] of processor time
 
     collisions = run%sim%tally%collisions
     events = run%sim%tally%events
-    call cpu_time(cpu(1))
+    call cpu_time(started)
     call run%evolution%start(run%sim)
     call main_loop(run, error)
-    call cpu_time(cpu(2))
-    run%rate = (run%sim%tally%collisions - collisions)/max(cpu(2) - cpu(1), 1.0e-9_real64)
-    run%event_rate = (run%sim%tally%events - events)/max(cpu(2) - cpu(1), 1.0e-9_real64)
+    call cpu_time(ended)
+    associate (duration => max(ended - started, 1.0e-9_real64))
+      run%rate = (run%sim%tally%collisions - collisions)/duration
+      run%event_rate = (run%sim%tally%events - events)/duration
+    end associate
     run%serial_events = run%evolution%serial_events
     deallocate (run%evolution)                             ! the completion of the output may need the memory
   end subroutine follow
