@@ -11,8 +11,8 @@ module epochs
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: are_crushed, restart_epoch, begin_first_epoch, ends_by_event, is_at_rest, last_time, most_events, move_epoch
-  public :: stands_still
+  public :: are_crushed, restart_epoch, begin_first_epoch, ends_by_event, ends_by_kick, is_at_rest, last_time, most_events
+  public :: move_epoch, stands_still
 
   !> Intended number of collisions per disk in an epoch. The time origin moves at the end of each epoch, so that times keep their
   !> precision.
@@ -28,7 +28,8 @@ module epochs
   real(real64), parameter :: crushing = 1.0e6_real64 !! growth factor of the energy above which disks are considered crushed
   real(real64), parameter :: densest = 0.9_real64  !! largest packing fraction used in the estimate of the event rate
   !> Largest factor by which a single event may increase the speed of the fastest disk, and largest number of edges of the box that
-  !> a disk may travel in an epoch thereafter. With larger numbers, rounding errors of the time would displace disks noticeably.
+  !> a disk may travel in an epoch thereafter. A kicked disk may not be faster than this number of edges divided by the time since
+  !> the time origin. With larger numbers, rounding errors of the time would displace disks noticeably.
   real(real64), parameter :: farthest = 1.0e3_real64
 
 contains
@@ -37,19 +38,17 @@ contains
   !> moves noticeably.
   pure subroutine begin_first_epoch(sim)
     type(simulation_t), intent(inout) :: sim
-    real(real64) :: fastest, mean
+    real(real64) :: mean                           ! mean squared speed [length**2/time**2]
     integer(int32) :: i
 
     mean = magnitude(sim%box%gravity)*minval(sim%disk%radius) + sim%box%highest_speed()**2
-    fastest = max(mean, sim%fastest_drive()**2)
+    sim%negligible_time = time_to_move(sim, max(sqrt(mean), sim%fastest_drive(), fastest_disk(sim)))
     do i = 1, sim%n_disks()
       associate (v => sim%disk(i)%v)
         mean = mean + dot_product(v, v)/sim%n_disks()
-        fastest = max(fastest, dot_product(v, v))
       end associate
     end do
     mean = mean + sim%fastest_drive()**2
-    sim%negligible_time = time_to_move(sim, sqrt(fastest))
     call begin_epoch(sim, events_per_epoch(sim)/(sqrt(max(mean, tiny(mean)))*sim%n_disks()*events_per_path()))
     sim%last_advance = sim%now
     sim%events_then = sim%tally%events
@@ -98,11 +97,11 @@ contains
   !> procedure also sorts the disks by cells, because all events have to be predicted again after a shift of the time origin in any
   !> case. The next epoch ends at a fixed time and not after a fixed number of events, so that domains that run independently of
   !> each other end the epoch at the same time.
-  !> If a single event has ended the epoch (see `ends_by_event`), a disk can be much faster than before. The time origin then moves
-  !> exactly to the present time.
-  subroutine move_epoch(sim, by_event)
+  !> If a single event or a kick has ended the epoch (see `ends_by_event` and `ends_by_kick`), a disk can be much faster than before.
+  !> The time origin then moves exactly to the present time.
+  subroutine move_epoch(sim, is_urgent)
     type(simulation_t), intent(inout) :: sim
-    logical, intent(in) :: by_event                !! whether a single event has ended the epoch
+    logical, intent(in) :: is_urgent               !! whether a single event or a kick has ended the epoch
     real(real64) :: shift, length
 
     if (sim%now - sim%last_advance >= sim%negligible_time) then
@@ -111,10 +110,11 @@ contains
     end if
     length = (sim%now - sim%epoch_begin)*min(2.0_real64, &
       events_per_epoch(sim)/real(max(sim%tally%events - sim%epoch_events, 1_int64), real64))
-    shift = scale(aint(scale(fraction(sim%now), significant_bits)), exponent(sim%now) - significant_bits)
-    if (by_event) then
+    if (is_urgent) then
       shift = sim%now
       sim%negligible_time = min(sim%negligible_time, time_to_move(sim, fastest_disk(sim)))
+    else
+      shift = scale(aint(scale(fraction(sim%now), significant_bits)), exponent(sim%now) - significant_bits)
     end if
     call renumber(sim)
     call move_origin(sim, shift)
@@ -180,6 +180,23 @@ contains
       possible = max(possible, maxval([(abs(sim%spin(i))*sim%disk(i)%radius, i=1, sim%n_disks())]))
     if (possible*sim%epoch_end > farthest*maxval(sim%box%edges())) yes = possible > farthest*fastest_disk(sim)
   end function ends_by_event
+
+  !> Whether a kick ends the epoch, because it has made a disk so fast that the time since the time origin is no longer exact enough.
+  pure function ends_by_kick(sim, kicked) result(yes)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: kicked(:)        !! (n) indices of the disks that the kick has accelerated
+    logical :: yes
+    real(real64) :: fastest2                       ! largest squared speed [length**2/time**2]
+    integer(int32) :: k
+
+    yes = .false.
+    if (.not. sim%epoch_end > 0) return            ! time-stepped dynamics has no epochs
+    fastest2 = 0
+    do k = 1, size(kicked, kind=int32)
+      fastest2 = max(fastest2, sum(sim%disk(kicked(k))%v**2))
+    end do
+    yes = sqrt(fastest2)*sim%now > farthest*maxval(sim%box%edges())
+  end function ends_by_kick
 
   !> Speed of the fastest disk.
   pure function fastest_disk(sim) result(speed)

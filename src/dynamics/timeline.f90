@@ -4,7 +4,7 @@
 module timeline
   use encounters, only: encounter_text
   use box_geometry, only: wall_normal
-  use epochs, only: are_crushed, ends_by_event, is_at_rest, last_time, most_events, move_epoch, stands_still
+  use epochs, only: are_crushed, ends_by_event, ends_by_kick, is_at_rest, last_time, most_events, move_epoch, stands_still
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t, is_full
   use evolution, only: evolution_t, limits_t
@@ -84,10 +84,16 @@ contains
     do while (arrived .and. sim%time() >= kick_time .and. next_kick(evolution, sim) <= kick_time)
       if (sim%drive%moves_disks()) then
         call recycle_disks(sim, kicked)
-        if (size(kicked) > 0) call evolution%start(sim)
       else
         call kick(sim, kicked)
+      end if
+      if (ends_by_kick(sim, kicked)) then
+        call move_epoch(sim, .true.)
+        call evolution%start(sim)
+      else if (.not. sim%drive%moves_disks()) then
         call evolution%renew(sim, kicked)
+      else if (size(kicked) > 0) then
+        call evolution%start(sim)
       end if
     end do
     sim%events_done = arrived .or. (sim%events_done .and. sim%tally%events == events .and. .not. sim%time() > before)

@@ -423,6 +423,28 @@ def test_slow_disks_that_an_event_makes_fast_are_exact(group, speed):
     assert deepest_overlap(gas, 200) < DEEPEST
 
 
+@pytest.mark.parametrize(
+    "drive",
+    [
+        {"kind": "noise", "keep_momentum": False},
+        {"kind": "andersen", "temperature": 1, "fraction": 0.5},
+        {"kind": "brownian", "temperature": 1},
+    ],
+)
+@pytest.mark.parametrize("speed", [1e-6, 1e-12])
+def test_slow_disks_that_a_kick_makes_fast_are_exact(drive, speed):
+    """A kick after a long time of slow motion makes disks fast."""
+    drive = {"interval": 1 / speed, **drive}
+    if drive["kind"] == "noise":
+        drive["strength"] = speed  # each kick then adds the variance 1
+    disks = {"count": 50, "packing_fraction": 0.1, "speed": speed}
+    gas = Simulation({"species": disks, "drive": drive}).advance(time=0.999 / speed)
+    assert np.abs(gas.velocity).max() < 1e2 * speed
+    while np.abs(gas.velocity).max() < 1e3 * speed:
+        gas.advance(events=gas.events + 1)
+    assert deepest_overlap(gas, 200) < DEEPEST
+
+
 def deepest_overlap(gas: Simulation, events: int) -> float:
     """Return the largest overlap of two disks of equal size during a number of events."""
     deepest, (one, other) = 0.0, np.triu_indices(gas.n_disks, 1)
