@@ -158,11 +158,6 @@ def unfitted(scans: Scans, runs: list[Run]) -> list[str]:
     return notes
 
 
-def fewest(curve: list[Point]) -> int:
-    """Return the smallest number of runs per point, among the points used in the fit."""
-    return min(p.runs for p in curve if p.free)
-
-
 def listed(values: dict[str, float]) -> str:
     """Return the values of the parameters as text."""
     return ",  ".join(f"{name} {value:g}" for name, value in values.items())
@@ -181,8 +176,8 @@ def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
     free = [p for p in curve if p.free]
     x = abscissa(axis, [p.values[axis] for p in free])
     y, error = np.array([p.sizes[name] for p in free]).reshape(-1, 2).T
-    few = min((p.runs for p in free), default=0) < FEWEST_RUNS
-    return fit_power_law(x, y, None if few else error)
+    runs = min((p.runs for p in free), default=0)
+    return fit_power_law(x, y, *((error, runs) if runs >= FEWEST_RUNS else ()))
 
 
 def power(axis: str, curve: list[Point], fit: PowerLaw | None) -> str:
@@ -190,7 +185,7 @@ def power(axis: str, curve: list[Point], fit: PowerLaw | None) -> str:
     if not fit:
         return ""
     exponent = "\\pm".join(rounded_to_error(fit.exponent, fit.exponent_error))
-    missed = f", $\\chi^2$/dof {fit.chi2:.2g}" if fit.misses(fewest(curve)) else ""
+    missed = f", $\\chi^2$/dof {fit.chi2:.2g}" if fit.missed else ""
     return f", $\\propto {SYMBOLS[axis]}^{{{exponent}}}${missed}"
 
 
@@ -289,7 +284,7 @@ def tables(scans: Scans) -> tuple[list[dict], list[dict], list[str]]:
                 fits.append(row | {"chi2/dof": fit.chi2})
                 what = f"{size} against {axis}: the fit does not describe its points; "
                 what += "chi^2 per degree of freedom is "
-                missed += [f"{what}{fit.chi2:.2g}"] * fit.misses(fewest(curve))
+                missed += [f"{what}{fit.chi2:.2g}"] * fit.missed
     return rows, fits, missed
 
 

@@ -97,6 +97,17 @@ def test_68_of_100_exponents_hold_the_true_one_where_scatter_makes_the_error(rng
     assert held == pytest.approx(0.6827, abs=0.04)
 
 
+@pytest.mark.parametrize(("points", "runs"), [(3, 4), (5, 4), (5, 12), (10, 8)])
+def test_68_of_100_exponents_hold_the_true_one_where_runs_make_the_errors(rng, points, runs):
+    """Neither the noise of the weights nor a scatter that chance explains spoils the error."""
+    x, held = np.linspace(1, 30, points), []
+    for _ in range(1000):
+        y = statistics.estimate(x * (1 + 0.05 * rng.normal(size=(runs, points))))
+        fit = statistics.fit_power_law(x, *y, runs)
+        held.append(abs(fit.exponent - 1) < fit.exponent_error)
+    assert np.mean(held) == pytest.approx(0.6827, abs=0.06)
+
+
 @pytest.mark.parametrize("runs", [4, 8])
 def test_a_fit_says_that_it_misses_its_points_as_seldom_as_it_should(rng, runs):
     x, missed = np.linspace(1, 30, 10), np.zeros((2, 1000), int)
@@ -104,7 +115,7 @@ def test_a_fit_says_that_it_misses_its_points_as_seldom_as_it_should(rng, runs):
         for bent in (0, 1):
             y = x**0.7 * (1 + 0.4 * bent * np.sin(x / 3))
             own = statistics.estimate(y * (1 + 0.05 * rng.normal(size=(runs, 10))))
-            missed[bent, k] = statistics.fit_power_law(x, *own).misses(runs)
+            missed[bent, k] = statistics.fit_power_law(x, *own, runs).missed
     assert missed[0].sum() < 20, "by chance 0.5 %"
     assert missed[1].mean() > (0.5 if runs == 4 else 0.99)
 

@@ -63,19 +63,7 @@ class PowerLaw(NamedTuple):
     exponent: float
     exponent_error: float
     chi2: float = float("nan")  # chi^2 per degree of freedom
-    free: int = 0  # degrees of freedom
-
-    def misses(self, runs: int) -> bool:
-        """Return whether the points deviate from the power law by more than their errors explain.
-
-        The test of Welch (1951) takes into account that the errors were estimated from only `runs`
-        runs.
-        """
-        if self.free < 1 or runs < FEWEST_RUNS:
-            return False
-        own, few = student(runs) ** 2 * self.chi2, (self.free + 2) * (runs - 1) / 3
-        ratio = own / (1 + 2 / (runs - 1))
-        return bool(scipy.special.fdtrc(self.free, few, ratio) < UNLIKELY)
+    missed: bool = False  # whether the points deviate from the law by more than their errors explain
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         return self.factor * np.asarray(x, dtype=float) ** self.exponent
@@ -307,11 +295,14 @@ def kurtosis_noise(count: int) -> float:
 
 
 def fit_power_law(
-    x: np.ndarray, y: np.ndarray, y_error: np.ndarray | None = None
+    x: np.ndarray, y: np.ndarray, y_error: np.ndarray | None = None, runs: float = MANY
 ) -> PowerLaw | None:
     """Fit a power law as a weighted straight line of ln y against ln x.
 
-    If the points scatter by more than their errors, the error of the fit is increased accordingly.
+    The weights are estimates, too; their noise increases the error of the exponent, by a factor
+    like that of a weighted mean (Meier, Biometrics 9, 59 (1953)).  If the points deviate from the
+    law by more than their errors explain, the error is multiplied by the square root of chi^2 per
+    degree of freedom.
 
     Parameters
     ----------
@@ -320,6 +311,8 @@ def fit_power_law(
     y_error : numpy.ndarray, optional
         (P,) errors of y; without them all points have equal weights, and the error of the fit
         follows from the scatter of the points
+    runs : float, optional
+        number of runs from which each error of y was estimated; without it the errors are exact
 
     Returns
     -------
@@ -343,7 +336,43 @@ def fit_power_law(
     line, covariance = np.polyfit(log_x, log_y, 1, w=weight, cov="unscaled")
     free = int(good.sum()) - 2
     chi2 = float(np.sum((weight * (log_y - np.polyval(line, log_x))) ** 2) / free)
-    wider = student(free + 1) ** 2 * chi2 if alike else max(1.0, chi2)
+    missed = not alike and points_miss_a_law(chi2, free, runs)
+    if alike:
+        wider = student(free + 1) ** 2 * chi2
+    else:
+        noise = 1 + 4 * free / ((free + 2) * (runs - 1))  # of the weights
+        wider = max(1.0, noise / student(runs) ** 2) * (chi2 if missed else 1.0)
     error = float(np.sqrt(covariance[0, 0] * wider))
     factor, exponent = np.exp(line[1]), line[0]
-    return PowerLaw(float(factor), float(exponent), error, np.nan if alike else chi2, free)
+    return PowerLaw(float(factor), float(exponent), error, np.nan if alike else chi2, missed)
+
+
+def points_miss_a_law(chi2: float, free: int, runs: float) -> bool:
+    """Determine whether points deviate from a law by more than their errors explain.
+
+    The test takes into account that the errors are estimates (Welch, Biometrika 38, 330 (1951)).
+
+    Parameters
+    ----------
+    chi2 : float
+        chi^2 per degree of freedom, calculated with errors that include Student's factor
+    free : int
+        degrees of freedom: number of points minus the two parameters of the law
+    runs : float
+        number of runs from which the error of each point was estimated
+
+    Returns
+    -------
+    bool
+        whether the probability of a larger chi^2 by chance is less than 0.5 %
+
+    Examples
+    --------
+    >>> points_miss_a_law(4.0, 8, 100), points_miss_a_law(4.0, 8, 3)
+    (True, False)
+    """
+    if free < 1:
+        return False
+    denominator = (free + 2) * (runs - 1) / 3
+    ratio = student(runs) ** 2 * chi2 / (1 + 2 / (runs - 1))
+    return bool(scipy.special.fdtrc(free, denominator, ratio) < UNLIKELY)
