@@ -10,8 +10,10 @@ on the figure.  Points are means over the runs, with error bars.  Lines are weig
 A x^p.  For the restitution xi, the variable x = 1 - xi^2 is the fraction of the normal energy that
 a collision dissipates.  The exponents are printed with chi^2 per degree of freedom.  If a fit does
 not describe its points, a warning is printed.  If a point of a curve is the mean of fewer than four
-runs, all points of the curve have equal weights.  If the points of a curve have equal weights, the
-error of the exponent is determined from the deviations of the points from the fit.  Points with
+runs, all points of the curve have equal weights.  The error of the exponent is determined from the
+scatter between the beds (jackknife) if all points of a curve are means over runs with the same
+seeds, otherwise from the errors of the points, or from their deviations from the fit if the points
+have equal weights.  Points with
 open symbols are not used in fits.  A point is not used in fits if the number of collisions with
 walls exceeds 1 % of the number of disks, because the walls then affect the crater.  A point is also
 not used in fits if some of its runs reached `stop.time` before the energy had fallen to the
@@ -63,6 +65,7 @@ EXTENTS = {"width": "width of the displaced", "depth": "depth of the displaced"}
 EXTENTS |= {"hole_width": "width of the hole", "hole_depth": "depth of the hole"}
 ALL = SIZES | EXTENTS
 MARKERS = "osDv"
+NONE = Estimate(np.nan, np.nan)  # exponent of a curve without a fit
 FEWEST_POINTS = 3  # smallest number of points that is fitted
 
 
@@ -70,12 +73,18 @@ class Point(NamedTuple):
     """The craters of all runs that differ only by their seed."""
 
     values: dict[str, float]  # of AXES
-    runs: int
-    sizes: dict[str, Estimate]
+    seeds: tuple[int, ...]  # of the R runs
+    of_runs: dict[str, np.ndarray]  # (R,) sizes in each run
+    sizes: dict[str, Estimate]  # means over the runs
     energy_left: Estimate
     side_collisions: Estimate  # per run
     by_time: bool  # some runs reached stop.time before the energy fraction
     free: bool  # limited by neither time nor walls
+
+    @property
+    def runs(self) -> int:
+        """The number of runs."""
+        return len(self.seeds)
 
 
 Scans = dict[str, list[list[Point]]]  # the curves of each parameter; points in ascending order
@@ -93,15 +102,18 @@ def key_of(run: Run) -> tuple[float, ...]:
 
 def point(key: tuple[float, ...], runs: list[Run]) -> Point:
     """Return the mean crater sizes over runs with equal parameters."""
+    runs = sorted(runs, key=lambda run: run.seed)
     craters = [crater(run) for run in runs]
-    sizes = {name: estimate([getattr(c, name) for c in craters]) for name in ALL}
+    sizes = {name: np.array([getattr(c, name) for c in craters], dtype=float) for name in ALL}
+    means = {name: estimate(own) for name, own in sizes.items()}
     left, hits = (
         estimate([getattr(c, name) for c in craters]) for name in ("energy_left", "side_collisions")
     )
     by_time = any(ended_by_time(*one) for one in zip(runs, craters, strict=True))
     free = not by_time and not box_takes_part(runs[0], hits.mean)
     values = dict(zip(AXES, key, strict=True))
-    return Point(values, len(runs), sizes, left, hits, by_time, free)
+    seeds = tuple(run.seed for run in runs)
+    return Point(values, seeds, sizes, means, left, hits, by_time, free)
 
 
 def others(axis: str, curve: list[Point]) -> dict[str, float]:
@@ -171,13 +183,24 @@ def abscissa(axis: str, x: np.ndarray) -> np.ndarray:
 def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
     """Fit a power law to a crater size.
 
-    All points have equal weights if any point is the mean of fewer than four runs.
+    All points have equal weights if any point is the mean of fewer than four runs.  If all points
+    are means over the same beds, the sizes at different points are correlated, and the error of the
+    exponent is that of the jackknife: the fit is repeated without each bed in turn.
     """
     free = [p for p in curve if p.free]
     x = abscissa(axis, [p.values[axis] for p in free])
     y, error = np.array([p.sizes[name] for p in free]).reshape(-1, 2).T
     runs = min((p.runs for p in free), default=0)
-    return fit_power_law(x, y, *((error, runs) if runs >= FEWEST_RUNS else ()))
+    weights = (error, runs) if runs >= FEWEST_RUNS else ()
+    fit = fit_power_law(x, y, *weights)
+    if fit is None or fit.missed or len({p.seeds for p in free}) > 1 or runs < 2:
+        return fit
+    each = np.array([p.of_runs[name] for p in free])
+    rest = (each.sum(axis=1, keepdims=True) - each) / (runs - 1)
+    if not rest.min() > 0:
+        return fit
+    exponents = np.array([fit_power_law(x, some, *weights).exponent for some in rest.T])
+    return fit._replace(exponent_error=float(estimate((1 - runs) * exponents).error))
 
 
 def power(axis: str, curve: list[Point], fit: PowerLaw | None) -> str:
@@ -265,10 +288,20 @@ def draw(runs: list[Run], scans: Scans) -> plt.Figure:
     return figure
 
 
-def tables(scans: Scans) -> tuple[list[dict], list[dict], list[str]]:
-    """Return a table of points, a table of fits, and warnings about fits of poor quality."""
-    rows, fits, missed = [], [], []
+class Tables(NamedTuple):
+    """Results of a scan."""
+
+    points: list[dict]
+    fits: list[dict]
+    data: list[dict]  # the points, each with the exponents of its curve
+    missed: list[str]  # warnings about fits that do not describe their points
+
+
+def tables(scans: Scans) -> Tables:
+    """Return the points and the fits of all curves."""
+    found = Tables([], [], [], [])
     for axis, curve in ((axis, curve) for axis, scan in scans.items() for curve in scan):
+        rows = []
         for p in curve:
             row = {"scan": axis, **p.values, "runs": p.runs}
             for name, size in p.sizes.items():
@@ -276,25 +309,32 @@ def tables(scans: Scans) -> tuple[list[dict], list[dict], list[str]]:
             row |= measured("energy_left", p.energy_left)
             row |= measured("side_collisions", p.side_collisions)
             rows.append(row | {"ended_by_time": int(p.by_time), "in_fit": int(p.free)})
+        exponents = {}
         for size in ALL:
-            if fit := fit_of(axis, curve, size):
+            fit = fit_of(axis, curve, size)
+            exponent = Estimate(fit.exponent, fit.exponent_error) if fit else NONE
+            exponents |= measured(f"{size}_exponent", exponent)
+            if fit:
                 row = {"scan": axis, **curve[0].values, axis: None, "size": size}
                 row |= {"of": "1 - xi^2" if axis == "restitution" else axis}
-                row |= measured("exponent", Estimate(fit.exponent, fit.exponent_error))
-                fits.append(row | {"chi2/dof": fit.chi2})
+                row |= measured("exponent", exponent)
+                found.fits.append(row | {"chi2/dof": fit.chi2})
                 what = f"{size} against {axis}: the fit does not describe its points; "
                 what += "chi^2 per degree of freedom is "
-                missed += [f"{what}{fit.chi2:.2g}"] * fit.missed
-    return rows, fits, missed
+                found.missed.extend([f"{what}{fit.chi2:.2g}"] * fit.missed)
+        found.points.extend(rows)
+        found.data.extend(row | exponents for row in rows)
+    return found
 
 
 def main() -> None:
     args = command_line(__doc__, "crater_scan.png").parse_args()
     points = [point(*one) for one in grouped(args.runs, key_of)]
     scans = scanned(points)
-    *results, missed = tables(scans)
-    notes = [*unfitted(scans, args.runs), *unused(points, scans), *missed]
-    report(args, draw(args.runs, scans), *results, notes=notes)
+    found = tables(scans)
+    notes = [*unfitted(scans, args.runs), *unused(points, scans), *found.missed]
+    figure = draw(args.runs, scans)
+    report(args, figure, found.points, found.fits, data=found.data, notes=notes)
 
 
 if __name__ == "__main__":

@@ -63,7 +63,7 @@ class PowerLaw(NamedTuple):
     exponent: float
     exponent_error: float
     chi2: float = float("nan")  # chi^2 per degree of freedom
-    missed: bool = False  # whether the points deviate from the law by more than their errors explain
+    missed: bool = False  # whether points deviate from the law by more than their errors explain
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         return self.factor * np.asarray(x, dtype=float) ** self.exponent
