@@ -6,14 +6,13 @@ The script reads the mass, speed and radius of the projectile and the coefficien
 from each run.  Runs that differ in only one parameter form a curve against that parameter.  For
 each parameter with at least one curve there is a panel; along each curve in the panel, the other
 three parameters are constant.  Runs that belong to no curve are listed in the printed warnings and
-on the figure.  Points are means over the runs, with error bars.  Lines are weighted fits of size =
-A x^p.  For the restitution xi, the variable x = 1 - xi^2 is the fraction of the normal energy that
-a collision dissipates.  The exponents are printed with chi^2 per degree of freedom.  If a fit does
-not describe its points, a warning is printed.  If a point of a curve is the mean of fewer than four
-runs, all points of the curve have equal weights.  The error of the exponent is determined from the
-scatter between the beds (jackknife) if all points of a curve are means over runs with the same
-seeds, otherwise from the errors of the points, or from their deviations from the fit if the points
-have equal weights.  Points with
+on the figure.  Points are means over the runs, with error bars.  Lines are fits of size = A x^p, in
+which all points have equal weights.  For the restitution xi, the variable x = 1 - xi^2 is the
+fraction of the normal energy that a collision dissipates.  The exponents are printed with chi^2 per
+degree of freedom.  If a fit does not describe its points, a warning is printed.  The error of an
+exponent is determined from the scatter between the beds (jackknife) if all points of a curve are
+means over runs with the same seeds, and otherwise from the errors of the points.  If each point is
+a single run, the error is determined from the deviations of the points from the fit.  Points with
 open symbols are not used in fits.  A point is not used in fits if the number of collisions with
 walls exceeds 1 % of the number of disks, because the walls then affect the crater.  A point is also
 not used in fits if some of its runs reached `stop.time` before the energy had fallen to the
@@ -38,7 +37,6 @@ from ricochet.analysis.crater import (
     projectile,
 )
 from ricochet.analysis.estimates import (
-    FEWEST_RUNS,
     Estimate,
     PowerLaw,
     estimate,
@@ -183,23 +181,22 @@ def abscissa(axis: str, x: np.ndarray) -> np.ndarray:
 def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
     """Fit a power law to a crater size.
 
-    All points have equal weights if any point is the mean of fewer than four runs.  If all points
-    are means over the same beds, the sizes at different points are correlated, and the error of the
-    exponent is that of the jackknife: the fit is repeated without each bed in turn.
+    If all points are means over the same beds, the sizes at different points are correlated, and
+    the error of the exponent is that of the jackknife: the fit is repeated without each bed in
+    turn.
     """
     free = [p for p in curve if p.free]
     x = abscissa(axis, [p.values[axis] for p in free])
     y, error = np.array([p.sizes[name] for p in free]).reshape(-1, 2).T
     runs = min((p.runs for p in free), default=0)
-    weights = (error, runs) if runs >= FEWEST_RUNS else ()
-    fit = fit_power_law(x, y, *weights)
+    fit = fit_power_law(x, y, *((error, runs) if runs > 1 else ()))
     if fit is None or fit.missed or len({p.seeds for p in free}) > 1 or runs < 2:
         return fit
     each = np.array([p.of_runs[name] for p in free])
     rest = (each.sum(axis=1, keepdims=True) - each) / (runs - 1)
     if not rest.min() > 0:
         return fit
-    exponents = np.array([fit_power_law(x, some, *weights).exponent for some in rest.T])
+    exponents = np.array([fit_power_law(x, some).exponent for some in rest.T])
     return fit._replace(exponent_error=float(estimate((1 - runs) * exponents).error))
 
 

@@ -133,7 +133,7 @@ def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
     assert [p.free for p in slow] == [True, True, False]
     assert crater_scan.fit_of("mass", slow, "displaced") is None, "two free points"
     three = crater_scan.fit_of("mass", [p._replace(free=True) for p in slow], "displaced")
-    assert np.isnan(three.chi2), "two runs a point do not say how far they scatter"
+    assert not three.missed, "two runs a point do not say how far they scatter"
     figure = crater_scan.draw(runs, scans)
     legends = [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]
     assert {"speed 2", "speed 5", "mass 5", "mass 10", "mass 15"} <= set(legends)
@@ -153,7 +153,7 @@ def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("shared", [True, False])
-@pytest.mark.parametrize("runs", [3, 8])
+@pytest.mark.parametrize("runs", [2, 8])
 def test_68_of_100_exponents_hold_the_true_one_whether_points_share_beds(rng, shared, runs):
     """A bed with a large crater increases the sizes at all points that it shares."""
     none = statistics.Estimate(0.0, 0.0)

@@ -25,7 +25,7 @@ __all__ = [
     "student",
 ]
 
-FEWEST_RUNS = 4  # smallest number of runs whose scatter is used as a weight
+FEWEST_RUNS = 4  # smallest number of runs whose scatter is used as a measured value
 UNLIKELY = 0.005  # probability below which a deviation is regarded as significant
 MANY = 1e12  # degrees of freedom of a known error
 ONE_SIGMA = float(scipy.special.ndtr(1))  # importing scipy.stats takes a second
@@ -57,12 +57,12 @@ class LawTest(NamedTuple):
 
 
 class PowerLaw(NamedTuple):
-    """Power law y = factor x^exponent, with the error of the exponent from a weighted fit."""
+    """Power law y = factor x^exponent, with the error of the exponent."""
 
     factor: float
     exponent: float
     exponent_error: float
-    chi2: float = float("nan")  # chi^2 per degree of freedom
+    chi2: float = float("nan")  # chi^2 per degree of freedom, of the best line
     missed: bool = False  # whether points deviate from the law by more than their errors explain
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
@@ -297,20 +297,19 @@ def kurtosis_noise(count: int) -> float:
 def fit_power_law(
     x: np.ndarray, y: np.ndarray, y_error: np.ndarray | None = None, runs: float = MANY
 ) -> PowerLaw | None:
-    """Fit a power law as a weighted straight line of ln y against ln x.
+    """Fit a power law as a straight line of ln y against ln x; all points have equal weights.
 
-    The weights are estimates, too; their noise increases the error of the exponent, by a factor
-    like that of a weighted mean (Meier, Biometrics 9, 59 (1953)).  If the points deviate from the
-    law by more than their errors explain, the error is multiplied by the square root of chi^2 per
-    degree of freedom.
+    Weights from the errors of few runs would be too noisy: with four runs they would increase the
+    scatter of the exponent, and its error would be too small.  If the points deviate from the law
+    by more than their errors explain, the error of the exponent is multiplied by the square root of
+    chi^2 per degree of freedom.
 
     Parameters
     ----------
     x, y : numpy.ndarray
         (P,) the points; points with a coordinate that is not positive are left out
     y_error : numpy.ndarray, optional
-        (P,) errors of y; without them all points have equal weights, and the error of the fit
-        follows from the scatter of the points
+        (P,) errors of y; without them the error of the fit follows from the scatter of the points
     runs : float, optional
         number of runs from which each error of y was estimated; without it the errors are exact
 
@@ -332,19 +331,23 @@ def fit_power_law(
     good = (x > 0) & (y > 0) & (y_error > 0)
     if len(np.unique(x[good])) < 3:
         return None
-    log_x, log_y, weight = np.log(x[good]), np.log(y[good]), y[good] / y_error[good]
-    line, covariance = np.polyfit(log_x, log_y, 1, w=weight, cov="unscaled")
+    log_x, log_y, relative = np.log(x[good]), np.log(y[good]), y_error[good] / y[good]
     free = int(good.sum()) - 2
-    chi2 = float(np.sum((weight * (log_y - np.polyval(line, log_x))) ** 2) / free)
-    missed = not alike and points_miss_a_law(chi2, free, runs)
+    exponent, offset = map(float, np.polyfit(log_x, log_y, 1))
+    factor = float(np.exp(offset))
+    share = log_x - log_x.mean()
+    share /= share @ share  # the exponent is the sum of the products share * log_y
     if alike:
-        wider = student(free + 1) ** 2 * chi2
-    else:
-        noise = 1 + 4 * free / ((free + 2) * (runs - 1))  # of the weights
-        wider = max(1.0, noise / student(runs) ** 2) * (chi2 if missed else 1.0)
-    error = float(np.sqrt(covariance[0, 0] * wider))
-    factor, exponent = np.exp(line[1]), line[0]
-    return PowerLaw(float(factor), float(exponent), error, np.nan if alike else chi2, missed)
+        rest = log_y - (offset + exponent * log_x)
+        error = student(free + 1) * np.sqrt(rest @ rest / free * (share @ share))
+        return PowerLaw(factor, exponent, float(error))
+    variance = (share * relative / student(runs)) ** 2
+    degrees = (runs - 1) * variance.sum() ** 2 / np.sum(variance**2)  # Welch and Satterthwaite
+    line = np.polyfit(log_x, log_y, 1, w=1 / relative)
+    chi2 = float(np.sum(((log_y - np.polyval(line, log_x)) / relative) ** 2) / free)
+    missed = points_miss_a_law(chi2, free, runs)
+    error = student(degrees + 1) * np.sqrt(variance.sum() * (chi2 if missed else 1.0))
+    return PowerLaw(factor, exponent, float(error), chi2, missed)
 
 
 def points_miss_a_law(chi2: float, free: int, runs: float) -> bool:
@@ -371,7 +374,7 @@ def points_miss_a_law(chi2: float, free: int, runs: float) -> bool:
     >>> points_miss_a_law(4.0, 8, 100), points_miss_a_law(4.0, 8, 3)
     (True, False)
     """
-    if free < 1:
+    if free < 1 or runs < FEWEST_RUNS:
         return False
     denominator = (free + 2) * (runs - 1) / 3
     ratio = student(runs) ** 2 * chi2 / (1 + 2 / (runs - 1))
