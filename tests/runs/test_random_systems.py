@@ -49,7 +49,7 @@ ASIDE = re.compile(
 )
 
 
-MOVING_SIDE = re.compile(r"/observables/sides/\w+/(position|velocity)/value")
+AT_LAST_SAMPLE = re.compile(r"/observables/(virial_pressure|sides/\w+/(position|velocity))/value")
 
 
 class End(NamedTuple):
@@ -268,14 +268,14 @@ def last_samples(found: dict) -> dict:
     """Return the values of the last samples without their sample numbers.
 
     A run without any further event ends at its last sample.  The time of this sample affects only
-    the positions of moving sides.
+    the positions of moving sides, and the mean pressure since the start.
     """
     return {
         name: value[-1:]
         for name, value in found.items()
         if name.startswith(("/particles", "/observables"))
         and name.endswith("/value")
-        and not (bytes(found["/provenance@note"]) and MOVING_SIDE.match(name))
+        and not (bytes(found["/provenance@note"]) and AT_LAST_SAMPLE.match(name))
     }
 
 

@@ -495,6 +495,10 @@ class Draw:
                 words += self.maybe(0.9, " at_rest = .true.")
         if self.chance(0.3) or self.steps or self.driven or self.drifts or self.disks < 4:
             words += f" time = {rng.uniform(0.01, 1) * min(self.edges) / self.speed!r}"
+        elif max(self.edges) > 30 * min(
+            self.edges
+        ):  # events are so rare that samples fill the disk
+            words += f" time = {100 * min(self.edges) / self.speed!r}"
         return words + " /"
 
     def output(self) -> str:
