@@ -259,12 +259,11 @@ number of runs. The columns are:
   Errors with Student's t make this ratio larger than 1.
 - *three*: the coverage of means over three bars, whose errors follow from their scatter.
 
-Three rows of the craters are outside of the limits. The numbers of disks that a projectile as light
+Four rows of the craters are outside of the limits. The numbers of disks that a projectile as light
 as a disk hits or displaces have a skewed distribution (skewness 2.2). Four values of such a
 distribution often contain no large value; then their mean and their error are both too small. In
 random choices from 240 craters, 16 values have a coverage of 64 %, and 64 values one of 67 %. The
-errors of the exponents are too large, because the fit widens the error whenever chance lets three
-points scatter by more than their errors.
+exponents follow from these numbers, and their errors are too small for the same reason.
 
 | system | quantity | bars | coverage | error / scatter | three |
 |---|---|---|---|---|---|
