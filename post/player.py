@@ -45,7 +45,7 @@ from matplotlib.colors import to_hex
 
 PAGE = Path(__file__).with_name("page")  # the parts of the page
 INPUTS = Path(__file__).resolve().parents[1] / "input"
-SCRIPTS = ("film", "camera", "stage", "panels", "controls", "stream", "live")
+SCRIPTS = ("film", "camera", "stage", "panels", "sliders", "controls", "stream", "live")
 SWING = ("amplitude", "period", "phase")  # variables of an oscillating side
 STROKE = ("velocity", "start_time", "end_time")
 LAWS = ("motion", *SWING, *STROKE, "temperature", "surface_velocity")
@@ -368,7 +368,8 @@ def lab_page(data: dict) -> str:
 
     The argument `data` contains the table of input variables and the input files.
     """
-    style, script = text_of("style.css") + text_of("lab.css"), text_of("lab.js")
+    style = text_of("style.css") + text_of("lab.css")
+    script = text_of("sliders.js") + text_of("lab.js")
     more = "connect-src 'self'", "img-src data:", "frame-src 'self'"
     fillings = {"policy": policy(style, script, *more), "style": style, "script": script}
     return filled("lab.html", fillings | {"data": enclosed(data)})

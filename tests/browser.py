@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 import subprocess
+import time
 import urllib.request
 from pathlib import Path
 
@@ -58,8 +59,23 @@ class Browser:
     def resize(self, width: int, height: int, phone: bool = False) -> None:
         """Set the size of the page itself, as on a device."""
         metrics = {"width": width, "height": height, "deviceScaleFactor": 2 if phone else 1}
-        body = {"cmd": "Emulation.setDeviceMetricsOverride", "params": metrics | {"mobile": phone}}
-        self.call("POST", "/goog/cdp/execute", body)
+        self.protocol("Emulation.setDeviceMetricsOverride", **metrics, mobile=phone)
+
+    def protocol(self, command: str, **params) -> object:
+        """Execute a command of the protocol of Chromium's developer tools."""
+        return self.call("POST", "/goog/cdp/execute", {"cmd": command, "params": params})
+
+    def touch(self, *places: tuple[float, float], lifted: bool = True) -> None:
+        """Move a finger along a path in window coordinates, as on a screen that it can scroll.
+
+        A finger that rests before it is lifted leaves no motion of the page behind.
+        """
+        kinds = ["touchStart"] + ["touchMove"] * (len(places) - 1)
+        for kind, (x, y) in zip(kinds, places, strict=True):
+            self.protocol("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y}])
+        if lifted:
+            time.sleep(0.1 if len(places) > 1 else 0)
+            self.protocol("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
 
     def complaints(self) -> list[dict]:
         return self.call("POST", "/se/log", {"type": "browser"})

@@ -166,36 +166,48 @@ function zoomBy(factor, px, py) {
 
 // ---------- in the laboratory: dragging of a side during the simulation, or of a disk during a pause ----------
 
-let grabbed = null;  // { side } or { disk }, and when the worker was last told [ms]
+// { side } or { disk }, the pointer, its first position, the distance from there to the side or disk, and when the worker was last told [ms]
+let grabbed = null;
 const HOLDABLE = [undefined, 'still', 'constant_velocity', 'piston'], TOLD_AGAIN = 100;
+const isFinger = ({ pointerType }) => pointerType === 'touch', reachOf = (event, mouse) => isFinger(event) ? 22 : mouse;  // [CSS pixels]
 
-// Returns the side or the disk at a point of the canvas, if the user can drag the side or the disk.
-function grabAt(px, py) {
+// Returns the side or the disk at a point of the canvas, if the user can drag the side or the disk. A finger can drag only the disk
+// whose trace is shown: wherever else it starts, it scrolls the page or moves the picture, even where disks are dense.
+function grabAt(px, py, event) {
   if (!isPart || !(state.playing ? stream.live : moment.time === last())) return null;
+  const own = { pointer: event.pointerId, from: [px, py] }, away = (x, y) => [x - backAcross(px), y - backUp(py)];
   if (!state.playing) {
-    const i = diskAt(px, py, 0);
-    return i === null ? null : { disk: i };
+    const i = isFinger(event) ? diskAt(px, py, reachOf(event), state.traced) : diskAt(px, py, 0);
+    return i === null ? null : { ...own, disk: i, away: away(X[i], Y[i]) };
   }
-  const [x0, x1, y0, y1] = sidesAt(moment.shown), reach = 10 * page.dots, gaps = [x0, x1].map(x => Math.abs(across(x) - px)).concat([y0, y1].map(y => Math.abs(up(y) - py)));
+  const [x0, x1, y0, y1] = sidesAt(moment.shown), reach = reachOf(event, 10) * page.dots, gaps = [x0, x1].map(x => Math.abs(across(x) - px)).concat([y0, y1].map(y => Math.abs(up(y) - py)));
   const side = gaps.findIndex((gap, k) => gap < reach && !film.periodic[k >> 1] && HOLDABLE.includes(film.sides[k].motion));
-  return side < 0 ? null : { side, told: 0 };
+  return side < 0 ? null : { ...own, side, away: side < 2 ? away([x0, x1][side], 0) : away(0, [y0, y1][side - 2]), told: -Infinity };
 }
+
+// Returns whether the browser would scroll the page by the motion that drags what is grabbed. Up and down along a side at the left or
+// right, the page is scrolled.
+const keepsFromScrolling = () => grabbed !== null && !(grabbed.side < 2);
 
 function drag(px, py) {
-  const { side, disk, told } = grabbed;
+  const { side, disk, from, away, told } = grabbed, to = [backAcross(px) + away[0], backUp(py) + away[1]];
   if (disk !== undefined) {
-    [X[disk], Y[disk]] = grabbed.to = [backAcross(px), backUp(py)];
+    [X[disk], Y[disk]] = grabbed.to = to;
     drawStage();
-  } else if (performance.now() > told + TOLD_AGAIN) {
-    grabbed.told = performance.now();
-    send({ do: 'hold', side, to: side < 2 ? backAcross(px) : backUp(py) });
+    return;
   }
+  const axis = side >> 1, isAlong = told < 0 && Math.abs([px, py][axis] - from[axis]) < SLIP * page.dots;
+  if (isAlong || performance.now() < told + TOLD_AGAIN) return;
+  grabbed.told = performance.now();
+  send({ do: 'hold', side, to: to[axis] });
 }
 
-function release() {
-  const { side, disk, to } = grabbed;
+// Ends the dragging. A gesture that the browser cancels leaves a disk where it was.
+function release(cancelled) {
+  const { side, disk, to, told } = grabbed;
   grabbed = null;
-  if (side !== undefined) send({ do: 'hold', side, to: null });
+  if (side !== undefined && told >= 0) send({ do: 'hold', side, to: null });
+  if (to && cancelled) show(moment.time, true);
   else if (to) send({ do: 'place', disk, position: to });
 }
 
@@ -206,8 +218,11 @@ function pointerMoved(event) {
   pointers.set(event.pointerId, here);
   const dx = here[0] - before[0], dy = here[1] - before[1];
   moved += Math.hypot(dx, dy);
-  if (moved < 6 * page.dots) return;
-  if (grabbed) { drag(...here); return; }
+  if (moved < SLIP * page.dots) return;
+  if (grabbed) {
+    if (grabbed.pointer === event.pointerId) drag(...here);
+    return;
+  }
   if (others.length) {
     const distance = place => Math.hypot(place[0] - others[0][0], place[1] - others[0][1]);
     zoom(distance(here) / Math.max(1, distance(before)), (here[0] + others[0][0]) / 2, (here[1] + others[0][1]) / 2);
@@ -216,10 +231,10 @@ function pointerMoved(event) {
 }
 
 // Returns the disk nearest to a point of the canvas, or null if the distance of the point from the rim of the disk exceeds a limit
-// in CSS pixels.
-function diskAt(px, py, distance) {
+// in CSS pixels. The disk is one of a list, or any.
+function diskAt(px, py, distance, list = Array(disks).keys()) {
   let nearest = null, least = distance * page.dots;
-  for (let i = 0; i < disks; i++) {
+  for (const i of list) {
     const reach = (radii[sizeOf[i]] + least) / view.unit;
     copies([X[i] - reach, X[i] + reach], [Y[i] - reach, Y[i] + reach], (dx, dy) => {
       const gap = Math.hypot(across(X[i] + dx) - px, up(Y[i] + dy) - py) - radii[sizeOf[i]];
@@ -230,8 +245,8 @@ function diskAt(px, py, distance) {
 }
 
 // Shows the path of the disk nearest to a point of the canvas, or no path if no disk is near.
-function pick(px, py) {
-  const i = diskAt(px, py, 12);
+function pick(px, py, event) {
+  const i = diskAt(px, py, reachOf(event, 12));
   trace(i === null ? [] : [i]);
 }
 
@@ -273,21 +288,28 @@ function listen() {
     button.innerHTML = `<svg viewBox="0 0 24 24"><path d="${button.dataset.path}"/></svg>`;
   for (const [id, action] of Object.entries(actions)) on(id, action);
   $('full').hidden = !document.fullscreenEnabled;
-  $('scrub').addEventListener('input', () => go(first() + $('scrub').value * (last() - first())));
-  $('pace').addEventListener('input', () => { follow(false); refresh(); if (isPart) parent.paced(window); });
+  onSlide($('scrub'), () => go(first() + $('scrub').value * (last() - first())));
+  onSlide($('pace'), () => { follow(false); refresh(); if (isPart) parent.paced(window); });
   $('colour').addEventListener('change', () => { state.colour = $('colour').value; refresh(); });
   const stage = $('stage');
   stage.addEventListener('pointerdown', event => {
-    if (!pointers.size) [moved, grabbed] = [0, grabAt(...onStage(event))];
-    pointers.set(event.pointerId, onStage(event));
+    const here = onStage(event);
+    if (!pointers.size) [moved, grabbed] = [0, grabAt(...here, event)];
+    else if (moved < SLIP * page.dots) grabbed = null;  // two fingers zoom
+    pointers.set(event.pointerId, here);
     stage.setPointerCapture(event.pointerId);
   });
+  // The browser sends this event after `pointerdown`. A listener that is not passive can keep the page from being scrolled.
+  stage.addEventListener('touchstart', event => { if (keepsFromScrolling()) event.preventDefault(); }, { passive: false });
   stage.addEventListener('pointermove', pointerMoved);
-  stage.addEventListener('pointercancel', event => { if (pointers.delete(event.pointerId) && grabbed) release(); });
+  stage.addEventListener('pointercancel', event => {
+    pointers.delete(event.pointerId);
+    if (grabbed?.pointer === event.pointerId) release(true);
+  });
   stage.addEventListener('pointerup', event => {
-    if (grabbed && moved >= 6 * page.dots) release();
-    grabbed = null;
-    if (pointers.delete(event.pointerId) && moved < 6 * page.dots) pick(...onStage(event));
+    const isClick = moved < SLIP * page.dots;
+    if (grabbed?.pointer === event.pointerId) { if (isClick) grabbed = null; else release(false); }
+    if (pointers.delete(event.pointerId) && isClick) pick(...onStage(event), event);
   });
   stage.addEventListener('wheel', event => {
     event.preventDefault();

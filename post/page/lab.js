@@ -112,7 +112,7 @@ function buildSlider(spec) {
     make('small', { textContent: acts(key) ? 'at once' : 'new run' }), make('div', {}, range, field), make('p', { className: 'problem' }));
   field.setAttribute('aria-label', `${spec.words}: value`);
   let values;
-  range.addEventListener('input', () => set(key, textWith(spec, String(values[range.value]))));
+  onSlide(range, () => set(key, textWith(spec, String(values[range.value]))));
   field.addEventListener('change', () => set(key, textWith(spec, field.value.trim().replaceAll(',', '.'))));
   row.sync = () => {
     const value = numberOf(key, Math.max(at, 0)), text = shownOf(key) || valueOf(key);

@@ -29,6 +29,18 @@ def slide(browser, number, place):
     browser.run(act, number, place)
 
 
+def pixel(browser, x, y):
+    """Return the window coordinates of a position in the box of the newest film."""
+    return browser.run(
+        """const film = filmOf(current()), frame = current().frame.getBoundingClientRect();
+        const box = film.document.getElementById('stage').getBoundingClientRect();
+        const [x, y] = film.pixelOf(...arguments);
+        return [frame.x + box.x + x, frame.y + box.y + y].map(Math.round);""",
+        x,
+        y,
+    )
+
+
 def type_at(browser, number, text):
     """Type a text beside a slider, followed by Enter."""
     field = "document.querySelectorAll('.slider input:not([type])')[arguments[0]].select()"

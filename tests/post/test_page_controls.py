@@ -5,7 +5,7 @@ import random
 import numpy as np
 import pytest
 
-from laboratory_page import inside, moving, slide, type_at
+from laboratory_page import inside, moving, pixel, slide, type_at
 from ricochet import Simulation
 from ricochet.pages.worker import DISKS, setting_lines
 from ricochet.running.program import ProgramError
@@ -147,18 +147,6 @@ def test_the_table_shows_the_moment_that_is_shown(opened):
         assert float(table[1][1]) == pytest.approx(rows[0]["now"], rel=1e-3)
         if key == "\ue011":
             assert [float(row[1]) for row in table[2:4]] == [1, 1]
-
-
-def pixel(browser, x, y):
-    """Return the window coordinates of a position in the box of the newest film."""
-    return browser.run(
-        """const film = filmOf(current()), frame = current().frame.getBoundingClientRect();
-        const box = film.document.getElementById('stage').getBoundingClientRect();
-        const [x, y] = film.pixelOf(...arguments);
-        return [frame.x + box.x + x, frame.y + box.y + y].map(Math.round);""",
-        x,
-        y,
-    )
 
 
 def mouse(browser, *moves):
