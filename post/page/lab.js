@@ -311,6 +311,8 @@ function hear(source, news) {
     box.changes = news.changes ?? box.changes;
     if (box === current()) for (const [, key, value] of box.changes) if (key) state.has[key] = value;
     if (news.reason) tell(news.reason, true);
+    else if (box.refused && $('status').textContent === box.refused) tell(Object.keys(state.waiting).length ? IMPOSSIBLE : '');
+    box.refused = news.reason;
     toAddress();
     tellShelf();
   } else if (news.is === 'file') {

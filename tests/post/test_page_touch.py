@@ -126,6 +126,15 @@ def test_a_selected_disk_follows_the_finger_and_its_buttons_are_seen(touched):
     wait_for(lambda: changes(touched) == ["disk 1 is moved", "disk 1 gets energy"])
 
 
+def test_a_refused_position_is_told_until_the_next_change(touched):
+    paused(touched)
+    touched.run("filmOf(current()).send({ do: 'place', disk: 0, position: [0.001, 0.5] })")
+    wait_for(lambda: "not wholly inside" in touched.run("return $('status').textContent"))
+    touched.run("filmOf(current()).send({ do: 'push', disk: 0 })")
+    wait_for(lambda: changes(touched) == ["disk 1 gets energy"])
+    assert touched.run("return $('status').textContent") == ""
+
+
 def test_a_finger_that_scrolls_over_a_slider_leaves_its_value(touched):
     run = touched.run("return current().run")
     x, y, width, value = touched.run(SLIDER, 3)
