@@ -349,6 +349,31 @@ def test_an_old_python_is_told_before_anything_is_installed(tmp_path):
     assert "3.10.12" in done.stderr and not (tmp_path / "asked").exists()
 
 
+#: Programs with which .ci/set-up works; gfortran, h5fc and sudo are not among them.
+FEW_TOOLS = "awk bash cat cmp dirname env grep head mkdir mktemp mv rm sed sh sort tail"
+
+
+@pytest.mark.parametrize("apt", [True, False])
+def test_who_cannot_install_packages_is_told_which_are_missing(tmp_path, apt):
+    """Neither sudo nor another system than Debian leads to a message of the shell."""
+    (tmp_path / "bin").mkdir()
+    for folder in (".ci", "src"):
+        (tmp_path / folder).mkdir()
+    for file in (".ci/set-up", "src/find_h5fc.sh"):
+        shutil.copy(ROOT / file, tmp_path / file)
+    for name in FEW_TOOLS.split():
+        (tmp_path / "bin" / name).symlink_to(shutil.which(name))
+    executable(tmp_path / "bin/id", "echo 1000", "sh")
+    executable(tmp_path / "bin/python3", "exit 0", "sh")
+    if apt:
+        executable(tmp_path / "bin/apt-get", f"touch '{tmp_path}/asked'", "sh")
+    done = ran(tmp_path / ".ci/set-up", "demo", env=environment(PATH=f"{tmp_path}/bin"))
+    words = "please run as root: apt-get install " if apt else "please install (names as in Debian"
+    assert done.returncode == 1 and not (tmp_path / "asked").exists()
+    assert done.stderr.startswith(f"set-up: {words}") and "gfortran" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
 def test_a_linker_without_version_scripts_makes_the_library(tmp_path):
     """Its flags are left out; the names of the C interface remain visible."""
     refusing = 'case "$*" in *version-script*) exit 1 ;; esac; exec gfortran "$@"'
