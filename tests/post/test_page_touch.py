@@ -1,4 +1,4 @@
-"""The page of the laboratory on tablets and telephones, where the same fingers scroll the page."""
+"""The page of the laboratory on touch screens, where the same fingers scroll the page."""
 
 import pytest
 
