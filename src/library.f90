@@ -24,13 +24,13 @@ module library
   use stop_rules, only: coldness, stop_rule_t
   use system, only: seconds
   use team, only: make_team
-  use texts, only: eol, growing_text_t, lines_of, place_of, text_t, written, written_exactly
+  use texts, only: eol, growing_text_t, lines_of, lower_case, place_of, text_t, written, written_exactly
   use timeline, only: adapted_iterations, advance_once, collapse_note
   use variable_help, only: input_of
   use variables, only: change_of, in_motion, obstacle_groups, row_of
   implicit none
   private
-  public :: advance_to, answer, begin, goal_of, renew_changed, session_of, session_t, text_of
+  public :: advance_to, answer, begin, check_files, goal_of, renew_changed, session_of, session_t, text_of
 
   integer(c_int), parameter :: going_on = 1          !! result of `advance` if the simulation has not yet reached a limit
   integer, parameter :: least_logged = 1000000  !! number of the most recent events that are kept when a full event log is shortened
@@ -190,11 +190,8 @@ contains
     call lines_of(text_of(overrides), lines)
     list = changes_of(session)
     do k = 1, size(lines)
-      associate (line => lines(k)%text)
-        if (change_of(line(:index(line, "=") - 1)) /= in_motion .and. .not. allocated(error)) &
-          call fail(error, exit_usage, line(:index(line, "=") - 1)//": cannot change in a running simulation")
-        list = list//written_exactly(session%sim%time())//" "//line//eol
-      end associate
+      if (.not. allocated(error)) call check_changeable(lines(k)%text, error)
+      list = list//written_exactly(session%sim%time())//" "//lines(k)%text//eol
     end do
     if (.not. allocated(error)) then
       input%path = session%input%path
@@ -203,9 +200,10 @@ contains
       call keep_sides(session, input%groups)
       call resolve_input(input, complete, problems, error, stepped=.true.)
     end if
+    if (.not. allocated(error)) call check_files(session%input%groups, input%groups, error)
     if (.not. allocated(error)) then
       code = 0
-      if (changes_nothing(session, lines, input)) return
+      if (changes_nothing(session, input)) return
       changed = session%sim
       call change_system(changed, input%settings%system_t, problem)
       if (problem /= "") call fail(error, exit_usage, problem)
@@ -222,30 +220,38 @@ contains
     code = answer(error, message, room)
   end function change
 
+  !> Reports a variable that may not change in a running simulation. An unknown variable is not reported, because `read_groups`
+  !> reports it.
+  subroutine check_changeable(line, error)
+    character(len=*), intent(in) :: line              !! change in the form GROUP.VARIABLE=VALUE
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: name
+
+    name = lower_case(trim(adjustl(line(:index(line, "=") - 1))))
+    if (index(name, "(") > 0) name = name(:index(name, "(") - 1)        ! an element of an array, such as box.gravity(2)
+    if (row_of(name(:index(name, ".") - 1), name(index(name, ".", back=.true.) + 1:)) == 0) return
+    if (change_of(name) /= in_motion) &
+      call fail(error, exit_usage, line(:index(line, "=") - 1)//": cannot change in a running simulation")
+  end subroutine check_changeable
+
   !> Whether a changed input has the same values as the present input. A side without a group in the present input has the default
   !> values.
-  function changes_nothing(session, lines, input) result(yes)
+  function changes_nothing(session, input) result(yes)
     type(session_t), intent(in) :: session
-    type(text_t), intent(in) :: lines(:)              !! changes in the form GROUP.VARIABLE=VALUE
     type(run_input_t), intent(in) :: input            !! changed input
-    logical :: yes, complete, new(size(lines))
+    logical :: yes, complete
     type(run_input_t) :: present
     type(problem_list_t) :: problems
     type(error_t), allocatable :: error
-    integer :: g, k
+    integer :: g
 
-    associate (groups => session%input%groups)
-      new = [(index(lines(k)%text, "side.") == 1, k=1, size(lines))]
-      do k = 1, size(lines)
-        if (any([(groups(g)%name == "side" .and. index(lines(k)%text, "side."//trim(groups(g)%instance)//".") == 1, &
-          g=1, size(groups))])) new(k) = .false.
-      end do
-    end associate
     present%path = input%path
-    present%overrides = pack(lines, new)
-    do k = 1, size(present%overrides)
-      associate (override => present%overrides(k))
-        override%text = override%text(:index(override%text, "="))      ! `NAME=` without a value restores the default
+    allocate (present%overrides(0))
+    do g = 1, size(input%groups)
+      associate (group => input%groups(g), now => session%input%groups)
+        if (any(now%name == group%name .and. now%instance == group%instance)) cycle
+        ! An override without a value creates the group of a side, with the default values.
+        present%overrides = [present%overrides, text_t("side."//trim(group%instance)//".motion=")]
       end associate
     end do
     call read_groups(input_of(session%input%groups), present%overrides, present%groups, problems, complete)
@@ -253,6 +259,30 @@ contains
     yes = .not. allocated(error)
     if (yes) yes = same_values(present%groups, input%groups)
   end function changes_nothing
+
+  !> Reports an obstacle file or a starting file that has changed since the simulation was created. The input is read again for each
+  !> change and for each saved file; obstacles would otherwise move in the running simulation, and the saved file would describe
+  !> other disks.
+  subroutine check_files(groups, again, error)
+    type(group_t), intent(in) :: groups(:)            !! groups of the input of the simulation
+    type(group_t), intent(in) :: again(:)             !! groups of the same input, which has just been read
+    type(error_t), allocatable, intent(out) :: error
+    integer :: g, k, old
+
+    do g = 1, size(again)
+      if (again(g)%name == "side" .or. .not. again(g)%given("file")) cycle
+      old = findloc(groups%name == again(g)%name .and. groups%instance == again(g)%instance, .true., dim=1)
+      do k = 1, size(again(g)%values)
+        associate (name => trim(again(g)%name)//"."//trim(again(g)%instance)//".")
+          if (change_of(name//trim(again(g)%values(k)%name)) == in_motion) cycle
+          if (same_value(again(g)%values(k), groups(old)%values(k))) cycle
+          call fail(error, exit_usage, name//"file: "//again(g)%text_of("file")//" has changed since the simulation was created (" &
+            //name//trim(again(g)%values(k)%name)//" is different); restore the file")
+          return
+        end associate
+      end do
+    end do
+  end subroutine check_files
 
   !> Sets the positions of all sides whose motion changes, so that each side starts its new motion at its present position.
   subroutine keep_sides(session, groups)

@@ -6,7 +6,7 @@ module library_files
   use errors, only: error_t
   use hdf5_objects, only: hdf5_file_t
   use initial_state, only: describe_system
-  use library, only: answer, begin, session_of, session_t, text_of
+  use library, only: answer, begin, check_files, session_of, session_t, text_of
   use output, only: output_t
   use run_files, only: check_name, output_of, source_of
   use run_setup, only: input_from_text, new_simulation
@@ -37,6 +37,7 @@ contains
     call check_name(text_of(path), error)
     if (.not. allocated(error)) call input_from_text(session%input%text, session%input%path, session%input%overrides, input, &
       error, stepped=.true.)
+    if (.not. allocated(error)) call check_files(session%input%groups, input%groups, error)
     if (session%sim%changes > 0) then                 ! the initial state is unknown, because the changed input does not describe it
       first = session%sim
       input%changes = session%input%changes

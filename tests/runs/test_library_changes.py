@@ -170,3 +170,49 @@ def test_an_input_is_saved_over_nothing_but_a_saved_one(tmp_path, monkeypatch):
     Path("new.nml").write_text(Path("new.nml").read_text() + "! edited\n")
     with pytest.raises(ProgramError, match=r"new\.nml"):
         gas.save("gas.h5", True, "new.nml")
+
+
+@pytest.mark.parametrize("name", ["side.surface_velocity", "Side.left.Surface_Velocity"])
+def test_a_change_takes_effect_however_its_variable_is_written(name):
+    """A name without the name of its only group, and a name in capital letters, are accepted."""
+    hot = {"name": "left", "temperature": 1, "surface_velocity": 1}
+    gas = Simulation({"side": hot, "species": {"count": 5, "radius": 0.02, "speed": 1}})
+    assert gas.change({name: 1}).changes == []
+    assert gas.change({name: 0}).changes == [(0.0, name, "0")]
+    assert "surface_velocity = 0" in gas.input
+
+
+def test_one_element_of_a_vector_can_change():
+    gas = Simulation(GAS).change({"box.gravity(2)": -5})
+    assert gas.parameters["box"]["gravity"] == [0, -5]
+    assert gas.change({"box.gravity(2)": -5}).changes == [(0.0, "box.gravity(2)", "-5")]
+    with pytest.raises(ProgramError, match="no element 3"):
+        gas.change({"box.gravity(3)": 1})
+    with pytest.raises(ProgramError, match='unknown variable; did you mean "restitution"'):
+        gas.change({"contact.restituton": 0.5})
+
+
+@pytest.mark.parametrize("kind", ["obstacle", "wall", "species"])
+def test_a_file_that_has_changed_moves_no_obstacle(tmp_path, monkeypatch, kind):
+    """Changes and saved files read the input again; they are refused if its files have changed."""
+    monkeypatch.chdir(tmp_path)
+    rows = {"obstacle": "x y radius\n0.3 0.3 0.05\n", "wall": "x1 y1 x2 y2\n0.3 0.3 0.4 0.4\n"}
+    rows["species"] = "x y vx vy radius\n0.3 0.3 1 0 0.05\n0.6 0.6 0 1 0.05\n"
+    gases = {"species": {"name": "a", "count": 9, "radius": 0.02, "speed": 1}}
+    gases |= {kind: {"name": "a", "file": "rows.txt"}}
+    Path("rows.txt").write_text(rows[kind])
+    gas = Simulation(gases).advance(time=0.1)
+    Path("rows.txt").write_text(rows[kind].replace("0.05", "0.04").replace("0.4 0.4", "0.4 0.5"))
+    told = rf"^{kind}\.a\.file: rows\.txt has changed since .*restore the file$"
+    with pytest.raises(ProgramError, match=told):
+        gas.change({"contact.restitution": 0.9})
+    with pytest.raises(ProgramError, match=told):
+        gas.save("gas.h5")
+    assert gas.changes == [] and not list(Path().glob("gas.h5*"))
+    Path("rows.txt").write_text(rows[kind])
+    gas.change(
+        {"contact.restitution": 0.9, f"{kind}.a.restitution": 0.5}
+        if kind != "species"
+        else {"contact.restitution": 0.9}
+    ).save("gas.h5")
+    assert np.array_equal(Simulation.load("gas.h5").position, gas.position)
