@@ -276,8 +276,8 @@ class Simulation(State):
         """
         limits = (
             math.inf if time is None else float(time),
-            NEVER if collisions is None else min(int(collisions), NEVER),
-            NEVER if events is None else min(int(events), NEVER),
+            NEVER if collisions is None else whole_limit("collisions", collisions),
+            NEVER if events is None else whole_limit("events", events),
         )
         given = limits != (math.inf, NEVER, NEVER)
         if not given and self._endless():
@@ -346,7 +346,8 @@ class Simulation(State):
         for name, step in goals.items():
             if not step >= 0:
                 raise ValueError(f"{name}: {step} is not a number from 0")
-            goals[name] = getattr(self, name) + step
+            further = step if name == "time" else whole_limit(name, step)
+            goals[name] = getattr(self, name) + further
         return self.advance(**goals, on_event=on_event)  # type: ignore[arg-type]
 
     def _report(self, limits: tuple[float, int, int], on_event: Callable[[Event], object]) -> None:
@@ -431,6 +432,15 @@ class Simulation(State):
         with self._open() as handle:
             called(library().ricochet_change, handle, c_text("\n".join(settings)))
         return self
+
+
+def whole_limit(name: str, limit: float) -> int:
+    """Return a limit of a number of events; raise an error if the limit is not a whole number."""
+    if limit == math.inf:
+        return NEVER
+    if isinstance(limit, float | np.floating) and not float(limit).is_integer():
+        raise ValueError(f"{name}: {limit} is not a whole number")
+    return min(int(limit), NEVER)
 
 
 def restored(kind: type[Simulation], data: bytes, start_energy: float) -> Simulation:

@@ -331,7 +331,7 @@ class State(Session):
         """
         if not self.parameters.get("output", {}).get("event_log"):
             raise RunError("the simulation has no event log, set output.event_log = .true.")
-        records = self._last_events(max(int(most), 0))
+        records = self._last_events(min(max(int(most), 0), self.events))
         ids = records[:, 1:3].astype(np.int32)
         return EventLog(records[:, 0], ids[:, 0], ids[:, 1], records[:, 3], records[:, 4:])
 
