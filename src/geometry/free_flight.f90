@@ -89,6 +89,9 @@ contains
     disc = rho*rho*speed2 - (d(1)*v(2) - d(2)*v(1))**2
     if (inside) then
       if (.not. speed2 > 0) return
+      ! Inside the circle this form has no cancellation. If a disk moves along the circle, b and c consist of rounding errors, and
+      ! the other form of the discriminant can vanish; the contact time, about 0, would then be the ratio of two rounding errors.
+      if (c < 0) disc = b*b - speed2*c
       disc = sqrt(max(disc, 0.0_real64))
       if (b > 0) then
         s = max(-c, 0.0_real64)/(disc + b)

@@ -190,3 +190,17 @@ def test_too_many_groups_are_refused_in_one_line(program, tmp_path, group):
     assert done.returncode == USAGE
     assert len(done.stderr.splitlines()) == 1
     assert f":5001: {group}: more than 5000 groups of this name" in done.stderr
+
+
+@pytest.mark.parametrize("angles", [{"from_angle": 17, "to_angle": 287}, {"side": "inside"}])
+def test_a_disk_that_loses_its_normal_velocity_stays_inside(angles):
+    """A disk that moves along a concave face collides again at once and does not pass the face."""
+    rng = np.random.default_rng(1)
+    bowl = {"centre": [0.5, 0.5], "radius": 0.4, "restitution": 0, "rule": "normal"} | angles
+    for _ in range(300):
+        angle, speeds = rng.uniform(0.5, 4.5), rng.uniform(-1, 1, 2)
+        out = np.array([np.cos(angle), np.sin(angle)])
+        velocity = abs(speeds[0]) * out + 0.3 * speeds[1] * out[::-1] * [-1, 1]
+        disk = {"radius": 0.01, "position": [*(0.5 + 0.3 * out)], "velocity": [*velocity]}
+        box = Simulation({"obstacle": bowl, "species": disk}).advance(events=1)
+        assert box.next_events(1)[0][0] - box.time < 1e-6 / np.hypot(*box.velocity[0])
