@@ -97,8 +97,8 @@ contains
   !> procedure also sorts the disks by cells, because all events have to be predicted again after a shift of the time origin in any
   !> case. The next epoch ends at a fixed time and not after a fixed number of events, so that domains that run independently of
   !> each other end the epoch at the same time.
-  !> If a single event or a kick has ended the epoch (see `ends_by_event` and `ends_by_kick`), a disk can be much faster than before.
-  !> The time origin then moves exactly to the present time.
+  !> If a single event or a kick has ended the epoch (see `ends_by_event` and `ends_by_kick`), a disk can be much faster than
+  !> before. The time origin then moves exactly to the present time.
   subroutine move_epoch(sim, is_urgent)
     type(simulation_t), intent(inout) :: sim
     logical, intent(in) :: is_urgent               !! whether a single event or a kick has ended the epoch
@@ -181,7 +181,8 @@ contains
     if (possible*sim%epoch_end > farthest*maxval(sim%box%edges())) yes = possible > farthest*fastest_disk(sim)
   end function ends_by_event
 
-  !> Whether a kick ends the epoch, because it has made a disk so fast that the time since the time origin is no longer exact enough.
+  !> Whether a kick ends the epoch, because it has made a disk so fast that the time since the time origin is no longer exact
+  !> enough.
   pure function ends_by_kick(sim, kicked) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: kicked(:)        !! (n) indices of the disks that the kick has accelerated
