@@ -270,7 +270,8 @@ contains
     integer :: g, k, old
 
     do g = 1, size(again)
-      if (again(g)%name == "side" .or. .not. again(g)%given("file")) cycle
+      if (row_of(again(g)%name, "file") == 0) cycle
+      if (.not. again(g)%given("file")) cycle
       old = findloc(groups%name == again(g)%name .and. groups%instance == again(g)%instance, .true., dim=1)
       do k = 1, size(again(g)%values)
         associate (name => trim(again(g)%name)//"."//trim(again(g)%instance)//".")
