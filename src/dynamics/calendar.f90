@@ -176,9 +176,8 @@ contains
     yes = iand(window, shiftl(1_int32, self%log_span) - 1) == 0
   end function span_begins
 
-  !> Moves the events of the next span into the buckets of their windows. A span is a range of consecutive windows. Events of later
-  !> spans can be in the same list as the events of the next span, and stay in the list if they are still valid. Disks whose events
-  !> do not fit into a full bucket are returned in `surplus`.
+  !> Moves the events of the next span into their buckets. Events of later spans can be in the same list as the events of the next
+  !> span, and stay in the list if they are still valid. Disks whose events do not fit into a full bucket are returned in `surplus`.
   subroutine open_span(self, tag, n_surplus, surplus)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
