@@ -228,7 +228,7 @@ contains
     character(len=:), allocatable :: name
 
     name = lower_case(trim(adjustl(line(:index(line, "=") - 1))))
-    if (index(name, "(") > 0) name = name(:index(name, "(") - 1)        ! an element of an array, such as box.gravity(2)
+    name = name(:index(name//"(", "(") - 1)           ! without the index of an element, as in box.gravity(2)
     if (row_of(name(:index(name, ".") - 1), name(index(name, ".", back=.true.) + 1:)) == 0) return
     if (change_of(name) /= in_motion) &
       call fail(error, exit_usage, line(:index(line, "=") - 1)//": cannot change in a running simulation")
