@@ -495,9 +495,8 @@ class Draw:
                 words += self.maybe(0.9, " at_rest = .true.")
         if self.chance(0.3) or self.steps or self.driven or self.drifts or self.disks < 4:
             words += f" time = {rng.uniform(0.01, 1) * min(self.edges) / self.speed!r}"
-        elif max(self.edges) > 30 * min(
-            self.edges
-        ):  # events are so rare that samples fill the disk
+        elif max(self.edges) > 30 * min(self.edges):
+            # Events are so rare that the samples until the last event would fill the disk.
             words += f" time = {100 * min(self.edges) / self.speed!r}"
         return words + " /"
 
