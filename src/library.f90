@@ -261,8 +261,8 @@ contains
   end function changes_nothing
 
   !> Reports an obstacle file or a starting file that has changed since the simulation was created. The input is read again for each
-  !> change and for each saved file; obstacles would otherwise move in the running simulation, and the saved file would describe
-  !> other disks.
+  !> change and each save. Without this report, a changed file would move obstacles in the running simulation, and the saved file
+  !> would describe other disks.
   subroutine check_files(groups, again, error)
     type(group_t), intent(in) :: groups(:)            !! groups of the input of the simulation
     type(group_t), intent(in) :: again(:)             !! groups of the same input, which has just been read

@@ -171,8 +171,8 @@ let grabbed = null;
 const HOLDABLE = [undefined, 'still', 'constant_velocity', 'piston'], TOLD_AGAIN = 100;
 const isFinger = ({ pointerType }) => pointerType === 'touch', reachOf = (event, mouse) => isFinger(event) ? 22 : mouse;  // [CSS pixels]
 
-// Returns the side or the disk at a point of the canvas, if the user can drag the side or the disk. A finger can drag only the disk
-// whose trace is shown: wherever else it starts, it scrolls the page or moves the picture, even where disks are dense.
+// Returns the side or the disk at a point of the canvas, if the user can drag the side or the disk. Of the disks, a finger can drag
+// only the one whose trace is shown. A finger that starts on another disk scrolls the page or moves the picture.
 function grabAt(px, py, event) {
   if (!isPart || !(state.playing ? stream.live : moment.time === last())) return null;
   const own = { pointer: event.pointerId, from: [px, py] }, away = (x, y) => [x - backAcross(px), y - backUp(py)];
@@ -185,8 +185,8 @@ function grabAt(px, py, event) {
   return side < 0 ? null : { ...own, side, away: side < 2 ? away([x0, x1][side], 0) : away(0, [y0, y1][side - 2]), told: -Infinity };
 }
 
-// Returns whether the browser would scroll the page by the motion that drags what is grabbed. Up and down along a side at the left or
-// right, the page is scrolled.
+// Returns whether the page must not be scrolled during the motion that drags a side or disk. A vertical motion along a left or right
+// side scrolls the page.
 const keepsFromScrolling = () => grabbed !== null && !(grabbed.side < 2);
 
 function drag(px, py) {

@@ -28,8 +28,9 @@ module epochs
   real(real64), parameter :: crushing = 1.0e6_real64 !! growth factor of the energy above which disks are considered crushed
   real(real64), parameter :: densest = 0.9_real64  !! largest packing fraction used in the estimate of the event rate
   !> Largest factor by which a single event may increase the speed of the fastest disk, and largest number of edges of the box that
-  !> a disk may travel in an epoch thereafter. A kicked disk may not be faster than this number of edges divided by the time since
-  !> the time origin. With larger numbers, rounding errors of the time would displace disks noticeably.
+  !> a disk may travel in an epoch thereafter. A kick ends the epoch if a disk, at its new speed,
+  !> would have travelled more than this number of edges since the time origin. With a larger number, rounding errors of the time
+  !> would displace disks noticeably.
   real(real64), parameter :: farthest = 1.0e3_real64
 
 contains
