@@ -1,5 +1,7 @@
 """Fixtures of all tests: the program under test and functions that run it."""
 
+import fcntl
+import hashlib
 import os
 import signal
 import subprocess
@@ -9,6 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from processor_times import (  # noqa: F401 (pytest finds its hooks here)
+    pytest_runtest_makereport,
+    pytest_runtest_protocol,
+    slowest_tests,
+)
 from whole_runs import ran, within
 
 # Processes that a shell starts in the background ignore these signals by default.
@@ -30,7 +37,10 @@ def pytest_configure():
 
 
 def pytest_terminal_summary(terminalreporter, config):
-    """Print the option that repeats the random order of the tests, also in quiet mode."""
+    """Print the slowest tests, and the option that repeats the random order of the tests."""
+    reports = [report for found in terminalreporter.stats.values() for report in found]
+    for line in slowest_tests(report for report in reports if hasattr(report, "user_properties")):
+        terminalreporter.write_line(line)
     if seed := config.getoption("randomly_seed", None):
         terminalreporter.write_line(f"the same order again: --randomly-seed={seed}")
 
@@ -42,6 +52,30 @@ def program() -> Path:
     if not os.access(path, os.X_OK):
         pytest.fail(f"no program at {path}: run make first, or set RICOCHET")
     return path
+
+
+@pytest.fixture(scope="session")
+def made_once(tmp_path_factory) -> Callable[[str, Callable[[Path], object]], Path]:
+    """Return a function that makes a file once in a session, for all workers of pytest-xdist.
+
+    The function returns the path of the file that belongs to a text, and calls `make(path)` if the
+    file does not exist.  Tests must not change the file; a test that does so changes a copy.
+    """
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "made_once"
+    folder.mkdir(exist_ok=True)
+
+    def made(text: str, make: Callable[[Path], object]) -> Path:
+        path = folder / f"{hashlib.sha256(text.encode()).hexdigest()[:20]}.h5"
+        with path.with_suffix(".lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not path.exists():
+                unfinished = path.with_stem(f"{path.stem}_unfinished")
+                make(unfinished)
+                unfinished.rename(path)
+        return path
+
+    return made
 
 
 @pytest.fixture
