@@ -231,32 +231,37 @@ figures:  ## draws the figures of all systems in runs/figures/ (long)
 	@$(MAKE) $(jobs) all
 	@runs/figures.sh
 
-# The unit tests take one core; meanwhile the others build the program.
+# The unit tests take one core; meanwhile the others build the program and the library. The tests use the library with run-time checks.
+under_test = RICOCHET="$$(realpath '$(BUILD)')/ricochet" RICOCHET_LIBRARY="$$(realpath '$(BUILD)')/tests"
 test:  ## sets up, then unit tests and whole runs (ten minutes)
 	@.ci/set-up demo test
 	@$(MAKE) $(jobs) $(unit_build) $(BUILD)/tests/unit_tests $(BUILD)/tests/four_disks
-	@$(MAKE) $(jobs) checked all
-	@$(MAKE) library
-	@$(MAKE) $(unit_build) library
-	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -n auto --dist worksteal tests
+	@$(MAKE) $(jobs) checked checked-library all
+	@$(under_test) $(venv) -m pytest -q -n auto --dist worksteal tests
 
-.PHONY: checked
+.PHONY: checked checked-library
 checked:
 	@$(MAKE) $(unit_build) unit-tests
+checked-library:
+	@$(MAKE) $(unit_build) library
 
-# Other systems each day; SEED=20270131 has those of that day again.
+# Other systems each day; SEED=20270131 has those of that day again. THOROUGH=1 makes unit tests use all random cases.
 SYSTEMS ?= 200
 CHANGED ?= 300
 SEED ?= $(shell date +%Y%m%d)
+optimised = SEED=$(SEED) RICOCHET="$$(realpath '$(BUILD)')/ricochet" RICOCHET_LIBRARY="$$(realpath '$(BUILD)')"
+check: export THOROUGH = 1
 check:  ## validates physics, provokes faults, runs random systems
 	@.ci/set-up demo test check
 	@$(MAKE) $(jobs) all
-	@LIMIT=1200 $(MAKE) $(jobs) suites=tests/long unit-tests
-	@SEED=$(SEED) RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -m check tests
-	@SYSTEMS=$(SYSTEMS) SEED=$(SEED) RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -n auto tests/runs/test_random_systems.py -k all_ways
 	@$(MAKE) library
-	@SYSTEMS=$(CHANGED) SEED=$(SEED) RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -n auto tests/runs/test_changes.py -k continues_exactly
-	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/validate.py --report '$(BUILD)/validation'
+	@$(MAKE) $(jobs) $(unit_build) unit-tests
+	@LIMIT=1200 $(MAKE) $(jobs) suites=tests/long unit-tests
+	@$(optimised) $(venv) -m pytest -q -m 'check or statistics' tests
+	@$(optimised) $(venv) -m pytest -q -n auto $(wildcard tests/runs/test_library_*.py)
+	@SYSTEMS=$(SYSTEMS) $(optimised) $(venv) -m pytest -q -n auto tests/runs/test_random_systems.py -k all_ways
+	@SYSTEMS=$(CHANGED) $(optimised) $(venv) -m pytest -q -n auto tests/runs/test_changes.py -k continues_exactly
+	@$(optimised) $(venv) tests/validate.py --report '$(BUILD)/validation'
 
 bench: all  ## measures collisions per second; FULL=1, and more; bench-lab
 	@RICOCHET=$(BUILD)/ricochet runs/bench.sh $(if $(FULL),--full)

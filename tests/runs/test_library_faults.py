@@ -16,7 +16,6 @@ import pytest
 
 from library_systems import ENDLESS, GAS
 from ricochet import ProgramError, RunError, Simulation
-from whole_runs import ran
 
 RESTING = {"species": {"count": 9, "radius": 0.1, "velocities": "rest"}}
 SHEARED = {"box": {"boundary": ["periodic", "periodic"], "shear_rate": 1}}
@@ -197,18 +196,6 @@ def test_a_damaged_input_in_a_file_is_called_damaged(tmp_path):
         with pytest.raises(ProgramError, match="input is damaged") as caught:
             Simulation.load(path)
         assert caught.value.code == 3 and "\n" not in caught.value.message
-
-
-def test_the_library_has_no_fault_that_checks_would_find(program):
-    """All tests of the library succeed with a library that contains run-time checks."""
-    checked = Path(program).parent / "tests"
-    if not (checked / "libricochet_files.so").is_file():
-        pytest.skip("`make test` builds it")
-    files = sorted(Path(__file__).parent.glob("test_library_*.py"))
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:randomly", *files]
-    own = {**os.environ, "RICOCHET_LIBRARY": str(checked)}
-    ended = ran(*command, "-k", "not checks_would_find and not header", env=own)
-    assert ended.returncode == 0, ended.stdout[-3000:]
 
 
 def test_a_fork_and_an_interpreter_that_ends_do_no_harm():

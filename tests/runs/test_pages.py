@@ -10,6 +10,7 @@ A comment `<!-- test: OLD => NEW; OLD => NEW -->` before a block replaces texts 
 that a long run becomes a short one.  The comment `<!-- test: not run, REASON -->` excludes a block.
 """
 
+import os
 import re
 import shutil
 import sys
@@ -56,11 +57,17 @@ def blocks_of(page: str, short: bool = True) -> list[Block]:
     return found
 
 
+def libraries(program: Path) -> list[Path]:
+    """Return the libraries that the tests use."""
+    folder = Path(os.environ.get("RICOCHET_LIBRARY", program.parent))
+    return sorted(folder.glob("libricochet*.so"))
+
+
 def make_project(folder: Path, program: Path) -> None:
     """Make a folder that looks like the project to the commands of a page."""
     (folder / "runs").mkdir()
     (folder / "build").mkdir()
-    for made in (program, *program.parent.glob("libricochet*.so")):
+    for made in (program, *libraries(program)):
         (folder / "build" / made.name).symlink_to(made)
     for script in (ROOT / "runs").glob("*.sh"):
         shutil.copy(script, folder / "runs")
@@ -92,7 +99,7 @@ def execute(blocks: list[Block], folder: Path, program: Path) -> None:
 @pytest.mark.parametrize("page", RUN, ids=lambda path: f"{path.parent.name}/{path.stem}")
 def test_the_code_of_a_page_works(page, program, tmp_path):
     text = page.read_text()
-    if "libricochet" in text and not (program.parent / "libricochet.so").exists():
+    if "libricochet" in text and not libraries(program):
         pytest.skip("make library builds it")
     make_project(tmp_path, program)
     before = {path.name for path in tmp_path.iterdir()}

@@ -17,7 +17,7 @@ def test_every_source_has_a_row_with_tests_that_use_it():
 @pytest.mark.parametrize(
     ("page", "before", "after", "problem"),
     [
-        ("base", "| `sorting` | `test_renumbering.pf` |", "|", "base/sorting.f90: its page names no"),
+        ("base", "| `sorting` | `test_renumbering.pf` |", "|", "sorting.f90: its page names no"),
         ("base", "`sorting`", "`sorted`", "base/sorted.f90: there is no such file"),
         ("base", "test_renumbering.pf", "test_renumber.pf", "there is no test_renumber.pf"),
         ("base", "test_renumbering.pf", "test_random_stream.pf", "does not use it"),
