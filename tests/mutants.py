@@ -40,8 +40,9 @@ SCRATCH = ROOT / "build" / "mutants"
 UNIT_BUILD = re.findall(r"^unit_build := (.*)", (ROOT / "Makefile").read_text(), re.MULTILINE)[0]
 UNIT_BUILD = UNIT_BUILD.replace("$(BUILD)", "build")
 UNIT_TESTS = ("make -j{jobs} {unit_build}/unit_tests", "make checked")
-PROGRAM = "make -j{jobs} {unit_build}/four_disks && make -j{jobs} all library"
-PYTEST = ".venv/bin/python -m pytest -q -x -n {jobs} --dist load --maxschedchunk 8 -p no:randomly "
+PROGRAM = "make -j{jobs} {unit_build}/four_disks && make -j{jobs} all && make {library}"
+PYTEST = "RICOCHET_LIBRARY=$PWD/build/tests "
+PYTEST += ".venv/bin/python -m pytest -q -x -n {jobs} --dist load --maxschedchunk 8 -p no:randomly "
 MUTANT = re.compile(r"^([\w-]+): .*\n--- (.*)\n((?:.*\n)+?)(?=\n[\w-]+: |\Z)", re.MULTILINE)
 FAILURE = re.compile(r"^(?:Failure in: |FAILED |ERROR |unit tests: )(.*?)(?: - .*)?$", re.MULTILINE)
 
@@ -98,7 +99,8 @@ def outcome(tree: Path, mutant: Mutant | None, jobs: int, log: Path) -> str:
         if path.is_relative_to(tree / "post"):
             steps = steps[2:]
     for step in steps:
-        command = step.format(jobs=jobs, unit_build=f"{UNIT_BUILD} build/tests")
+        variables = {"unit_build": f"{UNIT_BUILD} build/tests", "library": f"{UNIT_BUILD} library"}
+        command = step.format(jobs=jobs, **variables)
         with log.open("w") as output:
             failed = subprocess.call(command, shell=True, cwd=tree, stdout=output, stderr=output)
         if failed:

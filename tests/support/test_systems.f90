@@ -25,7 +25,7 @@ module test_systems
   private
   public :: add_obstacle, build, few_disks, system, systems, every_system, prepare, evolve, difference
   public :: total_energy, momentum, tightest_gap
-  public :: draw_between, draw_vector, draw_magnitude, meeting, time_to_contact
+  public :: cases, draw_between, draw_vector, draw_magnitude, meeting, time_to_contact
 
   !> Systems with many combinations of features, in which all general properties must hold.
   character(len=*), parameter :: systems(*) = [character(len=40) :: "walls", "walls dilute", &
@@ -45,6 +45,14 @@ module test_systems
     "walls shaken sizes gravity", "walls shaken arcs gravity giant"]
 
 contains
+
+  !> Returns the number of random cases that a test draws: `most` if the environment variable THOROUGH is set, otherwise half of them.
+  integer function cases(most)
+    integer, intent(in) :: most
+    integer :: length
+    call get_environment_variable("THOROUGH", length=length)
+    cases = merge(most, (most + 1)/2, length > 0)
+  end function cases
 
   !> Returns the simulation that an input text describes. `message` contains the problems of the input, or '' if there are none.
   !> Without `message`, a problem ends the tests. If the input has no stop rule, the simulation ends at time 1.
