@@ -11,6 +11,7 @@ from driven import demon_law, fuller, noise_law, temperature_law
 from ricochet import statistics, theory
 from ricochet.figures.drawing import plt
 from ricochet.reading.nature import Refused
+from sampling import STATISTICS, samples
 from synthetic_run import drawn
 
 
@@ -57,7 +58,7 @@ def test_a_slow_stroke_is_drawn_beside_its_adiabat(simulated, tmp_path):
         assert temperature_law(simulated(text, change, *(f"side.top.{w}=" for w in words))) is None
 
 
-@pytest.mark.parametrize("across", ["wall", "periodic"])
+@pytest.mark.parametrize("across", ["wall", pytest.param("periodic", marks=STATISTICS)])
 def test_a_side_that_disks_push_is_drawn_beside_its_mean_and_deviation(simulated, tmp_path, across):
     text = f"""&box boundary = '{across}', 'wall' / &side name = 'top' motion = 'piston' mass = 5
     force = 70 / &species count = 50 packing_fraction = 0.2 speed = 1 / &stop time = 300 /
@@ -106,11 +107,12 @@ def test_single_points_are_seen_and_titles_lie_over_no_words_of_a_wall(simulated
     assert said and not any(map(title.overlaps, said))
 
 
-def test_an_even_gas_has_no_fuller_half(rng):
+@samples(200, 2000)
+def test_an_even_gas_has_no_fuller_half(rng, samples):
     """This also holds with correlations; a lasting majority in one half is detected."""
-    noise = lfilter([1], [1, -0.9], rng.normal(scale=0.02, size=(2000, 300)))
+    noise = lfilter([1], [1, -0.9], rng.normal(scale=0.02, size=(samples, 300)))
     even = np.array([fuller(0.5 + one).mean() for one in noise])
-    assert even.mean() == pytest.approx(0.5, abs=4 * even.std() / np.sqrt(2000))
+    assert even.mean() == pytest.approx(0.5, abs=4 * even.std() / np.sqrt(samples))
     assert fuller(0.1 + 0.1 * noise[0]).mean() == pytest.approx(0.9, abs=0.02)
     assert not any(map(statistics.has_trend, noise[:100])), "a memory is no drift"
     assert all(statistics.has_trend(one + np.linspace(0, 1, 300)) for one in noise[:100])

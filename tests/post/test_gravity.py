@@ -10,23 +10,29 @@ import equipartition
 import gravity
 import missed
 from ricochet import RunError, read_run, statistics, thermodynamics
+from sampling import held_as_often_as_stated, samples
 from synthetic_gases import TWO, falling
 from synthetic_run import drawn
 
 
+@samples(40, 300)
 @pytest.mark.parametrize("reach", [gravity.SPEED_RANGE, gravity.HEIGHT_RANGE])
-def test_errors_of_slopes_are_their_scatter_although_kt_is_measured(rng, reach):
+def test_errors_of_slopes_are_their_scatter_although_kt_is_measured(rng, reach, samples):
     """The values have exponential distributions whose kT changes from block to block."""
     found = []
-    for _ in range(300):
+    for _ in range(samples):
         kt = np.repeat(rng.gamma(400, 1 / 400, gravity.BLOCKS), 60)[:, None]
         values = kt * rng.exponential(size=(len(kt), 40))
         species = [gravity.Samples(1.0, 0.0, 2 * values, values, values)]
         laws = values.mean() * gravity.warmth(species)
         found.append(gravity.slope_of(values, reach, 1 / laws))
     mean, error = np.transpose(found)
-    assert np.mean(np.abs(mean - mean.mean()) < error) == pytest.approx(0.6827, abs=0.07)
-    assert np.mean(error) == pytest.approx(1.06 * np.std(mean), rel=0.12)
+    held = np.abs(mean - mean.mean()) < error
+    if samples < 300:
+        assert held_as_often_as_stated(held)
+    else:
+        assert np.mean(held) == pytest.approx(0.6827, abs=0.07)
+        assert np.mean(error) == pytest.approx(1.06 * np.std(mean), rel=0.12)
 
 
 def test_gravity_slopes_are_those_of_the_laws(tmp_path, rng):
@@ -76,11 +82,12 @@ def test_thermalisation_time_ignores_a_passing_agreement():
         assert np.isnan(unknown.mean)
 
 
-def test_one_run_of_many_disks_has_a_thermalisation_time_with_an_error(rng):
+@samples(20, 200)
+def test_one_run_of_many_disks_has_a_thermalisation_time_with_an_error(rng, samples):
     """Its error follows from fluctuations in equilibrium and has a coverage of 68 %."""
     time, found = np.arange(0, 40, 0.25) + 0.25, []
     kinds = [SimpleNamespace(mass=mass) for mass in (1.0, 2.0)]
-    for _ in range(200):
+    for _ in range(samples):
         noise = lfilter([0.015], [1, -0.7], rng.normal(size=len(time)))
         energy = {"A": np.ones(len(time)), "B": 1 + np.exp(-time / 3) + noise}
         run = SimpleNamespace(
@@ -91,7 +98,8 @@ def test_one_run_of_many_disks_has_a_thermalisation_time_with_an_error(rng):
         found.append(equipartition.approach([run], 0.5, 0.1).thermalisation)
     mean, error = np.transpose(found)
     truth = 3 * np.log(10)
-    assert 0.55 < np.mean(np.abs(mean - truth) < error) < 0.85
+    held = np.abs(mean - truth) < error
+    assert 0.55 < np.mean(held) < 0.85 if samples >= 200 else held_as_often_as_stated(held)
     assert np.abs(np.median(mean) - truth) < 0.3 * truth and np.isfinite(mean).mean() > 0.9
 
 
@@ -104,20 +112,25 @@ def thermalisation_time(time, light, heavy):
     return equipartition.over_runs(crossing, [light, heavy])
 
 
-def test_the_error_of_the_thermalisation_time_is_the_scatter_of_groups(rng):
+@samples(30, 300)
+def test_the_error_of_the_thermalisation_time_is_the_scatter_of_groups(rng, samples):
     """The energy difference falls below 10 % at a known time; the noise is that of 20 runs."""
     time = np.arange(0.25, 12, 0.5)
     difference, truth = np.exp(-time / 3), 3 * np.log(10)
 
     found = []
-    for _ in range(300):
+    for _ in range(samples):
         light = 1 + 0.01 * rng.normal(size=(20, len(time)))
         heavy = 1 + difference + 0.01 * rng.normal(size=light.shape)
         found.append(thermalisation_time(time, light, heavy))
     mean, error = np.transpose(found)
-    assert 0.56 < np.mean(np.abs(mean - truth) < error) < 0.78  # four standard deviations
-    assert np.mean(error) == pytest.approx(np.std(mean), rel=0.25)
-    assert abs(mean.mean() - truth) < 0.3 * np.std(mean)
+    held = np.abs(mean - truth) < error
+    if samples < 300:
+        assert held_as_often_as_stated(held)
+    else:
+        assert 0.56 < np.mean(held) < 0.78  # four standard deviations
+        assert np.mean(error) == pytest.approx(np.std(mean), rel=0.25)
+        assert abs(mean.mean() - truth) < 0.3 * np.std(mean)
 
 
 def test_the_error_of_the_thermalisation_time_is_at_most_the_size_of_a_jump(rng):

@@ -6,9 +6,8 @@ from scipy.signal import lfilter
 from scipy.stats import kstest
 
 from ricochet import speed_laws
+from sampling import samples
 from synthetic_run import written
-
-SEEDS = 100
 
 
 def made(rng, count, frames, mass, periodic, keep, fixed):
@@ -33,15 +32,16 @@ SYSTEMS = {
 }
 
 
+@samples(12, 100)
 @pytest.mark.parametrize("system", SYSTEMS)
-def test_p_values_are_uniform_where_the_law_holds(tmp_path, rng, system):
+def test_p_values_are_uniform_where_the_law_holds(tmp_path, rng, system, samples):
     count, heavy, periodic, keep, fixed = SYSTEMS[system]
     mass = np.where(np.arange(count) < count // 2, 1.0, heavy)
     kinds = {"mass": mass, "species": 1 + (mass > 1), "names": ("a", "b")[: 1 + (heavy > 1)]}
     sides = {"top": {"temperature": 1.0}} if not fixed else {}
     kinds["parameters"] = {f"side/{name}": own for name, own in sides.items()}
     frames, found = 40, []
-    for k in range(SEEDS):
+    for k in range(samples):
         v = made(rng, count, frames, mass, periodic, keep, fixed)
         run = written(tmp_path / f"{k}.h5", 0 * v, v, periodic=periodic, **kinds)
         test = speed_laws.speed_test([run], [range(frames)], run.names[-1])
