@@ -48,10 +48,15 @@ def test_random_starts_lie_inside_the_billiard(name):
             assert not np.any(billiard.observable("side_collisions")[:2])
 
 
-@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize(
-    ("more", "box"),
-    [("", ""), ("", "gravity = 0.3, -1"), ("dynamics = 'steps' dt = 1e-4", "gravity = 0, -1")],
+    ("law", "more", "box"),
+    [
+        ("elastic", "", ""),
+        ("inelastic, normal", "", "gravity = 0.3, -1"),
+        ("rough, sliding", "", ""),
+        ("rough, sliding", "dynamics = 'steps' dt = 1e-4", "gravity = 0, -1"),
+        ("thermal, sliding", "", "gravity = 0.3, -1"),
+    ],
 )
 def test_a_closed_arc_is_a_container(law, more, box):
     """Disks move in an arc of 360 degrees as in a circle with side = 'inside', up to rounding."""
@@ -68,8 +73,10 @@ def test_a_closed_arc_is_a_container(law, more, box):
         assert not spins or (np.allclose(*spins) and np.any(spins[0]))
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("box", ["", "gravity = 0, -1", "boundary = 'periodic', 'periodic'"])
+@pytest.mark.parametrize(
+    ("law", "box"),
+    zip(LAWS, ["boundary = 'periodic', 'periodic'", "gravity = 0, -1"] * 2, strict=True),
+)
 def test_a_closed_arc_is_a_peg(law, box):
     """Disks bounce off the outside of an arc of 360 degrees as off a circle, up to rounding."""
     runs = []

@@ -200,22 +200,6 @@ def test_twenty_sweeps_move_most_disks_by_a_diameter(ricochet, tmp_path):
     assert np.median(np.hypot(*steps.T)) > 0.04
 
 
-def test_a_relaxed_start_does_not_depend_on_threads_search_and_pauses(ricochet, tmp_path):
-    write_input(tmp_path, relaxed(5))
-    ways = ([], ["run.threads=2"], ["run.search=pairs"], ["run.queue=heap"])
-    ends = []
-    for k, words in enumerate(ways):
-        more = [word for own in words for word in ("--set", own)]
-        assert ricochet("gas.nml", "-o", f"{k}.h5", *more).returncode == FINISHED
-    early = ["--set", "stop.collisions_per_disk=1"]
-    assert ricochet("gas.nml", "-o", "parts.h5", *early).returncode == FINISHED
-    assert ricochet("gas.nml", "-o", "parts.h5", "--resume").returncode == FINISHED
-    for name in (*range(len(ways)), "parts"):
-        with h5py.File(tmp_path / f"{name}.h5") as file:
-            ends.append(file["particles/disks/position/value"][-1])
-    assert all((end == ends[0]).all() for end in ends)
-
-
 def test_a_relaxed_start_that_is_too_dense_is_told(ricochet, tmp_path):
     write_input(tmp_path, relaxed(5))
     run = ricochet("gas.nml", "-o", "gas.h5", "--set", "species.large.radius=0.0385")
