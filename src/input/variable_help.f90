@@ -77,13 +77,18 @@ contains
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: wanted, now
-    character(len=name_length + 9) :: full(size(table))
+    character(len=name_length + 9) :: names(size(table)), full(size(table))
+    logical :: of_group(size(table))
     integer :: k
 
     wanted = bare(lower_case(trim(name)))
-    full = [character(len=len(full)) ::(trim(table(k)%group)//"."//table(k)%name, k=1, size(table))]
-    text = explanations(pack([(k, k=1, size(table))], table%group == wanted))// &
-      explanations(pack([(k, k=1, size(table))], table%name == wanted .or. full == wanted))
+    do k = 1, size(table)
+      names(k) = table(k)%name
+      full(k) = trim(table(k)%group)//"."//table(k)%name
+      of_group(k) = table(k)%group == wanted
+    end do
+    text = explanations(pack([(k, k=1, size(table))], of_group))// &
+      explanations(pack([(k, k=1, size(table))], names == wanted .or. full == wanted))
     if (text /= "") then
       text = text(:len(text) - len(eol))
       return
@@ -97,7 +102,7 @@ contains
     else
       call fail(error, exit_usage, "--explain "//shown(name)//": no variable, choice or help contains this (the pages " &
         //"in docs/ have a search: make docs); " &
-        //suggestion(wanted, [character(len=len(full)) :: table%name, full, group_names], group_names))
+        //suggestion(wanted, [character(len=len(full)) :: names, full, group_names], group_names))
     end if
   end subroutine explain
 
