@@ -8,7 +8,7 @@ module cell_scans
   use images, only: image_t, images_t
   use neighbour_lists, only: neighbour_lists_t
   use neighbour_search, only: earliest_contact, latest_clock, list_capacity, no_gravity, prediction_t
-  use object_lists, only: place_t, object_lists_t
+  use object_lists, only: entry_t, object_lists_t, place_t
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -81,16 +81,19 @@ contains
     type(images_t), intent(in) :: images
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prediction_t), intent(inout) :: near
-    integer(int32) :: e, last(2)                   ! index of a list entry; periodic image that contains the candidates in `near`
+    type(entry_t) :: entry                         ! copied, because the compiler keeps a local record in registers
+    integer(int32) :: next                         ! index of the next entry
+    integer(int32) :: last(2)                      ! periodic image that contains the candidates in `near`
     real(real64) :: number(2), shift(2)            ! index of the image of an obstacle; shift to this image [length]
     logical :: falling                             ! whether gravity acts on the disks
 
     near%n = 0
-    last = 0
     falling = iand(known, no_gravity) == 0
-    e = reach%first(cell(1), cell(2))
-    do while (e > 0)
-      associate (entry => reach%entry(e), disk => sim%disk(near%disk), tag => sim%tag(near%disk))
+    next = reach%first(cell(1), cell(2))
+    associate (disk => sim%disk(near%disk), tag => sim%tag(near%disk))
+      do while (next > 0)
+        entry = reach%entry(next)
+        next = entry%next
         if (entry%code <= 0) then
           number = entry%image
           shift = images%shift(number)
@@ -102,10 +105,9 @@ contains
           near%n = near%n + 1
           near%list(near%n) = entry%code - 1
         end if
-        e = entry%next
-      end associate
-    end do
-    call test_disks()
+      end do
+    end associate
+    if (near%n > 0) call test_disks()
   contains
 
     !> Tests the big disks in the list of candidates, which are all in the same periodic image of the box.

@@ -16,7 +16,7 @@ module object_lists
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: largest_small_radius, place_t, object_lists_t
+  public :: entry_t, largest_small_radius, place_t, object_lists_t
 
   integer(int32), parameter :: most_big_disks = 256    !! largest number of big disks; each is tested against all other big disks
 
