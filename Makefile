@@ -28,22 +28,27 @@ hdf5_libs := $(filter-out -I%,$(wordlist 2,$(words $(hdf5)),$(hdf5)))
 # Most flags are gfortran's; another compiler gets plain optimisation, and FFLAGS.
 gnu = $(eval gnu := $(findstring GNU Fortran,$(shell $(FC) --version 2>/dev/null)))$(gnu)
 ARCH ?= native
-OPT ?= $(if $(DEBUG),-O0 $(if $(gnu),-Wno-maybe-uninitialized),-O2 $(if $(gnu),$(if $(ARCH),-march=$(ARCH)) $(hot) -fno-backtrace $(quiet)))
+# Usual flags, with which the event loop is optimised as a whole; any other flags are the same for all files.
+usual := $(if $(DEBUG)$(filter-out undefined,$(origin OPT) $(origin FFLAGS)),,1)
+OPT ?= $(if $(DEBUG),-O0 $(if $(gnu),-Wno-maybe-uninitialized),-O2 $(if $(gnu),$(if $(ARCH),-march=$(ARCH)) -fno-backtrace $(quiet)))
 # These warnings of gfortran 13 and later are false alarms about array descriptors. `make lint` has them on.
 quiet := -Wno-maybe-uninitialized -Wno-uninitialized
-# For the innermost loops: inlining across modules, and a version of the kernel for each of its cases.
+# For the event loop: inlining across modules, and a version of the kernel for each of its cases.
 hot := -flto=auto -finline-limit=1000 -fipa-cp-clone --param=ipa-cp-eval-threshold=1 \
   --param=ipa-cp-unit-growth=200 --param=inline-unit-growth=200 -fno-trapping-math -fno-tree-vectorize
+cold := -O1
 CHECKS := $(if $(DEBUG),-fcheck=all$(comma)no-array-temps -finit-real=snan -ffpe-trap=invalid$(comma)zero$(comma)overflow)
 FFLAGS ?= $(if $(gnu),-std=f2008 -Wall -Wextra -Wno-compare-reals -Wno-unused-dummy-argument) -g $(OPT)
-# Contraction off, whatever FFLAGS says: only then do all builds give the same bits.
-flags = $(FFLAGS) $(PIC) -ffp-contract=off $(if $(gnu),-fopenmp) $(if $(gnu),$(CHECKS) -ffpe-summary=none)
+# Contraction off, whatever FFLAGS says: only then do all builds give the same bits. Position independent, because the program and
+# both libraries are linked from the same objects.
+flags = $(FFLAGS) -fPIC -ffp-contract=off $(if $(gnu),-fno-semantic-interposition -fopenmp $(CHECKS) -ffpe-summary=none)
 # gfortran compiles C, too, so that link-time optimisation can make an instruction of a prefetch.
 c_compiler = $(if $(gnu),$(FC),$(CC))
-c_flags = -Wall -Wextra $(PIC) $(filter -O% -g -march=% -flto% -fsanitize% -fno-sanitize% --coverage -pedantic -Werror,$(flags))
+c_flags = -Wall -Wextra -fPIC $(filter -O% -g -march=% -flto% -fsanitize% -fno-sanitize% --coverage -pedantic -Werror,$(flags))
 wrapped := -Wl,--wrap=malloc,--wrap=realloc
 hints = $(if $(HINTS),$(wrapped))
 
+announce := . .ci/progress.sh; announce
 PYTHON := $(if $(wildcard .venv/bin/python),.venv/bin/python,python3)
 Q := $(if $(V),,@)
 
@@ -51,7 +56,13 @@ sources := $(wildcard src/*.f90 src/*/*.f90)
 vpath %.f90 $(sort $(dir $(sources))) $(BUILD)
 vpath %.c src/base
 modules := $(filter-out main library library_events library_files %_without_hdf5,$(notdir $(sources:.f90=))) build_info
-objects := $(modules:%=$(BUILD)/%.o) $(patsubst src/base/%.c,$(BUILD)/%_c.o,$(wildcard src/base/*.c))
+objects := $(modules:%=$(BUILD)/%.o) $(patsubst src/base/%.c,$(BUILD)/%_c.o,$(filter-out %/program_heap.c,$(wildcard src/base/*.c)))
+objects_in = $(patsubst %.f90,$(BUILD)/%.o,$(notdir $(wildcard $(1:%=src/%/*.f90))))
+# The modules of the event loop. Those of its folders that it calls seldom or never are compiled like the others.
+seldom := changes stop_rules observables sample_values packing obstacle_cells time_stepped verlet_list recycling
+hot_objects := $(filter-out $(seldom:%=$(BUILD)/%.o),$(call objects_in,dynamics parallel physics search geometry)) \
+  $(patsubst %,$(BUILD)/%.o,random_stream sorting memory_hints memory_hints_c)
+cold_objects := $(call objects_in,. input variables output files)
 
 # Unit tests: the same .pf files under pFUnit or the substitute, each in its own folder, with all checks on.
 PFUNIT_DIR ?= $(lastword $(sort $(wildcard /usr/local/PFUNIT-* $(HOME)/.local/PFUNIT-*)))
@@ -80,34 +91,61 @@ ifneq ($(filter $(BUILD)/%,$(MAKECMDGOALS)),)
 $(shell mkdir -p $(T))
 -include $(BUILD)/hints.mk $(BUILD)/deps.mk
 
+# The compilations of a build from the beginning are counted. Of a later one it is not known how many there will be.
+goals = $(filter $(1:%=$(BUILD)/%),$(MAKECMDGOALS))
+counted = $(objects) $(if $(call goals,ricochet),main program_heap) $(if $(call goals,%.so),library library_events library_files \
+  $(filter %_without_hdf5.o,$(without_hdf5))) $(if $(call goals,unit_tests),$(test_objects) $(shared_objects))
+total := $(if $(V)$(wildcard $(BUILD)/kinds.o),,$(words $(counted)))
+$(shell : > $(BUILD)/progress)
+say = . .ci/progress.sh; count $(BUILD)/progress '$(total)'
+
 # Under another name first: a build that is killed leaves no half of a program that looks finished.
 define link
-	@echo "link    $@"
-	$(Q)$(FC) $(flags) $1 -o $@.new $2 $(hints) $(hdf5_libs)
+	@echo "link $@"
+	$(Q)$(FC) $(flags) $(together) $1 -o $@.new $2 $(hints) $(hdf5_libs)
 	$(Q)mv $@.new $@
 endef
 
-$(BUILD)/ricochet: $(BUILD)/main.o $(objects)
+# The event loop becomes one object, which the program and both libraries contain. If the linker cannot make such an object
+# (MERGE in hints.mk), each of them optimises the event loop anew.
+ifneq ($(and $(usual),$(gnu)),)
+$(hot_objects): private of_part := $(hot)
+$(cold_objects): private of_part := $(cold)
+ifneq ($(MERGE),)
+linked := $(filter-out $(hot_objects),$(objects)) $(BUILD)/event_loop.o
+else
+together := $(hot)
+endif
+endif
+linked ?= $(objects)
+
+$(BUILD)/event_loop.o: $(hot_objects)
+	+$(Q)$(announce) 'optimise the event loop (10 s on two idle cores)' $(FC) $(filter-out -fopenmp,$(flags)) $(hot) $(merge) -o $@ $^
+
+$(BUILD)/ricochet: $(BUILD)/main.o $(BUILD)/program_heap_c.o $(linked)
 	$(call link,$(LDFLAGS),$^)
 
-# The program calls none of it, and nothing else is to be seen: then the compiler may inline as it does in the program.
+# Nothing but the C interface is to be seen.
 library_flags := -Wl,--version-script=src/library.map -Wl,-z,defs
 as_library = -shared $(if $(EXPORTS),$(library_flags))
 $(BUILD)/libricochet.so: hdf5_libs :=
-$(BUILD)/libricochet.so: $(filter-out $(BUILD)/main.o,$(without_hdf5)) $(filter %_c.o,$(objects))
+$(BUILD)/libricochet.so: $(filter-out $(BUILD)/main.o $(objects),$(without_hdf5)) $(filter $(without_hdf5) %_c.o %/event_loop.o,$(linked))
 	$(call link,$(as_library),$(filter %.o,$^))
 
 $(BUILD)/libricochet_files.so: hdf5_libs = $(filter-out -I%,$(wordlist 2,99,$(shell $(H5FC) -shlib -show)))
-$(BUILD)/libricochet_files.so: $(BUILD)/library.o $(BUILD)/library_events.o $(BUILD)/library_files.o $(objects)
+$(BUILD)/libricochet_files.so: $(BUILD)/library.o $(BUILD)/library_events.o $(BUILD)/library_files.o $(linked)
 	$(call link,$(as_library),$^)
 
+$(BUILD)/ricochet.h: src/ricochet.h
+	@cp $< $@
+
 $(BUILD)/%.o: %.f90 $(BUILD)/flags
-	@echo "compile $<"
-	$(Q)$(FC) $(flags) $(hdf5_flags) -J$(BUILD) -c -o $@ $<
+	@$(say) compile $<
+	$(Q)$(FC) $(flags) $(of_part) $(hdf5_flags) -J$(BUILD) -c -o $@ $<
 
 $(BUILD)/%_c.o: %.c $(BUILD)/flags
-	@echo "compile $<"
-	$(Q)$(c_compiler) $(c_flags) $(if $(HINTS),-DMEMORY_HINTS) -c -o $@ $<
+	@$(say) compile $<
+	$(Q)$(c_compiler) $(c_flags) $(of_part) $(if $(HINTS),-DMEMORY_HINTS) -c -o $@ $<
 
 # The compiler leaves an interface untouched that has not changed: then nothing that uses it is compiled again.
 %.mod: %.o
@@ -117,42 +155,45 @@ $(BUILD)/%_c.o: %.c $(BUILD)/flags
 keep = cat > $@.$$$$; if cmp -s $@.$$$$ $@; then rm $@.$$$$; else mv $@.$$$$ $@; fi
 
 $(BUILD)/flags: FORCE
-	@echo '$(FC) $(flags) $(hints)' | { $(keep); }
+	@echo '$(FC) $(flags) $(usual) $(hints)' | { $(keep); }
 
 # Another pFUnit compiles the tests of its folder again, and another runner links its own: of the program nothing.
 $(BUILD)/runner $(T)/runner: FORCE
 	@echo '$(PFUNIT_DIR)' | { $(keep); }
 
 $(BUILD)/build_info.f90: FORCE
-	@src/build_info.sh $(flags) | { $(keep); }
+	@src/build_info.sh $(flags) $(if $(usual),$(if $(gnu),$(hot))) | { $(keep); }
 
 $(BUILD)/deps.mk: FORCE
 	@awk -v build='$(BUILD)' -v tests='$(T)' -f src/modules.awk $(sources) $(tests) $(shared) /dev/null | sort | { $(keep); }
 
-# Whether compiler, linker and system know what the hints are made of, and whether the linker knows the flags of the library.
+# Whether compiler, linker and system know what the hints are made of, the flags of the library, and the merging of objects.
+merge := -r -nostdlib -flinker-output=nolto-rel
 $(BUILD)/hints.mk: src/base/memory_hints.c Makefile
 	@echo 'int main(void) { return 0; }' > $@.c; \
 	  if $(c_compiler) -DMEMORY_HINTS -include $< $@.c $(wrapped) -o $@.out 2>/dev/null; \
 	  then echo 'HINTS ?= 1'; else echo 'HINTS ?='; fi > $@.new; \
 	  if $(c_compiler) -fPIC -shared $(library_flags) $@.c -o $@.out 2>/dev/null; \
-	  then echo 'EXPORTS ?= 1'; else echo 'EXPORTS ?='; fi >> $@.new; rm -f $@.c $@.out; mv $@.new $@
+	  then echo 'EXPORTS ?= 1'; else echo 'EXPORTS ?='; fi >> $@.new; \
+	  if $(c_compiler) -fPIC -flto -c $@.c -o $@.o 2>/dev/null && $(c_compiler) -flto $(merge) $@.o -o $@.out 2>/dev/null; \
+	  then echo 'MERGE ?= 1'; else echo 'MERGE ?='; fi >> $@.new; rm -f $@.c $@.o $@.out; mv $@.new $@
 
-$(BUILD)/unit_tests: $(driver) $(T)/tests.inc $(test_objects) $(shared_objects) $(objects) $(BUILD)/runner
+$(BUILD)/unit_tests: $(driver) $(T)/tests.inc $(test_objects) $(shared_objects) $(linked) $(BUILD)/runner
 	$(call link,$(test_flags),$< $(filter %.o,$^) $(PFUNIT_LIBRARIES))
 
 # The engine of docs/tutorials/how-it-works.md.
-$(BUILD)/four_disks: docs/four_disks.f90 $(objects)
+$(BUILD)/four_disks: docs/four_disks.f90 $(linked)
 	$(call link,-I$(BUILD),$^)
 
 $(T)/test_%.F90: $(suites)/test_%.pf $(translator) $(T)/runner
 	$(Q)log=$$($(PYTHON) $(translator) $< $@ 2>&1) || { echo "$$log"; false; }
 
 $(test_objects): $(T)/%.o: $(T)/%.F90 $(BUILD)/flags
-	@echo "compile $(<:$(T)/%.F90=$(suites)/%.pf)"
+	@$(say) compile $(<:$(T)/%.F90=$(suites)/%.pf)
 	$(Q)$(FC) $(CHECKS) -O0 -g $(test_flags) -ffree-line-length-none $(hdf5_flags) -c -o $@ $<
 
 $(shared_objects): $(T)/%.o: tests/support/%.f90 $(BUILD)/flags
-	@echo "compile $<"
+	@$(say) compile $<
 	$(Q)$(FC) $(flags) $(hdf5_flags) -I$(T) -J$(T) -I$(BUILD) -c -o $@ $<
 
 $(T)/tests.inc: FORCE
@@ -173,12 +214,8 @@ build = mkdir -p $(BUILD) 2>/dev/null && [ -w $(BUILD) ] || { echo 'Cannot write
 all:  ## builds the program (default); library: for C, Python; wheel
 	@+$(build) $(BUILD)/ricochet
 
-# Position independent. A library is replaced, not written over: who has loaded it keeps it.
 library:
-	@$(MAKE) $(jobs) BUILD=$(BUILD)/library PIC='-fPIC -fno-semantic-interposition' $(BUILD)/library/libricochet.so \
-	  $(BUILD)/library/libricochet_files.so
-	@for file in $(BUILD)/library/*.so src/ricochet.h; do copy=$(BUILD)/$$(basename $$file); \
-	  cmp -s $$file $$copy || { cp $$file $$copy.new && mv $$copy.new $$copy; } || exit; done
+	@+$(build) $(BUILD)/libricochet.so $(BUILD)/libricochet_files.so $(BUILD)/ricochet.h
 
 # build/wheels/*.whl: all of it with its libraries inside, for pip on machines without a compiler. For any processor
 # since 2013 or so, but for GLIBC as old as here: its name says which.

@@ -10,7 +10,6 @@
 #include <string.h>
 #include <unistd.h>
 #ifdef __linux__
-#include <malloc.h>
 #include <sys/mman.h>
 #endif
 
@@ -55,17 +54,6 @@ __attribute__((used)) void *__wrap_realloc(void *memory, size_t bytes)
 {
     return obtained(__real_realloc(memory, bytes), bytes);
 }
-
-/* Fixes the size above which the C library allocates an array by a separate memory mapping instead of on the heap. By
-   default the C library increases this size during a run. Large arrays that are allocated repeatedly would then
-   fragment the heap, and the memory use of a long run would grow without limit. The shared library does not change this
-   size, because the heap belongs to the program that has loaded the library. */
-#if defined(M_MMAP_THRESHOLD) && (defined(__PIE__) || !defined(__PIC__))
-__attribute__((constructor, used)) static void map_large_arrays(void)
-{
-    mallopt(M_MMAP_THRESHOLD, (int)large);
-}
-#endif
 
 #else
 #define PREFETCH(address) ((void)(address))
