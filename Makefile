@@ -232,19 +232,26 @@ unit-tests:  ## unit tests; DEBUG=1 tests=tests/unit/test_X.pf: of a module
 	@tests/support/run_unit_tests.sh "$(if $(PFUNIT_DIR),pFUnit $(PFUNIT_VERSION),the substitute for pFUnit)" \
 	  $(BUILD)/unit_tests $$(sed 's,.*(\(.*\)_suite),$(suites)/\1.pf,' $(T)/tests.inc)
 
+# Shows a command while it runs.
+shown = @$(announce) '$(strip $1)' $1
 demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
+	@echo 'make demo, step 1 of 3: packages (half a minute the first time)'
 	@.ci/set-up demo
-	@$(MAKE) $(jobs) all
-	$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force --set output.frames_every_time=0.002 --set output.event_log=.true.
-	$(BUILD)/ricochet input/gas.nml -o runs/demo/gas.h5 --force
-	$(BUILD)/ricochet input/gas.nml -o runs/demo/gas_start.h5 --force --set stop.collisions_per_disk=8 \
-	  --set output.frames_every_time=0.002 --set output.event_log=.true.
-	$(venv) post/crater.py runs/demo/crater.h5 -o runs/demo/crater.png
-	$(venv) post/player.py runs/demo/crater.h5 -o runs/demo/crater.html --colour displacement
-	$(venv) post/speeds.py runs/demo/gas.h5 -o runs/demo/speeds.png
-	$(venv) post/snapshot.py runs/demo/gas.h5 -o runs/demo/gas.png
-	$(venv) post/player.py runs/demo/gas_start.h5 -o runs/demo/gas.html
+	@echo 'make demo, step 2 of 3: program and library (25 s on two idle cores the first time)'
+	@$(MAKE) $(jobs) all library
+	@echo 'make demo, step 3 of 3: two simulations and five pictures (10 s)'
+	$(call shown,$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force --set output.frames_every_time=0.002 --set output.event_log=.true.)
+	$(call shown,$(BUILD)/ricochet input/gas.nml -o runs/demo/gas.h5 --force)
+	$(call shown,$(BUILD)/ricochet input/gas.nml -o runs/demo/gas_start.h5 --force --set stop.collisions_per_disk=8 \
+	  --set output.frames_every_time=0.002 --set output.event_log=.true.)
+	$(call shown,$(venv) post/crater.py runs/demo/crater.h5 -o runs/demo/crater.png)
+	$(call shown,$(venv) post/player.py runs/demo/crater.h5 -o runs/demo/crater.html --colour displacement)
+	$(call shown,$(venv) post/speeds.py runs/demo/gas.h5 -o runs/demo/speeds.png)
+	$(call shown,$(venv) post/snapshot.py runs/demo/gas.h5 -o runs/demo/gas.png)
+	$(call shown,$(venv) post/player.py runs/demo/gas_start.h5 -o runs/demo/gas.html)
 	@echo 'In runs/demo: crater.html and gas.html, films for the browser; crater.png, speeds.png, gas.png; the data (*.h5).'
+	@echo 'Next: open runs/demo/crater.html in a browser; make lab (a page with moving disks and sliders);'
+	@echo '      a run of your own, as the README shows.'
 
 FILM ?= runs/film
 film: name = $(FILM)/$(basename $(notdir $(INPUT)))
@@ -260,7 +267,7 @@ lab:  ## sets up, builds, opens the laboratory in your browser
 
 notebook:  ## sets up, and opens the tour in JupyterLab
 	@.ci/set-up demo notebook
-	@$(MAKE) $(jobs) all && $(MAKE) library
+	@$(MAKE) $(jobs) all library
 	$(venv) -m jupyterlab $(if $(filter 0,$(shell id -u)),--allow-root) docs/tutorials/tour.ipynb
 
 figures:  ## draws the figures of all systems in runs/figures/ (long)
@@ -356,13 +363,14 @@ coverage:
 	@RICOCHET="$$(realpath '$(BUILD)')/coverage/ricochet" $(venv) -m pytest -q tests
 	@$(venv) -m gcovr --root . --filter src/ --fail-under-line 95 $(BUILD)/coverage
 
+# The pages need no optimised program, but use it if it exists.
+docs: site = $(BUILD)$(if $(wildcard $(BUILD)/ricochet),,/site)
 docs:  ## builds the documentation site: build/docs/index.html
 	@.ci/set-up demo docs
-	@$(MAKE) $(jobs) all
-	@$(MAKE) library
-	@$(venv) -m ford --quiet --no-search --src_dir "$$PWD/src" --output_dir "$$(realpath $(BUILD))/docs/fortran" --config \
+	@$(MAKE) $(jobs) $(if $(filter %/site,$(site)),OPT=-O1 BUILD=$(site)) all library
+	@$(announce) 'ford: pages of the sources' $(venv) -m ford --quiet --no-search --src_dir "$$PWD/src" --output_dir "$$(realpath $(BUILD))/docs/fortran" --config \
 	  'project = "Ricochet"; preprocess = false; display = ["public", "private"]; print_creation_date = false' src/README.md
-	@$(venv) docs/build_site.py $(BUILD)
+	@$(announce) 'Sphinx: all other pages' env RICOCHET="$$(realpath $(site))/ricochet" $(venv) docs/build_site.py $(BUILD)
 	@echo 'The site: $(BUILD)/docs/index.html'
 
 install: $(if $(wildcard $(BUILD)/ricochet),,all library)  ## for all users (PREFIX=, DESTDIR=); uninstall; dist: tarball

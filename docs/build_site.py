@@ -2,6 +2,9 @@
 
     python docs/build_site.py build
 
+The examples of the pages use the program build/ricochet, or the program that the variable
+RICOCHET of the environment names.
+
 The command `make docs` runs this script.  The script copies all pages to the folder
 build/docs-sources, and changes links between pages of different folders to links within the site;
 from this copy, Sphinx builds the site build/docs.  In each folder of docs/, the file README.md is
@@ -400,7 +403,8 @@ def main(build: Path) -> int:
     stage.write_python_reference()
     stage.write_script_pages()
     stage.tidy()
-    own = {"RICOCHET": str(build / "ricochet"), "PYTHONPATH": str(ROOT / "post")}
+    program = os.environ.get("RICOCHET", str(build / "ricochet"))
+    own = {"RICOCHET": program, "PYTHONPATH": str(ROOT / "post")}
     environment = os.environ | own | {"RICOCHET_SITE_CACHE": str(build / "docs-cache")}
     command = [sys.executable, "-m", "sphinx", "-a", "-W", "--keep-going", "-q", "-j", "auto"]
     command += ["-c", str(DOCS), "-d", str(build / "docs-doctrees"), str(stage.folder), str(site)]

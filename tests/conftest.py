@@ -16,6 +16,7 @@ from processor_times import (  # noqa: F401 (pytest finds its hooks here)
     pytest_runtest_protocol,
     slowest_tests,
 )
+from signs_of_life import SignsOfLife
 from whole_runs import ran, within
 
 # Processes that a shell starts in the background ignore these signals by default.
@@ -26,9 +27,13 @@ ROOT = Path(__file__).resolve().parents[1]
 ROOM = 4e9  #: for the files of the tests [bytes]
 
 
-def pytest_configure():
-    """Keep the files of the tests in memory if possible, so that a slow disk does not matter."""
-    memory = Path("/dev/shm")
+@pytest.hookimpl(trylast=True)  # after the terminal reporter exists
+def pytest_configure(config):
+    """Show signs of life, and keep the files of the tests in memory if possible."""
+    terminal = config.pluginmanager.get_plugin("terminalreporter")
+    if terminal and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(SignsOfLife(terminal))
+    memory = Path("/dev/shm")  # a slow disk then does not matter
     if os.access(memory, os.W_OK):
         disk = os.statvfs(memory)
         if disk.f_bavail * disk.f_frsize > ROOM and not disk.f_flag & os.ST_NOEXEC:

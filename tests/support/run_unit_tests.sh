@@ -9,9 +9,13 @@ runner=$1 program=$2 limit=${LIMIT:-300} hours=2
 export OMP_WAIT_POLICY=passive
 shift 2
 expected=$(cat "$@" | grep -ciE '^[[:space:]]*@test[[:space:]]*$')
-echo "$expected unit tests under $runner"
+. "$(dirname "$0")/../../.ci/progress.sh"
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+run() { (ulimit -S -c 0 -t "$limit" && timeout "${hours}h" "$program" >"$log" 2>&1); }
 status=0
-output=$(ulimit -S -c 0 -t "$limit" && timeout "${hours}h" "$program" 2>&1) || status=$?
+announce "$expected unit tests under $runner" run || status=$?
+output=$(<"$log")
 printf '%s\n' "$output"
 case $status in
   124) echo "unit tests: stopped after $hours hours" >&2 ;;
