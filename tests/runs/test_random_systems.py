@@ -366,8 +366,12 @@ def test_the_systems_draw_every_variable(program, tmp_path):
     assert known - NOT_DRAWN - drawn == set()
 
 
+@pytest.mark.statistics
 def test_many_systems_draw_every_pair_of_features_that_goes_together(program, tmp_path):
-    """Random systems contain every allowed pair of features, and the program accepts them."""
+    """Random systems contain every allowed pair of features, and the program accepts them.
+
+    The test draws 14 000 systems, because some pairs are rare.
+    """
     pairs, features = set(), set()
     systems = [random_system(random.Random(seed)) for seed in range(14000)]
     each = [(sorted(system.features()), system) for system in systems]
