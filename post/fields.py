@@ -1,7 +1,7 @@
 """Density, flow, temperature, stress and heat flux as functions of position in a steady state.
 
     python post/fields.py runs/fourier/*.h5 --across x -o fourier.png --csv fourier.csv
-    python post/fields.py runs/hopper.h5 --grid 16,24 -o hopper.png
+    python post/fields.py runs/leidenfrost.h5 --grid 12,24 -o rolls.png
 
 The box is divided into cells, and the fields in a cell are averages over the disks whose centres
 are in the cell.  The density n is the number of disks per accessible area (the area that centres
@@ -23,11 +23,14 @@ shaken bed, is therefore part of the temperatures, the stress and the heat flux.
 a warning if the oscillation of the centre of mass alone is more than 5 % of the kinetic energy
 along an axis.  The panel of the temperature shows kT_x and kT_y if they differ significantly.
 
-With --grid, the script also draws the stream function psi of the particle flux j = n u, where j_x =
-d psi / dy and j_y = -d psi / dx.  The contour lines of psi are the streamlines of the mean flow.
-The longest arrow represents the largest significant flow.  Arrows are pale in cells without
-significant flow, where chi^2 of the two components is below 5.99. In a gas without flow, noise
-alone causes a chi^2 above 5.99 in 5 % of the cells.
+With --grid, the script also draws the stream function psi of the particle flux j, where j_x = d psi
+/ dy and j_y = -d psi / dx.  The contour lines of psi are the streamlines of the mean flow, and the
+difference of psi between two points is the number of disks that pass between them per time.
+Recycled disks (drive.kind = 'recycle') leave the flow in one region and enter it in another.  A run
+with recycled disks therefore has no stream function, and only the arrows are drawn.  The longest
+arrow represents the largest significant flow.  Arrows are pale in cells without significant flow,
+where chi^2 of the two components is below 5.99. In a gas without flow, noise alone causes a chi^2
+above 5.99 in 5 % of the cells.
 
 For equal disks between two walls, dashed lines show predicted profiles without fitted parameters.
 A profile is calculated from the measured temperature and flow in the middle of the box, and from
@@ -53,7 +56,7 @@ from ricochet.analysis.fields import (
     prediction,
 )
 from ricochet.analysis.statistics import Estimate
-from ricochet.analysis.streams import stream_function
+from ricochet.analysis.streams import StreamFunction, stream_function
 from ricochet.analysis.equilibrium import motion_notes
 from ricochet.figures.drawing import band, draw_box, plt, titled
 from ricochet.reading.reader import SIDES
@@ -183,17 +186,15 @@ class Flow(NamedTuple):
 
     u: np.ndarray  # (2, C) along x and y [speed]
     significant: np.ndarray  # (C,) whether the flow differs from 0 by more than its error explains
-    stream: np.ndarray  # (NY + 1, NX + 1) stream function at the corners [1/time]
 
 
-def flow_of(run: Run, cells: tuple[int, int], found: dict[str, Estimate]) -> Flow:
-    """Return the measured mean flow, and the stream function of the particle flux."""
+def flow_of(found: dict[str, Estimate]) -> Flow:
+    """Return the measured mean flow."""
     parts = [found[name] for name in ("flow_x", "flow_y")]
     u, error = (np.array([part[k] for part in parts]) for k in (0, 1))
     with np.errstate(divide="ignore", invalid="ignore"):
         chi2 = np.sum(np.square(u / error), axis=0)
-    flux = (u * found["density"].mean).reshape(2, *cells[::-1])
-    return Flow(u, np.nan_to_num(chi2, posinf=0.0) > SIGNIFICANT, stream_function(run, flux))
+    return Flow(u, np.nan_to_num(chi2, posinf=0.0) > SIGNIFICANT)
 
 
 def draw_arrows(axes: plt.Axes, run: Run, cells: tuple[int, int], flow: Flow, colour: str) -> None:
@@ -217,9 +218,13 @@ def draw_arrows(axes: plt.Axes, run: Run, cells: tuple[int, int], flow: Flow, co
 
 
 def draw_grid(
-    runs: list[Run], cells: tuple[int, int], found: dict[str, Estimate], flow: Flow, title: str
+    runs: list[Run],
+    cells: tuple[int, int],
+    found: dict[str, Estimate],
+    stream: StreamFunction | None,
+    title: str,
 ) -> plt.Figure:
-    """Draw maps of density and temperature, and a map of the stream function with arrows."""
+    """Draw maps of density and temperature, and arrows on a map of the stream function, if any."""
     run = runs[0]
     figure, panels = plt.subplots(1, 3, figsize=(16, 1 + 4.5 * run.edges[1] / run.edges[0]))
     sides = [np.linspace(run.lower[k], run.upper[k], cells[k] + 1) for k in (0, 1)]
@@ -230,16 +235,23 @@ def draw_grid(
             image.set_clip_path(Circle(one.centre, one.radius, transform=axes.transData))
         figure.colorbar(image, ax=axes, label=run.units.label(*LABELS[name]), shrink=0.8)
     draw_box(panels[2], run)
-    top = float(np.abs(flow.stream).max()) or 1.0
-    levels = np.linspace(-top, top, 16)  # even: no line at 0, where noise dominates
-    style = {"cmap": "RdBu_r", "zorder": 0.2}
-    filled = panels[2].contourf(*sides, flow.stream, levels, **style)
-    panels[2].contour(*sides, flow.stream, levels, colors="0.5", linewidths=0.5, zorder=0.3)
-    label = run.units.label("stream function ψ of the flux n u", "rate")
-    figure.colorbar(filled, ax=panels[2], label=label, shrink=0.8, format="%.2g", ticks=levels[::3])
-    draw_arrows(panels[2], run, cells, flow, "black")
+    if stream is not None:
+        draw_stream(figure, panels[2], run, sides, stream.corners.mean)
+    draw_arrows(panels[2], run, cells, flow_of(found), "black")
     figure.suptitle(title)
     return figure
+
+
+def draw_stream(
+    figure: plt.Figure, axes: plt.Axes, run: Run, sides: list[np.ndarray], psi: np.ndarray
+) -> None:
+    """Draw a stream function (NY + 1, NX + 1) as colours with contour lines."""
+    top = float(np.abs(psi).max()) or 1.0
+    levels = np.linspace(-top, top, 16)  # even: no line at 0, where noise dominates
+    filled = axes.contourf(*sides, psi, levels, cmap="RdBu_r", zorder=0.2)
+    axes.contour(*sides, psi, levels, colors="0.5", linewidths=0.5, zorder=0.3)
+    label = run.units.label("stream function ψ of the flux", "rate")
+    figure.colorbar(filled, ax=axes, label=label, shrink=0.8, format="%.2g", ticks=levels[::3])
 
 
 def cells_of(text: str) -> tuple[int, ...]:
@@ -280,13 +292,14 @@ def main() -> None:
     middles = places(runs[0], cells)
     data = {"x": middles[:, 0], "y": middles[:, 1]} | spread({"": found})
     if args.grid:
-        flow = flow_of(runs[0], cells, found)
-        middle = sum(
-            flow.stream[i : -1 + i or None, j : -1 + j or None] for i in (0, 1) for j in (0, 1)
-        )
-        data |= {"stream_function": middle.ravel() / 4}
-        data |= {"flow_significant": flow.significant.astype(int)}
-        figure = draw_grid(runs, cells, found, flow, title)
+        stream = None
+        if any("recycled" in run.nature for run in runs):
+            notes.append("recycled disks enter the flow inside the box: no stream function")
+        else:
+            stream = stream_function(runs, args.equilibration, cells, args.species)
+            data |= spread({"": {"stream_function": stream.middles}})
+        data |= {"flow_significant": flow_of(found).significant.astype(int)}
+        figure = draw_grid(runs, cells, found, stream, title)
     else:
         x, law = data["xy"[axis]], None
         if has_theory(runs, axis):

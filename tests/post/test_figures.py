@@ -18,7 +18,6 @@ from ricochet import (
     read_run,
     script,
     statistics,
-    streams,
     thermodynamics,
 )
 from ricochet.figures.drawing import plt
@@ -389,30 +388,6 @@ def test_spins_have_a_colour(tmp_path, rng, figures, capsys, simulated):
 # --- flows ---
 
 
-@pytest.mark.parametrize("periodic", [(False, False), (True, False), (False, True), (True, True)])
-def test_a_stream_function_is_found_from_its_flux(rng, periodic):
-    """Random modes that satisfy the boundary conditions, with a flux along periodic axes."""
-    edges = rng.uniform(0.5, 3, 2)
-    ends = [np.linspace(0, edge, int(rng.integers(30, 45)) + 1) for edge in edges]
-    through = rng.normal(size=2) * periodic
-    waves = np.where(periodic, 2, 1) * np.pi * rng.integers(1, 3, (3, 2)) / edges
-    phases, sizes = np.where(periodic, rng.uniform(0, 6, (3, 2)), 0), rng.normal(size=3)
-
-    def psi(x, y):
-        parts = zip(sizes, waves, phases, strict=True)
-        total = sum(a * np.sin(k[0] * x + p[0]) * np.sin(k[1] * y + p[1]) for a, k, p in parts)
-        return total + through[0] * y - through[1] * x
-
-    x, y = np.meshgrid(*((end[1:] + end[:-1]) / 2 for end in ends))
-    step = 1e-5
-    flux = np.stack([psi(x, y + step) - psi(x, y - step), psi(x - step, y) - psi(x + step, y)])
-    run = SimpleNamespace(edges=edges, periodic=np.array(periodic))
-    found = streams.stream_function(run, flux / (2 * step))
-    exact = psi(*np.meshgrid(*ends))
-    exact = exact - exact[0, 0]
-    assert np.abs(found - exact).max() < 0.03 * np.ptp(exact)
-
-
 def test_arrows_are_as_long_as_the_largest_flow_beyond_its_error(tmp_path, rng):
     """A noisy roll of 5 % of the thermal speed is drawn dark, and sets the scale of the arrows."""
     x = rng.uniform(0, 1, (1, 4, 2))
@@ -422,8 +397,7 @@ def test_arrows_are_as_long_as_the_largest_flow_beyond_its_error(tmp_path, rng):
     u[:, 7], error[:, 7] = (0.5, 0.5), 1.0
     names = zip(("flow_x", "flow_y"), u, error, strict=True)
     found = {name: statistics.Estimate(*own) for name, *own in names}
-    found["density"] = statistics.Estimate(np.ones(80), np.zeros(80))
-    flow = fields_figure.flow_of(run, cells, found)
+    flow = fields_figure.flow_of(found)
     assert flow.significant[5] and not flow.significant[7] and flow.significant.sum() < 14
     figure, axes = plt.subplots()
     fields_figure.draw_arrows(axes, run, cells, flow, "black")

@@ -213,17 +213,16 @@ def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[B
     return blocks, float(np.sum(alike * (counts - 1)) / size)
 
 
-def block_correlation(members: Members, blocks: list[Block], most: float) -> np.ndarray:
+def block_correlation(
+    members: Members, blocks: list[Block], most: float, least: np.ndarray
+) -> np.ndarray:
     """Return, for each of F fields (G, F, C), the correlation (F,) of neighbouring blocks of time.
 
     The correlation is twice the sum of products of the deviations of neighbouring blocks from the
     mean, divided by the sum of squared deviations.  The correlation of a field is computed from
     sums over all cells together, because the blocks are too few for an estimate in a single cell.
-    The correlations are limited to the range from 0 to `most`.  For the flow, the lower limit of
-    the range is `FLOW_LEAST` instead of 0, because neighbouring blocks of the flow can be
-    anticorrelated: the flow is the rate of change of a bounded displacement.
+    The correlations are limited to the range from `least` (F,) to `most`.
     """
-    least = np.array([FLOW_LEAST if name.startswith("flow") else 0.0 for name in NAMES])
     size, same = len(blocks), [a.run is b.run for a, b in pairwise(blocks)]
     rest = np.nan_to_num(members.rests())
     square = np.maximum(np.sum(rest**2, axis=(0, 2)), np.finfo(float).tiny)
@@ -332,6 +331,9 @@ NAMES = (
     *("density", "flow_x", "flow_y", "temperature", "kT_x", "kT_y", "rotational_temperature"),
     *("stress_xx", "stress_xy", "stress_yy", "heat_x", "heat_y"),
 )
+#: Smallest correlation of neighbouring blocks.  The flow is the rate of change of a bounded
+#: displacement, so that neighbouring blocks of the flow can be anticorrelated.
+LEAST = np.array([FLOW_LEAST if name.startswith("flow") else 0.0 for name in NAMES])
 BY_FRAMES = np.array([name.startswith(("density", "stress", "heat")) for name in NAMES])
 
 
@@ -421,7 +423,7 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     for axis, name in enumerate(("kT_x", "kT_y")):
         values[:, NAMES.index(name)] *= run.n_disks / (run.n_disks - comoving(run)[axis])
     members = Members(values, share)
-    near = block_correlation(members, blocks, most)
+    near = block_correlation(members, blocks, most, LEAST)
     mean, error = members.estimate(near[:, None])
     frames, disks = parts[:, :2].sum(axis=0)
     room = np.max(areas, axis=0)

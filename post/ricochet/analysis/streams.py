@@ -1,92 +1,206 @@
-"""Stream function of a measured flow on a grid of cells.
+"""Stream function of the mean flow of disks in a steady state.
 
-In a steady state the flux of disks j = n u has no divergence.  Therefore a stream function psi
-exists, with j_x = d psi / dy and j_y = -d psi / dx.  The contour lines of psi are the streamlines
-of the mean flow.  The difference of psi between two streamlines is the number of disks that pass
-between these streamlines per unit of time.
+In a steady state the flux of disks j, their number that passes per length and time, has no
+divergence.  Therefore a stream function psi exists, with j_x = d psi / dy and j_y = -d psi / dx.
+The contour lines of psi are the streamlines of the mean flow.  The difference of psi between two
+points is the number of disks whose centres pass between these points per unit of time.
+
+The stream function minimises the integral of (j - j_psi)^2 over the box, where j_psi is the flux
+that follows from psi.  The minimum depends on j only through sums over disks of v times the
+gradients of the basis functions at the centres of the disks.  Therefore the flux is neither
+averaged over cells nor divided by an accessible area, and psi does not depend on the cells for
+which it is requested, as long as the finite elements are small.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 
+from ..reading.nature import Refused
 from ..reading.reader import Run
+from .estimates import Estimate
+from .fields import (
+    FLOW_LEAST,
+    Cells,
+    block_correlation,
+    blocks_of,
+    jackknife,
+    own_motion,
+    places,
+)
 
-__all__ = ["stream_function"]
+__all__ = ["StreamFunction", "stream_function"]
+
+FINE = 64  # smallest number of finite elements along an axis
 
 
-def stream_function(run: Run, flux: np.ndarray) -> np.ndarray:
-    """Fit a stream function to the flux of disks in cells.
+class StreamFunction(NamedTuple):
+    """Stream function at the corners and in the middles of C = NX NY cells [1/time]."""
 
-    The fit minimises the sum of squared deviations between the measured flux and the flux that
-    follows from the stream function.  The flux that follows from a stream function has no
-    divergence, so that the fit removes the part of the noise that has a divergence.
+    corners: Estimate  # (NY + 1, NX + 1)
+    middles: Estimate  # (C,) at the points that `fields.places` returns
+
+
+class Mesh(NamedTuple):
+    """Grid of bilinear finite elements that cover the box of a run."""
+
+    run: Run
+    count: tuple[int, int]  # elements along x and y
+
+    @property
+    def size(self) -> np.ndarray:
+        """Lengths (2,) of the sides of an element."""
+        return np.asarray(self.run.edges / self.count)
+
+    def corners_of(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the elements that contain points (P, 2) as nodes and functions at their corners.
+
+        The arrays (4, P) contain the numbers of the corners and the values of the basis functions
+        of the corners at the points.  The third array (4, 2, P) contains the derivatives of the
+        basis functions along x and y.
+        """
+        place = (points - self.run.lower) / self.size
+        cell = np.clip(place.astype(int), 0, np.array(self.count) - 1)
+        s, t = (place - cell).clip(0, 1).T
+        width, height = self.size
+        number = cell[:, 1] * (self.count[0] + 1) + cell[:, 0]
+        nodes = np.stack([number + a + b * (self.count[0] + 1) for b in (0, 1) for a in (0, 1)])
+        along_x, along_y = ((1 - s, s), (1 - t, t))
+        values = np.stack([along_x[a] * along_y[b] for b in (0, 1) for a in (0, 1)])
+        slopes = np.stack(
+            [
+                np.stack([(2 * a - 1) * along_y[b] / width, (2 * b - 1) * along_x[a] / height])
+                for b in (0, 1)
+                for a in (0, 1)
+            ]
+        )
+        return nodes, values, slopes
+
+    def loads(self, points: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Return the sums (nodes,) over disks of v_x d phi / dy - v_y d phi / dx.
+
+        The disks have the positions `points` (P, 2) and the velocities (P, 2); phi is the basis
+        function of a node.
+        """
+        nodes, _, slopes = self.corners_of(points)
+        parts = velocity[:, 0] * slopes[:, 1] - velocity[:, 1] * slopes[:, 0]
+        total = (self.count[0] + 1) * (self.count[1] + 1)
+        return np.bincount(nodes.ravel(), parts.ravel(), minlength=total)
+
+    def stiffness(self) -> scipy.sparse.csr_array:
+        """Return the integrals (nodes, nodes) of the products of gradients of basis functions."""
+        parts = []
+        for count, width in zip(self.count, self.size, strict=True):
+            ends = np.ones(count + 1)
+            ends[[0, -1]] = 0.5
+            beside = np.ones(count)
+            mass = scipy.sparse.diags_array([beside, 4 * ends, beside], offsets=[-1, 0, 1])
+            slope = scipy.sparse.diags_array([-beside, 2 * ends, -beside], offsets=[-1, 0, 1])
+            parts.append((mass * (width / 6), slope / width))
+        (mass_x, slope_x), (mass_y, slope_y) = parts
+        whole = scipy.sparse.kron(mass_y, slope_x) + scipy.sparse.kron(slope_y, mass_x)
+        return scipy.sparse.csr_array(whole)
+
+    def solve(self, loads: np.ndarray) -> np.ndarray:
+        """Return the stream functions (nodes, B) of B loads (nodes, B), which are 0 at node 0."""
+        unknowns, nodes = node_unknowns(self.count[1], self.count[0], self.run.periodic)
+        if not unknowns:
+            return np.zeros(loads.shape)
+        matrix = scipy.sparse.csc_array(nodes.T @ self.stiffness() @ nodes)
+        psi = nodes @ scipy.sparse.linalg.splu(matrix).solve(nodes.T @ loads)
+        return psi - psi[0]
+
+
+def stream_function(
+    runs: list[Run], skip: float | None, cells: Cells, species: str | None = None
+) -> StreamFunction:
+    """Measure the stream function of the flux of disks in the steady state.
 
     Parameters
     ----------
-    run : ricochet.Run
-        a run in the same box; no flux passes through the walls of the box
-    flux : numpy.ndarray
-        (2, NY, NX) density times flow along x and y [1/(length time)]; the value NaN, as in cells
-        inside obstacles, is treated as 0
+    runs : list of Run
+        (R,) runs of one input, which differ by their seed
+    skip : float, optional
+        duration of the equilibration, in collisions per disk [the first half of each run]
+    cells : tuple of int
+        numbers of cells along x and y
+    species : str, optional
+        name of the species whose flux is measured [all disks]
 
     Returns
     -------
-    numpy.ndarray
-        (NY + 1, NX + 1) stream function at the corners of the cells [1/time], which is 0 at the
-        lower left corner
+    StreamFunction
+        stream function at the corners and in the middles of the cells, which is 0 at the lower left
+        corner of the box and constant on each wall; the errors follow from the jackknife over
+        blocks of time
+
+    Raises
+    ------
+    Refused
+        if a run recycles disks, which leave the fluid in one region and enter it in another region
 
     Examples
     --------
-    >>> still = np.zeros((2, 4, 5))
-    >>> streams.stream_function(run, still).shape
-    (5, 6)
+    >>> psi = streams.stream_function(runs, None, (5, 4))
+    >>> psi.corners.mean.shape, psi.middles.error.shape
+    ((5, 6), (20,))
     """
-    _, rows, columns = flux.shape
-    edges = run.edges / (columns, rows)
-    unknowns, corners = corner_unknowns(rows, columns, run.periodic)
-    # Each row of the matrix `corners` expresses psi at one corner as a sum of unknowns. The flux in
-    # a cell is determined by differences of psi between the corners of the cell.
-    number = np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, columns + 1)
-    lower, upper, left, right = number[:-1], number[1:], number[:, :-1], number[:, 1:]
-    ends = slice(None, -1), slice(1, None)
-    along_y = [(one[:, end], sign / 2) for one, sign in ((upper, 1), (lower, -1)) for end in ends]
-    along_x = [(one[end], sign / 2) for one, sign in ((left, 1), (right, -1)) for end in ends]
-    matrix = scipy.sparse.vstack(
-        [
-            differences(along_y, number.size) @ corners / edges[1],
-            differences(along_x, number.size) @ corners / edges[0],
-        ]
+    for run in runs:
+        if "recycled" in run.nature:
+            why = "recycles disks, so that their flux begins and ends inside the box"
+            raise Refused(f"{run.path}: {why}: there is no stream function")
+    blocks, most = blocks_of(runs, skip, cells)
+    run = runs[0]
+    finer = [-(-FINE // count) for count in cells]
+    mesh = Mesh(run, (cells[0] * finer[0], cells[1] * finer[1]))
+    own = run.species > 0 if species is None else run.of_species(species)
+    loads = [
+        mesh.loads(
+            block.run.position[block.frames][:, own].reshape(-1, 2),
+            velocities(block.run, block.frames)[:, own].reshape(-1, 2),
+        )
+        for block in blocks
+    ]
+    psi = mesh.solve(np.stack(loads, axis=1))
+    shape = tuple(count + 1 for count in mesh.count[::-1])
+    corners = psi.reshape(*shape, -1)[:: finer[1], :: finer[0]]
+    nodes, values, _ = mesh.corners_of(places(run, cells))
+    middles = np.sum(values[..., None] * psi[nodes], axis=0)
+    frames = np.array([[float(len(block.frames))] for block in blocks])
+    sums = np.hstack([np.vstack([corners.reshape(-1, len(blocks)), middles]).T, frames])
+    members = jackknife(lambda total: total[:-1] / total[-1], sums, frames)
+    by_field = members._replace(values=members.values[:, None], share=members.share[:, None])
+    near = block_correlation(by_field, blocks, most, np.array([FLOW_LEAST]))
+    found = members.estimate(near)
+    edge = corners[..., 0].size
+    return StreamFunction(
+        Estimate(*(part[:edge].reshape(corners.shape[:2]) for part in found)),
+        Estimate(*(part[edge:] for part in found)),
     )
-    wanted = np.nan_to_num(flux).reshape(-1)
-    if not unknowns or not wanted.any():
-        return np.zeros(number.shape)
-    fitted = scipy.sparse.linalg.lsqr(matrix, wanted, atol=1e-10, btol=1e-10, iter_lim=20000)[0]
-    psi = (corners @ fitted).reshape(number.shape)
-    return psi - psi[0, 0]
 
 
-def differences(terms: list[tuple[np.ndarray, float]], count: int) -> scipy.sparse.csr_array:
-    """Return a sparse matrix, whose rows are weighted sums of values at the corners of a cell."""
-    cells = terms[0][0].size
-    rows = np.tile(np.arange(cells), len(terms))
-    columns = np.concatenate([corner.ravel() for corner, _ in terms])
-    values = np.repeat([factor for _, factor in terms], cells)
-    return scipy.sparse.csr_array((values, (rows, columns)), shape=(cells, count))
+def velocities(run: Run, frames: list[int]) -> np.ndarray:
+    """Return velocities (F, N, 2), relative to the centre of mass only if noise moves it."""
+    v = own_motion(run, frames)
+    height = run.position[frames][..., 1] - run.lower[1] - run.edges[1] / 2
+    v[..., 0] += run.shear_rate * height
+    return v
 
 
-def corner_unknowns(
+def node_unknowns(
     rows: int, columns: int, periodic: np.ndarray
 ) -> tuple[int, scipy.sparse.csr_array]:
-    """Return the number of unknowns, and the matrix that converts unknowns to psi at the corners.
+    """Return the number of unknowns, and the matrix that converts unknowns to psi at the nodes.
 
-    The unknowns of the fit are the values of psi at corners that are not on walls, followed by one
-    flux for each periodic axis.  All periodic images of a corner share one unknown.  Psi is
-    constant on each wall, and is 0 on the lower wall and on the left wall.  The flux along a
-    periodic axis through the whole box is, except for its sign, the difference of psi between the
-    two sides parallel to this axis.
+    The unknowns are the values of psi at nodes that are not on walls, followed by one flux for each
+    periodic axis.  All periodic images of a node share one unknown.  Psi is constant on each wall,
+    and is 0 on the lower wall and on the left wall.  Without walls, psi is 0 at the lower left
+    corner.  The flux along a periodic axis through the whole box is, except for its sign, the
+    difference of psi between the two sides parallel to this axis.
     """
     y, x = np.meshgrid(np.arange(rows + 1), np.arange(columns + 1), indexing="ij")
-    fixed = np.zeros(x.shape, dtype=bool)
+    fixed = (x % columns == 0) & (y % rows == 0) if np.all(periodic) else np.zeros(x.shape, bool)
     if not periodic[0]:
         fixed |= (x == 0) | (x == columns)
     if not periodic[1]:
