@@ -29,7 +29,7 @@ difference of psi between two points is the number of disks that pass between th
 Recycled disks (drive.kind = 'recycle') leave the flow in one region and enter it in another.  A run
 with recycled disks therefore has no stream function, and only the arrows are drawn.  The longest
 arrow represents the largest significant flow.  Arrows are pale in cells without significant flow,
-where chi^2 of the two components is below 5.99. In a gas without flow, noise alone causes a chi^2
+where chi^2 of the two components is below 5.99.  In a gas without flow, noise alone causes a chi^2
 above 5.99 in 5 % of the cells.
 
 For equal disks between two walls, dashed lines show predicted profiles without fitted parameters.

@@ -118,7 +118,7 @@ def test_recycled_disks_have_no_stream_function(tmp_path, rng, capsys):
     x, v, _ = in_a_funnel(rng)
     parameters = {"drive": {"kind": "recycle"}}
     path = write_run(tmp_path / "a.h5", x, v, radius=RADIUS, parameters=parameters)
-    with pytest.raises(Refused, match="recycles disks.*no stream function"):
+    with pytest.raises(Refused, match=r"recycles disks.*no stream function"):
         streams.stream_function([read_run(path)], None, (4, 4))
     rows = drawn(tmp_path, "fields", path, "--grid", "4,4")
     assert "flow_significant" in rows[0] and "stream_function" not in rows[0]
