@@ -11,24 +11,38 @@ dimensionless rate W_reduced = W sqrt(d / g).  If all runs have one value of D, 
 rate against time, from which the start of the steady state can be read.  If the runs have several
 values of D, the figure shows W_reduced against D / d.  If the runs have at least three values of D,
 the script determines C and k by a fit.  In a second fit the exponent is free, and k has the fixed
-value 1.4.  Beverloo, Leniger and van de Velde, Chemical Engineering Science 15, 260 (1961),
-measured k = 1.4 in three dimensions, where the exponent is 5/2.  Beverloo's law applies to rough
-disks.  The rate of smooth disks increases with the height of the bed.
+value 1.4.  If the radii are drawn (polydispersity), each seed has a different sample of radii, on
+which W depends.  The error of W then follows from the scatter of the runs.  The error of a single
+run does not contain the scatter between samples of radii, and the script prints a warning.
+Beverloo, Leniger and van de Velde, Chemical Engineering Science 15, 260 (1961), measured k = 1.4 in
+three dimensions, where the exponent is 5/2.  Beverloo's law applies to rough disks.  The rate of
+smooth disks increases with the height of the bed.
 """
 
+from typing import NamedTuple
+
 from ricochet import Run, RunError
-from ricochet.analysis.statistics import combine_runs, correlated_mean, rounded_to_error, windows
+from ricochet.analysis.statistics import (
+    Estimate,
+    SeriesMean,
+    combine_runs,
+    correlated_mean,
+    diagnostics,
+    estimate,
+    fit_law,
+    fit_power_law,
+    rounded_to_error,
+    windows,
+)
 from ricochet.figures.drawing import COLOURS, caption, plt
 from ricochet.reading.nature import Refused
-from ricochet.script import command_line, grouped, launch, measured, not_negative, over_runs, report
+from ricochet.script import command_line, grouped, launch, measured, not_negative, report
 
 import numpy as np
-from scipy.optimize import curve_fit
 
 EXPONENT = 1.5  # of Beverloo's law in two dimensions
 BEVERLOO = 1.4  # k of Beverloo, Leniger and van de Velde (1961)
 WINDOWS = 50  # number of mean rates in a figure against time
-LEAST_ERROR = 0.01  # relative error of a rate in the fits, besides its statistical error
 
 
 def mouth(run: Run) -> float:
@@ -76,40 +90,89 @@ def rates_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
     return time, np.diff(count) / np.diff(time)
 
 
-def fitted(x: np.ndarray, y: np.ndarray, error: np.ndarray) -> dict[str, tuple[float, float]]:
-    """Return C and k of the first fit and the exponent of the second fit, with standard errors."""
-    known = np.where(np.isfinite(error), error, 0)
-    sigma = np.hypot(known, LEAST_ERROR * y)
+def draws_radii(run: Run) -> bool:
+    """Return whether the program drew the radii of disks at random, as with polydispersity."""
+    species = run.parameters.get("species", {})
+    return any(float(species.get(name, {}).get("polydispersity", 0.0)) > 0 for name in run.names)
+
+
+def fitted(
+    x: np.ndarray, y: np.ndarray, error: np.ndarray | None = None, runs: np.ndarray | float = np.inf
+) -> dict[str, Estimate]:
+    """Return C and k of the first fit and the exponent of the second fit, with their errors.
+
+    The errors follow from the errors (M,) of the reduced rates `y`, each estimated from `runs`
+    independent values, or without `error` from the scatter of the points.
+    """
     largest = x.min() - 1e-6
 
     def law(x: np.ndarray, c: float, k: float) -> np.ndarray:
-        return c * (x - k) ** EXPONENT
+        return np.log(c) + EXPONENT * np.log(x - k)
 
-    def power(x: np.ndarray, c: float, n: float) -> np.ndarray:
-        return c * (x - BEVERLOO) ** n
-
-    bounds = ([0, -10], [np.inf, largest])
-    first, spread = curve_fit(law, x, y, [y[-1] / x[-1] ** EXPONENT, 1], sigma, bounds=bounds)
-    second, scatter = curve_fit(power, x, y, [first[0], EXPONENT], sigma)
-    errors = np.sqrt([*np.diag(spread), scatter[1, 1]])
-    return dict(
-        zip(("C", "k", "exponent"), zip([*first, second[1]], errors, strict=True), strict=True)
-    )
+    start = y.max() / x[np.argmax(y)] ** EXPONENT, min(1.0, largest - 1)
+    first = fit_law(law, x, y, start, error, runs, bounds=((1e-9, -10), (np.inf, largest)))
+    second = fit_power_law(x - BEVERLOO, y, error, runs)
+    if first is None or second is None:
+        return {}
+    both = map(Estimate, first.values, first.errors)
+    exponent = Estimate(second.exponent, second.exponent_error)
+    return dict(zip(("C", "k", "exponent"), (*both, exponent), strict=True))
 
 
-def table(runs: list[Run], after: float) -> tuple[list[dict], list[str]]:
-    """Return a table row for each width of the mouth, and warnings."""
-    rows, notes = [], []
+def mean_rate(runs: list[Run], members: list[SeriesMean]) -> SeriesMean:
+    """Return the mean of the rates of runs with one mouth.
+
+    If the radii are drawn, the error of the mean of several runs is that of their scatter.
+    """
+    if len(runs) < 2 or not any(map(draws_radii, runs)):
+        return combine_runs(members)
+    drift = sum(one.drift for one in members) / len(members) ** 0.5
+    means = estimate([one.mean for one in members])
+    return SeriesMean(*map(float, means), len(members), drift, len(members) - 1)
+
+
+class Rates(NamedTuple):
+    """Rates against the width of the mouth."""
+
+    rows: list[dict]  # a table row for each of the M widths
+    notes: list[str]
+    independent: np.ndarray  # (M,) number of independent values from which the error follows
+    complete: bool  # whether the errors contain the scatter between samples of radii
+
+
+def measured_rates(runs: list[Run], after: float) -> Rates:
+    """Measure the rate for each width of the mouth."""
+    rows, notes, independent, complete = [], [], [], True
     mouths = grouped(runs, lambda run: round(mouth(run), 9))
     for _, same in sorted(mouths, key=lambda pair: pair[0]):
         members = [rate(run, after) for run in same]
         width = round(float(np.mean([reduced_width(run) for run in same])), 6)
-        row = {"D_over_d": width, "runs": len(same)}
-        row |= over_runs("W", members, notes, f"D = {width:g} d")
+        whole = mean_rate(same, members)
+        notes += diagnostics(f"D = {width:g} d", members)
+        if len(same) < 2 and draws_radii(same[0]):
+            complete = False
+            notes.append(
+                f"D = {width:g} d: the error of a single run does not contain the scatter between "
+                "samples of radii (polydispersity); use several seeds"
+            )
+        row = {"D_over_d": width, "runs": len(same)} | measured("W", whole)
         reduced = [one.scaled(reduction(run)) for one, run in zip(members, same, strict=True)]
-        row |= measured("W_reduced", combine_runs(reduced))
-        rows.append(row | {"samples": round(combine_runs(members).samples, 1)})
-    return rows, notes
+        row |= measured("W_reduced", mean_rate(same, reduced))
+        rows.append(row | {"samples": round(whole.samples, 1)})
+        independent.append(whole.freedom + 1)
+    return Rates(rows, notes, np.array(independent), complete)
+
+
+def fit_of(found: Rates) -> dict[str, Estimate]:
+    """Fit Beverloo's law to measured rates; return an empty dictionary for fewer than 3 widths.
+
+    If the errors of the rates are unknown or incomplete, the errors of the fit follow from the
+    scatter of the points.
+    """
+    x, y, error = columns(found.rows)
+    if found.complete and np.all(error > 0):
+        return fitted(x, y, error, found.independent)
+    return fitted(x, y)
 
 
 def columns(rows: list[dict]) -> np.ndarray:
@@ -146,7 +209,7 @@ def draw_in_time(row: dict, runs: list[Run], after: float) -> plt.Figure:
     return figure
 
 
-def draw(rows: list[dict], runs: list[Run], fit: dict) -> plt.Figure:
+def draw(rows: list[dict], runs: list[Run], fit: dict[str, Estimate]) -> plt.Figure:
     """Draw the rates with the fits, and in a second panel rate^(2/3), which is linear in D."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8))
     x, y, error = columns(rows)
@@ -175,16 +238,15 @@ def main() -> None:
     words = "start of the steady state: earlier samples are left out [4]"
     parser.add_argument("--after", type=not_negative, default=4.0, metavar="T", help=words)
     args = parser.parse_args()
-    rows, notes = table(args.runs, args.after)
-    x, y, error = columns(rows)
-    fit = fitted(x, y, error) if len(rows) > 2 else {}
+    found = measured_rates(args.runs, args.after)
+    rows, fit = found.rows, fit_of(found)
     for name, (value, uncertainty) in fit.items():
         print(f"{name} = {value:.4f} ± {uncertainty:.4f}")
     if len(rows) == 1:
         figure = draw_in_time(rows[0], args.runs, args.after)
     else:
         figure = draw(rows, args.runs, fit)
-    report(args, figure, rows, notes=notes)
+    report(args, figure, rows, notes=found.notes)
 
 
 if __name__ == "__main__":

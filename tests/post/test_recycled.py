@@ -6,7 +6,7 @@ import pytest
 import discharge
 import player
 import trajectory
-from ricochet import ProgramError, RunError, Simulation, read_run
+from ricochet import ProgramError, RunError, Simulation, read_run, statistics
 from ricochet.analysis.correlations import Correlator
 from ricochet.reading.nature import Refused
 from synthetic_run import run_script, write_run
@@ -84,13 +84,15 @@ def test_the_engine_counts_recycled_disks_and_checks_changes(program, monkeypatc
         assert box.recycled
 
 
-def mouths(folder, widths, k, c, count=200):
+def mouths(folder, widths, k, c, count=200, **grain):
     """Write runs with the rate C sqrt(g / d) (D / d - k)^(3/2), where d = 0.02 and g = 4."""
+    folder.mkdir(exist_ok=True)
     paths = []
     for width in widths:
         rate = c * np.sqrt(4 / 0.02) * (width / 0.02 - k) ** 1.5
         time = np.linspace(0, 20, count)
         parameters = {"drive": {"kind": "recycle"}, "box": {"gravity": [0.0, -4.0]}}
+        parameters |= {"species/disk": grain} if grain else {}
         walls = [((0, 1), (0.5 - width / 2, 0.5)), ((1, 1), (0.5 + width / 2, 0.5))]
         paths.append(
             write_run(
@@ -105,22 +107,54 @@ def mouths(folder, widths, k, c, count=200):
 def test_the_rate_of_a_hopper_follows_the_law_that_it_has(tmp_path, capsys):
     """The fits return the values with which the rates were made."""
     paths = mouths(tmp_path, (0.1, 0.15, 0.2, 0.3), k=1.4, c=0.7)
-    rows, _ = discharge.table([read_run(path) for path in paths], 4)
+    rows = discharge.measured_rates([read_run(path) for path in paths], 4).rows
     assert [row["D_over_d"] for row in rows] == [5, 7.5, 10, 15]
     x, y = (np.array([row[name] for row in rows]) for name in ("D_over_d", "W_reduced"))
     per_time = np.array([row["W"] for row in rows])
     assert per_time == pytest.approx(0.7 * (x - 1.4) ** 1.5 * np.sqrt(4 / 0.02), rel=1e-6)
     assert y == pytest.approx(0.7 * (x - 1.4) ** 1.5, rel=1e-6)
-    found = discharge.fitted(x, y, np.zeros(4))
+    found = discharge.fitted(x, y)
     assert [one[0] for one in found.values()] == pytest.approx([0.7, 1.4, 1.5], rel=1e-5)
     assert run_script("discharge", *paths, "-o", tmp_path / "rate.png") == 0
     assert "k = 1.4000" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("widths", [3, 4])
+@pytest.mark.parametrize("runs", [1, 3])
+def test_68_of_100_fits_hold_the_law_however_few_the_widths(rng, widths, runs):
+    """The rates have random errors, which follow from the scatter of points or of three runs."""
+    held = []
+    for _ in range(200):
+        c, k = rng.uniform(0.5, 2), 1.4
+        x = np.sort(rng.uniform(4, 7) * np.geomspace(1, rng.uniform(2, 4), widths))
+        y = c * (x - k) ** 1.5 * (1 + rng.uniform(0.005, 0.03) * rng.normal(size=(runs, widths)))
+        own = statistics.estimate(y) if runs > 1 else y
+        fit = discharge.fitted(x, *own, *[runs] * (runs > 1))
+        truth = zip(fit.values(), (c, k, 1.5), strict=True)
+        held.append([abs(one.mean - true) < one.error for one, true in truth])
+    assert np.mean(held, axis=0) == pytest.approx(0.6827, abs=4 * 0.033)
+    assert np.mean(held) == pytest.approx(0.6827, abs=0.09)
+
+
+def test_a_rate_of_drawn_radii_has_the_error_of_their_scatter(tmp_path):
+    """Each seed has its own sample of radii; one run says nothing about the other samples."""
+    drawn = {"polydispersity": 0.1}
+    paths = [mouths(tmp_path / f"{c}", (0.2,), k=1.4, c=c, **drawn)[0] for c in (0.9, 1.0, 1.1)]
+    runs = [read_run(path) for path in paths]
+    found = discharge.measured_rates(runs, 4)
+    (row,) = found.rows
+    assert row["W_error"] / row["W"] == pytest.approx(0.1 * statistics.student(3) / 3**0.5)
+    assert found.complete and found.independent == [3]
+    single = discharge.measured_rates(runs[:1], 4)
+    assert not single.complete and "samples of radii" in single.notes[0]
+    alike = [read_run(mouths(tmp_path / "alike", (0.2,), k=1.4, c=1.0)[0])]
+    assert discharge.measured_rates(alike, 4).complete
+
+
 def test_the_rate_of_one_mouth_is_drawn_against_time(tmp_path):
     """The lines at the rate and at the number of disks meet the measured curves at the end."""
     runs = [read_run(path) for path in mouths(tmp_path, (0.2,), k=1.4, c=0.7)]
-    rows, _ = discharge.table(runs, 4)
+    rows = discharge.measured_rates(runs, 4).rows
     figure = discharge.draw_in_time(rows[0], runs, 4)
     left, right = figure.axes
     measured, line, *_ = left.lines

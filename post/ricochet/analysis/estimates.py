@@ -1,6 +1,6 @@
 """Means, densities and fits of independent values, with errors, and goodness-of-fit tests."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,11 +12,13 @@ from ..predictions.theory import Law
 __all__ = [
     "Curve",
     "Estimate",
+    "LawFit",
     "LawTest",
     "PowerLaw",
     "binned",
     "estimate",
     "excess_kurtosis",
+    "fit_law",
     "fit_power_law",
     "goodness_of_fit",
     "kurtosis_noise",
@@ -54,6 +56,15 @@ class LawTest(NamedTuple):
     ks_p: float  # probability of a larger distance by chance
     chi2: float  # per degree of freedom, bins of equal probability
     chi2_p: float
+
+
+class LawFit(NamedTuple):
+    """K parameters of a law that is fitted to points, with the errors of the parameters."""
+
+    values: np.ndarray  # (K,)
+    errors: np.ndarray  # (K,) half the 68 % intervals
+    chi2: float = float("nan")  # chi^2 per degree of freedom; NaN if the points have no errors
+    missed: bool = False  # whether points deviate from the law by more than their errors explain
 
 
 class PowerLaw(NamedTuple):
@@ -295,14 +306,9 @@ def kurtosis_noise(count: int) -> float:
 
 
 def fit_power_law(
-    x: np.ndarray, y: np.ndarray, y_error: np.ndarray | None = None, runs: float = MANY
+    x: np.ndarray, y: np.ndarray, y_error: np.ndarray | None = None, runs: ArrayLike = MANY
 ) -> PowerLaw | None:
-    """Fit a power law as a straight line of ln y against ln x; all points have equal weights.
-
-    Weights from the errors of few runs would be too noisy: with four runs they would increase the
-    scatter of the exponent, and its error would be too small.  If the points deviate from the law
-    by more than their errors explain, the error of the exponent is multiplied by the square root of
-    chi^2 per degree of freedom.
+    """Fit a power law as a straight line of ln y against ln x; see `fit_law` for the error.
 
     Parameters
     ----------
@@ -310,8 +316,9 @@ def fit_power_law(
         (P,) the points; points with a coordinate that is not positive are left out
     y_error : numpy.ndarray, optional
         (P,) errors of y; without them the error of the fit follows from the scatter of the points
-    runs : float, optional
-        number of runs from which each error of y was estimated; without it the errors are exact
+    runs : array_like, optional
+        number of runs from which each error of y was estimated, a number or (P,); without it the
+        errors are exact
 
     Returns
     -------
@@ -327,27 +334,110 @@ def fit_power_law(
     (3.0, 2.0)
     """
     alike = y_error is None
-    x, y, y_error = (np.asarray(a, dtype=float) for a in (x, y, y if alike else y_error))
-    good = (x > 0) & (y > 0) & (y_error > 0)
-    if len(np.unique(x[good])) < 3:
+    x, y, error, runs = usable(x, y, y if alike else y_error, runs)
+    if len(np.unique(x)) < 3:
         return None
-    log_x, log_y, relative = np.log(x[good]), np.log(y[good]), y_error[good] / y[good]
-    free = int(good.sum()) - 2
+    log_x, log_y = np.log(x), np.log(y)
     exponent, offset = map(float, np.polyfit(log_x, log_y, 1))
-    factor = float(np.exp(offset))
-    share = log_x - log_x.mean()
-    share /= share @ share  # the exponent is the sum of the products share * log_y
-    if alike:
-        rest = log_y - (offset + exponent * log_x)
-        error = student(free + 1) * np.sqrt(rest @ rest / free * (share @ share))
-        return PowerLaw(factor, exponent, float(error))
-    variance = (share * relative / student(runs)) ** 2
-    degrees = (runs - 1) * variance.sum() ** 2 / np.sum(variance**2)  # Welch and Satterthwaite
-    line = np.polyfit(log_x, log_y, 1, w=1 / relative)
-    chi2 = float(np.sum(((log_y - np.polyval(line, log_x)) / relative) ** 2) / free)
-    missed = points_miss_a_law(chi2, free, runs)
-    error = student(degrees + 1) * np.sqrt(variance.sum() * (chi2 if missed else 1.0))
-    return PowerLaw(factor, exponent, float(error), chi2, missed)
+    slopes, rest = np.stack([log_x, np.ones(len(x))], axis=1), log_y - (offset + exponent * log_x)
+    relative = None if alike else error / y
+    fit = with_errors(np.array([exponent, offset]), slopes, rest, relative, runs)
+    return PowerLaw(float(np.exp(offset)), exponent, float(fit.errors[0]), fit.chi2, fit.missed)
+
+
+def fit_law(
+    logarithm: Callable[..., np.ndarray],
+    x: ArrayLike,
+    y: ArrayLike,
+    start: Sequence[float],
+    y_error: ArrayLike | None = None,
+    runs: ArrayLike = MANY,
+    bounds: tuple[Sequence[float], Sequence[float]] = ((-np.inf, -np.inf), (np.inf, np.inf)),
+) -> LawFit | None:
+    """Fit two parameters of a law to the logarithms of points; all points have equal weights.
+
+    Weights from the errors of few runs would be too noisy: with four runs they would increase the
+    scatter of an exponent, and its error would be too small.  If the points deviate from the law by
+    more than their errors explain, the errors of the parameters are multiplied by the square root
+    of chi^2 per degree of freedom.  All errors contain Student's factor.
+
+    Parameters
+    ----------
+    logarithm : callable
+        function of x and the two parameters that returns ln y
+    x, y : array_like
+        (P,) the points; points with a coordinate that is not positive are left out
+    start : sequence of float
+        (2,) values of the parameters from which the search begins
+    y_error : array_like, optional
+        (P,) errors of y; without them the errors of the parameters follow from the scatter of the
+        points
+    runs : array_like, optional
+        number of runs from which each error of y was estimated, a number or (P,); without it the
+        errors are exact
+    bounds : tuple, optional
+        smallest and largest allowed values of the parameters
+
+    Returns
+    -------
+    LawFit or None
+        the parameters, or None if fewer than three points have different x
+
+    Examples
+    --------
+    >>> x = np.array([3.0, 5.0, 9.0, 17.0])
+    >>> law = lambda x, c, k: np.log(c * np.sqrt(x - k))
+    >>> fit_law(law, x, 2 * np.sqrt(x - 1), (1, 0), bounds=((0, -9), (9, 2.9))).values.round(6)
+    array([2., 1.])
+    """
+    alike = y_error is None
+    x, y, error, runs = usable(x, y, y if alike else y_error, runs)
+    if len(np.unique(x)) < 3:
+        return None
+    log_y = np.log(y)
+
+    def rest(values: np.ndarray) -> np.ndarray:
+        return logarithm(x, *values) - log_y
+
+    tight = {"xtol": 1e-12, "ftol": 1e-12, "gtol": 1e-12, "x_scale": "jac", "jac": "3-point"}
+    found = scipy.optimize.least_squares(rest, start, bounds=bounds, **tight)
+    return with_errors(found.x, found.jac, -found.fun, None if alike else error / y, runs)
+
+
+def usable(
+    x: ArrayLike, y: ArrayLike, error: ArrayLike | None, runs: ArrayLike
+) -> tuple[np.ndarray, ...]:
+    """Return x, y, error and number of runs of the points at which the first three are positive."""
+    x, y, error = (np.asarray(part, dtype=float) for part in (x, y, error))
+    good = (x > 0) & (y > 0) & (error > 0)
+    return x[good], y[good], error[good], np.broadcast_to(np.asarray(runs, float), x.shape)[good]
+
+
+def with_errors(
+    values: np.ndarray,
+    slopes: np.ndarray,
+    rest: np.ndarray,
+    relative: np.ndarray | None,
+    runs: np.ndarray,
+) -> LawFit:
+    """Return fitted parameters (K,) with their errors.
+
+    The derivatives of ln y with respect to the parameters are `slopes` (P, K), and `rest` (P,) are
+    the deviations of ln y from the law.  The relative errors of y are `relative` (P,), or unknown.
+    """
+    share = np.linalg.pinv(slopes)  # the derivatives (K, P) of the parameters with respect to ln y
+    free = len(rest) - 2
+    if relative is None:
+        variance = np.sum(share**2, axis=1) * (rest @ rest) / free
+        return LawFit(values, student(free + 1) * np.sqrt(variance))
+    parts = (share * relative / student(runs)) ** 2
+    variance = parts.sum(axis=1)
+    degrees = variance**2 / np.sum(parts**2 / (runs - 1), axis=1)  # Welch and Satterthwaite
+    best = np.linalg.lstsq(slopes / relative[:, None], rest / relative, rcond=None)[0]
+    chi2 = float(np.sum(((rest - slopes @ best) / relative) ** 2) / free)
+    missed = points_miss_a_law(chi2, free, float(runs.min()))
+    errors = student(degrees + 1) * np.sqrt(variance * (chi2 if missed else 1.0))
+    return LawFit(values, errors, chi2, missed)
 
 
 def points_miss_a_law(chi2: float, free: int, runs: float) -> bool:

@@ -16,11 +16,13 @@ from .estimates import (
     UNLIKELY,
     Curve,
     Estimate,
+    LawFit,
     LawTest,
     PowerLaw,
     binned,
     estimate,
     excess_kurtosis,
+    fit_law,
     fit_power_law,
     goodness_of_fit,
     kurtosis_noise,
@@ -32,6 +34,7 @@ from .estimates import (
 __all__ = [
     "Curve",
     "Estimate",
+    "LawFit",
     "LawTest",
     "PowerLaw",
     "SeriesMean",
@@ -42,6 +45,7 @@ __all__ = [
     "equilibration",
     "estimate",
     "excess_kurtosis",
+    "fit_law",
     "fit_power_law",
     "goodness_of_fit",
     "has_drift",
@@ -140,6 +144,11 @@ def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> Series
     The estimate is the ratio R of the sums of the two series.  The error of the ratio R is the
     error of the mean of the series (amount - R per) / (mean of per), estimated from the slowest
     Fourier components of the series.
+
+    The error describes fluctuations that occur within the series.  If a state never changes during
+    a run, such as the order of disks in a narrow channel or the structure of a glass, the error of
+    one run does not contain the differences between such states.  Use the scatter of several runs
+    with different starts.
 
     Parameters
     ----------
