@@ -15,7 +15,8 @@ values of T_therm for the energy difference minus its error and plus its error. 
 30 disks of each species, the error of the relative energy difference is 26 %, which is too large to
 determine T_therm; therefore many runs or many disks are required.  In the table, K_light and
 K_heavy are mean energies in equilibrium, which begins after the first X collisions per disk, where
-X is the value of --equilibration, or by default when no observable drifts any longer.
+X is the value of --equilibration and by default 15, or later if an observable drifts significantly
+after 15 collisions per disk.
 """
 
 from collections.abc import Callable
@@ -32,7 +33,7 @@ from ricochet.analysis.statistics import (
     student,
     windows,
 )
-from ricochet.analysis.equilibrium import start_of_equilibrium
+from ricochet.analysis.equilibrium import relaxed_start
 from ricochet.analysis.thermodynamics import lightest_and_heaviest
 from ricochet.figures.drawing import caption, colours, plt
 from ricochet.reading.nature import SETTLED, allow
@@ -116,7 +117,7 @@ def late(runs: list[Run], name: str, skip: float | None) -> Estimate:
     means = []
     for run in runs:
         time, value = run.observable(name)
-        means.append(value[time >= start_of_equilibrium(run, skip)].mean())
+        means.append(value[time >= relaxed_start(run, skip)[0]].mean())
     return estimate(means)
 
 
@@ -150,7 +151,7 @@ def draw(groups: list, results: list[Approach], until: float, within: float) -> 
 
 
 def main() -> None:
-    parser = command_line(__doc__, "equipartition.png", equilibration=None)
+    parser = command_line(__doc__, "equipartition.png", equilibration="15, or until no drift")
     parser.add_argument(
         "--window", type=float, default=0.5, help="duration of each window of time [0.5]"
     )

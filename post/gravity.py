@@ -3,24 +3,26 @@
     python post/gravity.py runs/gravity/long.h5 -o gravity.png --csv gravity.csv
 
 The temperature kT is the mean kinetic energy of a disk in equilibrium.  Equilibrium begins after
-the first X collisions per disk, where X is the value of --equilibration, or by default when no
-observable drifts any longer.  The figure and the second table state why the frames before
-equilibrium are not used.  The solid lines show P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~
-exp(-m g h / kT).  The height h is the height of the centre of a disk above its lowest possible
-position.  The laws that the solid lines show are exact for a large number of point particles.  The
-dashed lines include two corrections.  The first correction is for a fixed total energy of N disks:
-it replaces the factor exp(-e / kT) for the energy e of a disk by (1 - e / (2 N kT))^(2 N - 2).  The
-second correction accounts for the area that disks exclude for the centres of other disks.  The
-centres of disks of species i cannot be in the area pi s_ij^2 around each disk of species j, where
-s_ij is the sum of the two radii.  To first order, the excluded area multiplies the density of
-species i by exp(-sum_j pi s_ij^2 n_j(h)).  The correction for the excluded area is a few per cent
-near the floor.  If sum_j pi s_ij^2 n_j(h), calculated for point particles, exceeds 0.5 at the
-floor, no dashed line is drawn for the heights.
+the first X collisions per disk, where X is the value of --equilibration and by default 15.  If an
+observable drifts significantly after 15 collisions per disk, equilibrium begins later, when no
+observable drifts any longer.  The figure and the second table state which frames are left out, and
+why.  The solid lines show P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT).  The
+height h is the height of the centre of a disk above its lowest possible position.  The laws that
+the solid lines show are exact for a large number of point particles.  The dashed lines include two
+corrections.  The first correction is for a fixed total energy of N disks: it replaces the factor
+exp(-e / kT) for the energy e of a disk by (1 - e / (2 N kT))^(2 N - 2).  The second correction
+accounts for the area that disks exclude for the centres of other disks.  The centres of disks of
+species i cannot be in the area pi s_ij^2 around each disk of species j, where s_ij is the sum of
+the two radii.  To first order, the excluded area multiplies the density of species i by exp(-sum_j
+pi s_ij^2 n_j(h)).  The correction for the excluded area is a few per cent near the floor.  If sum_j
+pi s_ij^2 n_j(h), calculated for point particles, exceeds 0.5 at the floor, no dashed line is drawn
+for the heights.
 
 The slopes are maximum-likelihood estimates of the decay constants of exponential distributions.
-The fits use kinetic energies between 0 and 5 kT, and values of m g h between 1 and 5 kT.  Heights
-with m g h below 1 kT are left out, because the finite size of the disks flattens the distribution
-near the floor.  The errors of the slopes follow from the jackknife over ten blocks of time.
+The fits use kinetic energies between 0 and 5 kT, and values of m g h between 1 and 5 kT.  If the
+lid of the box is lower than 5 kT / m g, the fit of the heights ends at the lid.  Heights with m g h
+below 1 kT are left out, because the finite size of the disks flattens the distribution near the
+floor.  The errors of the slopes follow from the jackknife over ten blocks of time.
 """
 
 from typing import NamedTuple
@@ -77,7 +79,7 @@ def log_slope(values: np.ndarray, limits: tuple[float, float]) -> float:
     """
     inside = values[(values >= limits[0]) & (values <= limits[1])]
     reach = limits[1] - limits[0]
-    if len(inside) < FEWEST_VALUES:
+    if len(inside) < FEWEST_VALUES or reach <= 0:
         return float("nan")
 
     def excess(decay: float) -> float:
@@ -87,17 +89,26 @@ def log_slope(values: np.ndarray, limits: tuple[float, float]) -> float:
     return float(scipy.optimize.brentq(excess, -STEEPEST, STEEPEST) / reach)
 
 
-def slope_of(values: np.ndarray, reach: tuple[float, float], laws: np.ndarray) -> Estimate:
+def fit_limits(
+    reach: tuple[float, float], law: float, largest: float = np.inf
+) -> tuple[float, float]:
+    """Return the limits of a fit, which ends at the largest value that a disk can have."""
+    return reach[0] / law, min(reach[1] / law, largest)
+
+
+def slope_of(
+    values: np.ndarray, reach: tuple[float, float], laws: np.ndarray, largest: float = np.inf
+) -> Estimate:
     """Return the decay constant of values (F, n), divided by that of the law, with its error.
 
-    The argument `reach` is the range of the fit in units of kT.  The error is determined by the
-    jackknife method.  The first element of `laws` (BLOCKS + 1,) is the slope of the law for the
-    mean kT of all frames; each other element is the slope for the mean kT without the frames of one
-    block.
+    The argument `reach` is the range of the fit in units of kT, and `largest` is the largest value
+    that a disk can have.  The error is determined by the jackknife method.  The first element of
+    `laws` (BLOCKS + 1,) is the slope of the law for the mean kT of all frames; each other element
+    is the slope for the mean kT without the frames of one block.
     """
 
     def over(law: float, own: np.ndarray) -> float:
-        return log_slope(own, (reach[0] / law, reach[1] / law)) / law
+        return log_slope(own, fit_limits(reach, law, largest)) / law
 
     whole = over(laws[0], values)
     if len(values) < BLOCKS:
@@ -202,13 +213,15 @@ def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[d
         row = {"species": name, "mass": s.mass, "kT": temperature, "kT_error": kt[1]}
         for part, energies in (("K", s.square), ("K_x", s.square_x)):
             row |= measured(part, correlated_mean(0.5 * s.mass * energies.mean(axis=1)))
-        for kind, other, law, values, reach, x, weight in (
-            ("speed", "shared", v_law, s.square, SPEED_RANGE, squares, shared),
-            ("height", "crowded", h_law, s.height, HEIGHT_RANGE, grid, density),
+        lid = float(run.edges[1] - 2 * s.radius)
+        for kind, other, law, values, reach, x, weight, largest in (
+            ("speed", "shared", v_law, s.square, SPEED_RANGE, squares, shared, np.inf),
+            ("height", "crowded", h_law, s.height, HEIGHT_RANGE, grid, density, lid),
         ):
-            limits = tuple(np.array(reach) / law)
-            row |= measured(f"{kind}_slope", slope_of(values, reach, law / warm))
+            limits = fit_limits(reach, law, largest)
+            row |= measured(f"{kind}_slope", slope_of(values, reach, law / warm, largest))
             row[f"{kind}_{other}"] = law_slope(x, weight, limits, values.size) / law
+        row["height_fit_to"] = float(min(HEIGHT_RANGE[1], h_law * lid))
         rows.append(row)
     return rows
 
@@ -263,15 +276,20 @@ def draw(run: Run, species: list[Samples], result: list[dict], began: tuple) -> 
                 one.plot(x, dashed, color="black", lw=1.0, ls="--")
     titles = (
         "slope fitted for $mv^2/2$ = {:g} to {:g} kT, over $m/2kT$".format(*SPEED_RANGE),
-        "slope fitted for $mgh$ = {:g} to {:g} kT, over $mg/kT$".format(*HEIGHT_RANGE),
+        "slope fitted for $mgh$ = {:g} to {:g} kT or the lid, over $mg/kT$".format(*HEIGHT_RANGE),
     )
     names = (
         run.units.label("$v^2$", "squared speed"),
         run.units.label("height h of the centre above its lowest position", "length"),
     )
-    for row, title, name, known in zip(panels, titles, names, (1, lawful[0]), strict=True):
+    densities = (
+        run.units.label("probability density", f"1/{quantity}")
+        for quantity in ("squared speed", "length")
+    )
+    each = zip(panels, titles, names, densities, (1, lawful[0]), strict=True)
+    for row, title, name, density, known in each:
         top = row[0].get_ylim()[1]
-        row[0].set(ylabel="probability density", xlim=(0, None), ylim=(0, top))
+        row[0].set(ylabel=density, xlim=(0, None), ylim=(0, top))
         row[0].legend(loc="upper right", title=title)
         row[1].set(yscale="log", ylim=(1e-4 * top, 1.5 * top))
         for axes in row:
@@ -282,30 +300,36 @@ def draw(run: Run, species: list[Samples], result: list[dict], began: tuple) -> 
                 [], [], color="black", lw=1, ls="--", label="finite number and size of disks"
             )
             row[1].legend(*(part[-2:] for part in row[1].get_legend_handles_labels()))
-    when, found = f"t = {began[0]:.4g} to {run.time[-1]:g}", (kt, result[0]["kT_error"])
+    second, found = f" {run.units.time}".rstrip(), (kt, result[0]["kT_error"])
+    when = f"t = {began[0]:.4g} to {run.time[-1]:g}{second}"
     figure.suptitle(
         f"{caption([run])},  {when},  kT = {' ± '.join(rounded_to_error(*found))}\n"
-        f"left out before: {began[1]}"
+        f"left out before t = {began[0]:.4g}{second}: {began[1]}"
     )
     return figure
 
 
 def main() -> None:
-    args = command_line(__doc__, "gravity.png", one=True, equilibration=None).parse_args()
+    starts = {"equilibration": "15, or until no drift"}
+    args = command_line(__doc__, "gravity.png", one=True, **starts).parse_args()
     (run,) = args.runs
     known = "walls", "gravity", "mixture", "thermal_walls", "thermostatted", "time_stepped"
     allow(run, "the exponential laws do not apply to it", *known)
-    start, reason = equilibrium.explained_start(run, args.equilibration)
+    start, reason = equilibrium.relaxed_start(run, args.equilibration)
     frames = thermodynamics.frames_from(run, start)
     if not run.gravity[1]:
         raise Refused(f"{run.path}: has no gravity along y; the laws of heights do not apply")
     if not frames:
         raise RunError(f"{run.path}: needs frames in equilibrium")
     species = [samples(run, kind, frames) for kind in thermodynamics.kinds_of_disks(run)]
-    result, notes = table(run, species, thermodynamics.temperature(run, args.equilibration)), []
-    for kind, s in zip(run.by_species, species, strict=True):
+    result, notes = table(run, species, thermodynamics.temperature_after(run, start)), []
+    for kind, s, row in zip(run.by_species, species, result, strict=True):
         mean = correlated_mean(s.height.mean(axis=1))
         notes += statistics.diagnostics(f"height of {kind.label}", [mean])
+        if (end := row["height_fit_to"]) < HEIGHT_RANGE[1]:
+            high = f"height of {kind.label}: the lid is at mgh = {end:.3g} kT"
+            fitted = end > HEIGHT_RANGE[0]
+            notes.append(f"{high}, where the fit ends" if fitted else f"{high}: no fit is possible")
     if (share := crowding(run, species, result[0]["kT"])) > CROWDED:
         notes.append(f"points would take {share:.2g} of the area at the floor: no law of heights")
     began = float(run.time[frames[0]]), reason

@@ -1,12 +1,11 @@
 """Parts of figures besides the measured curves: bands of single runs, panels, explanations."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from matplotlib import colors
 from matplotlib.collections import EllipseCollection
 from matplotlib.quiver import Quiver, QuiverKey
+from scipy.signal import lfilter
 
 import cooling as cooling_figure
 import fields as fields_figure
@@ -22,7 +21,7 @@ from ricochet import (
 )
 from ricochet.figures.drawing import plt
 from sampling import held_as_often_as_stated, samples
-from synthetic_run import ROOT, run_script, write_run
+from synthetic_run import ROOT, run_script, write_run, written
 
 
 @pytest.fixture
@@ -188,6 +187,25 @@ def test_the_reason_of_the_start_names_what_drifts(tmp_path, rng):
         assert start > 200 and f"the {kind} energy of {name} drifts" in why
         assert start == thermodynamics.start_of_steady_state(run)
     assert equilibrium.explained_start(run, 20.0) == (20.0, "--equilibration 20")
+
+
+def test_a_relaxed_gas_loses_no_time_and_a_drifting_gas_does(tmp_path, rng):
+    """The observables fluctuate slowly, as under gravity; in some runs one of them drifts."""
+    time, v, lost = np.arange(1001.0), rng.normal(size=(2, 4, 2)), []
+    for k in range(24):
+        noise = lfilter([1], [1, -0.8], rng.normal(size=(4, 1001)))
+        noise[0] += 30 * np.exp(-time / 60) * (k >= 20)
+        names = (f"{kind}/{e}_energy" for kind in "ab" for e in ("kinetic", "potential"))
+        observables = {name: 10 + one for name, one in zip(names, noise, strict=True)}
+        observables |= {"collisions": 4 * time}
+        more = {"observables": observables, "observable_time": time, "species": [1, 1, 2, 2]}
+        more |= {"names": ("a", "b"), "parameters": {"box": {"gravity": [0.0, -1.0]}}}
+        run = written(tmp_path / "run.h5", 0 * v + 0.5, v, time=time[[0, -1]], **more)
+        rules = equilibrium.explained_start, equilibrium.relaxed_start
+        lost.append([rule(run)[0] for rule in rules])
+    before, after = np.transpose(lost)
+    assert np.mean(after[:20] < 10) >= 0.85 and np.mean(before[:20] < 10) < 0.5
+    assert (after[20:] > 100).all() and (after <= before).all()
 
 
 # --- speeds ---

@@ -35,6 +35,28 @@ def test_errors_of_slopes_are_their_scatter_although_kt_is_measured(rng, reach, 
         assert np.mean(error) == pytest.approx(1.06 * np.std(mean), rel=0.12)
 
 
+def test_slopes_of_heights_are_those_of_the_law_under_a_lid(rng):
+    """The lid is between 1.4 and 8 kT / m g above the floor; the fit ends there."""
+    pulls = []
+    for lid in rng.uniform(1.4, 8, 60):
+        heights = -np.log1p(-rng.uniform(size=(300, 30)) * -np.expm1(-lid))
+        found = gravity.slope_of(heights, gravity.HEIGHT_RANGE, np.ones(gravity.BLOCKS + 1), lid)
+        pulls.append((found.mean - 1) / found.error)
+    assert abs(np.mean(pulls)) < 4 / 60**0.5
+    assert np.mean(np.abs(pulls) < 1) == pytest.approx(0.6827, abs=4 * 0.06)
+    low = rng.uniform(0, 0.9, (300, 30))
+    assert np.isnan(gravity.slope_of(low, gravity.HEIGHT_RANGE, np.ones(11), 0.9).mean)
+
+
+def test_a_low_lid_is_named_with_the_end_of_the_fit(tmp_path, rng, capsys):
+    """The lid at 16 is at 2.8 kT / m g for the light disks and at 5.6 for the heavy ones."""
+    path = falling(tmp_path / "run.h5", rng, temperature=1.4)
+    rows = drawn(tmp_path, "gravity", path)
+    assert [float(row["height_fit_to"]) for row in rows] == pytest.approx([2.8, 5.0], rel=0.05)
+    said = capsys.readouterr()
+    assert "the lid is at mgh = 2." in said.err and "left_out_before" in said.out
+
+
 def test_gravity_slopes_are_those_of_the_laws(tmp_path, rng):
     run = read_run(falling(tmp_path / "run.h5", rng))
     frames = thermodynamics.frames_from(run, thermodynamics.start_of_equilibrium(run, 40))

@@ -98,7 +98,12 @@ def temperature(run: Run, skip: float | None = None) -> SeriesMean:
     """
     if run.nature.keeps_kinetic_energy:
         return SeriesMean(kt_at_start(run), 0.0, np.inf, 0.0)
-    start, (track, time, kt) = start_of_equilibrium(run, skip), kt_in_time(run)
+    return temperature_after(run, start_of_equilibrium(run, skip))
+
+
+def temperature_after(run: Run, start: float) -> SeriesMean:
+    """Estimate kT of a run whose kinetic energy fluctuates from the samples after a time."""
+    track, time, kt = kt_in_time(run)
     kt, time = kt[time >= start], time[time >= start]
     by_time = (run.parameter("output", f"{track}_{how}") for how in TIMED)
     if all(given is None for given in by_time) and "gravity" not in run.nature:
