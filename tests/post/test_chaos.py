@@ -30,10 +30,14 @@ def test_lyapunov_finds_the_rate_of_divergence(tmp_path, rng, capsys):
     runs = [read_run(path) for path in paths]
     apart = np.array([lyapunov.distance(*runs[k : k + 2]) for k in (0, 2, 4)])
     found = lyapunov.divergence(runs[0].time, apart, largest=0.01, begin=0.2)
-    np.testing.assert_allclose(found.slope, [1.9, 2.0, 2.1], atol=1e-3)
-    assert found.exponent.mean == pytest.approx(2, abs=1e-3)
-    assert found.exponent.error == pytest.approx(statistics.student(3) * 0.1 / 3**0.5, rel=0.02)
-    assert found.end == pytest.approx(10.8), "the last frame before the first pair is 0.01 apart"
+    growth, times = found.growth, np.diff(found.passed, axis=0)[0]
+    np.testing.assert_allclose(growth / times, [1.9, 2.0, 2.1], atol=1e-3)
+    assert found.exponent.mean == pytest.approx(2, abs=0.01)
+    relative = statistics.estimate(times).error / times.mean()
+    assert found.exponent.error == pytest.approx(2 * relative, rel=0.1)
+    assert np.exp(found.ends) == pytest.approx([1e-10, 0.01]) and found.reached == 3
+    shorter = lyapunov.divergence(runs[0].time[:56], apart[:, :56], largest=0.01, begin=0.2)
+    assert shorter.reached == 1 and shorter.exponent.mean == pytest.approx(2, abs=0.02)
     with pytest.raises(RunError, match="no fit is possible"):
         lyapunov.divergence(runs[0].time, 0 * apart, largest=0.01, begin=0.2)
     assert "3 runs: an even number" in refusal(capsys, "lyapunov", *paths[:3])
@@ -82,3 +86,25 @@ def test_lorentz_finds_the_diffusion_of_a_random_walk(tmp_path, rng, capsys):
     assert "equal circles" in refusal(capsys, "lorentz", uneven)
     short = tracer(tmp_path / "short.h5", rng, frames=11)
     assert "needs more frames" in refusal(capsys, "lorentz", short)
+
+
+def test_the_exponent_depends_neither_on_the_starts_nor_on_waiting_times(rng):
+    """Distances grow by random factors at random times, after a slow beginning."""
+    found = []
+    time = np.arange(0, 400, 0.1)
+    for _ in range(40):
+        tracks = []
+        for _ in range(12):
+            often = rng.uniform(size=400) < 0.8
+            waits = rng.exponential(np.where(often, 0.2, 2.0))
+            steps = rng.exponential(0.5, 400)
+            steps[:3] *= 0.2
+            at = np.cumsum(waits)
+            tracks.append(-27 + np.interp(time, at, np.cumsum(steps), left=0))
+        apart = np.exp(np.minimum(tracks, 0))
+        found.append(lyapunov.divergence(time, apart, largest=0.01, begin=0.2).exponent)
+    exact = 0.5 / (0.8 * 0.2 + 0.2 * 2.0)
+    mean, error = np.transpose(found)
+    assert mean.mean() == pytest.approx(exact, abs=4 * statistics.estimate(mean).error)
+    assert abs(mean.mean() / exact - 1) < 0.05
+    assert np.mean(np.abs(mean - exact) < error) == pytest.approx(0.6827, abs=0.25)
