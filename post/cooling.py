@@ -10,16 +10,17 @@ estimated from the numbers of disks.  The panels of the second row compare all v
 logarithmic axis.  The second row shows the kinetic energy per disk of each species, divided by the
 initial mean over all disks; bands show the errors of the means.  The third row shows the ratio of
 the temperatures of the heaviest and the lightest species, which is 1 in equilibrium.  The third row
-is omitted if all masses are equal. If there are fewer than four runs, the half-width of the band
+is omitted if all masses are equal.  If there are fewer than four runs, the half-width of the band
 around the temperature ratio is twice the standard deviation of the ratio over single runs.  The
 table contains the reduced energies against collisions per disk, and the energies in the units of
-the input against time.
+the input against time.  The script prints a warning if the gas is not homogeneous at the end,
+because its temperature ratio is then not that of the homogeneous state.
 """
 
 from itertools import chain, cycle
 
 from ricochet import Run
-from ricochet.analysis.cooling import SMOOTH, Curves, energies
+from ricochet.analysis.cooling import SMOOTH, Curves, energies, flow_notes, flow_share
 from ricochet.analysis.estimates import FEWEST_RUNS, Estimate, student
 from ricochet.analysis.thermodynamics import lightest_and_heaviest
 from ricochet.figures.drawing import COLOURS, band, caption, colours, dilute_limit, plt
@@ -193,13 +194,14 @@ def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
 
 
 def table(groups: list, results: list[Curves]) -> list[dict]:
-    """Return the energy and temperature ratio at the last collisions per disk, by restitution."""
+    """Return energy, temperature ratio and share of flows at the end, by restitution."""
     return [
         {
             "restitution": xi.name,
             "runs": len(runs),
             **measured("energy_left", found["K_all"], -1),
             **measured("temperature_ratio", found.get("ratio"), -1),
+            "flow_share": flow_share(runs).share,
         }
         for (xi, runs), found in zip(groups, results, strict=True)
     ]
@@ -210,7 +212,8 @@ def main() -> None:
     groups = by_restitution(args.runs)
     results = [energies(members) for _, members in groups]
     data = spread({f"_xi{xi:g}": own for (xi, _), own in zip(groups, results, strict=True)})
-    report(args, draw(args.runs, groups, results), table(groups, results), data=data)
+    notes = flow_notes([(f"ξ = {xi:g}", members) for xi, members in groups])
+    report(args, draw(args.runs, groups, results), table(groups, results), data=data, notes=notes)
 
 
 if __name__ == "__main__":

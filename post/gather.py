@@ -5,7 +5,10 @@
 The table contains a row for each member run.  The first columns are the name of the run, the values
 of all variables that the sweep changes, and the seed.  The next columns contain the state of the
 run (finished, unfinished or failed), the reason of a failure, and the wall time in seconds.  The
-last columns of the table are the final values of all scalar observables.
+last columns of the table are the final values of all scalar observables.  For gases that cool, the
+column flow_share contains the share of flows in the kinetic energy of the last frame, which is 0 on
+average in a homogeneous gas.  The script prints a warning if some of these gases are not
+homogeneous.
 """
 
 import argparse
@@ -14,9 +17,23 @@ import sys
 from collections import Counter
 from pathlib import Path
 
+from ricochet.analysis.cooling import FlowShare, flow_share
 from ricochet.reading.files import destination
+from ricochet.reading.reader import read_run
 from ricochet.running.ensembles import gathered
 from ricochet.script import launch
+
+
+def with_flows(folder: Path, rows: list[dict]) -> list[FlowShare]:
+    """Add the share of flows to the rows of finished gases that cool, and return all shares."""
+    found = []
+    for row in rows:
+        if row["state"] == "finished" and row.get("dissipated_energy", 0) > 0:
+            run = read_run(folder / f"{row['member']}.h5")
+            if run.nature.cooling:
+                found.append(flow_share([run]))
+                row["flow_share"] = found[-1].share
+    return found
 
 
 def main() -> None:
@@ -27,6 +44,7 @@ def main() -> None:
     parser.add_argument("--csv", type=Path, metavar="FILE", help="file for the table [printed]")
     args = parser.parse_args()
     rows = gathered(args.folder)
+    shares = with_flows(args.folder, rows)
     columns = list(dict.fromkeys(name for row in rows for name in row))
     last = ["state", "reason"]  # the longest texts are in the last columns
     if args.csv:
@@ -42,6 +60,12 @@ def main() -> None:
     states = Counter(row["state"] for row in rows)
     told = ", ".join(f"{number} {state}" for state, number in sorted(states.items()))
     print(f"{args.folder}: {len(rows)} members: {told}", file=sys.stderr)
+    if flowing := sum(not one.homogeneous for one in shares):
+        print(
+            f"warning: {flowing} of {len(shares)} cooling gases are not homogeneous at the end "
+            "(flow_share); their temperatures are not those of the homogeneous state",
+            file=sys.stderr,
+        )
 
 
 if __name__ == "__main__":

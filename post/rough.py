@@ -16,7 +16,7 @@ T_rot / T.  All runs must have the same input, and the box must be periodic.
 """
 
 from ricochet import Run, RunError, theory
-from ricochet.analysis.cooling import Curves, rough, rough_law, steady_ratio
+from ricochet.analysis.cooling import Curves, flow_notes, rough, rough_law, steady_ratio
 from ricochet.figures.drawing import COLOURS, band, caption, plt
 from ricochet.script import command_line, launch, measured, report, spread
 
@@ -58,9 +58,9 @@ def main() -> None:
     row = dict(zip(("restitution", "tangential_restitution", "inertia"), law, strict=True))
     row |= {"runs": len(args.runs), **measured("ratio", steady_ratio(args.runs, law))}
     row |= {"maxwellian": theory.rough_ratio(*law), "boltzmann": exact}
-    notes = []
+    notes = flow_notes([("all runs", args.runs)])
     if exact is None:
-        notes = [
+        notes += [
             "the theory assumes Maxwell's velocities; the Boltzmann equation yields up to 6 % less"
         ]
     figure = draw(args.runs, law, exact, found)

@@ -1,5 +1,7 @@
 """Cooling gases: laws of Haff for hard and soft disks, and the scripts haff and cooling."""
 
+import csv
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import haff
 from ricochet import (
     cooling,
     equilibrium,
+    estimates,
     hard_disks as hd,
     read_run,
     theory,
@@ -14,7 +17,7 @@ from ricochet import (
 )
 from ricochet.reading.reader import Restitution
 from synthetic_gases import TWO, cooled, gas
-from synthetic_run import drawn, written
+from synthetic_run import drawn, run_script, write_run, written
 
 
 def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp_path, capsys):
@@ -139,3 +142,52 @@ def test_the_steady_ratio_has_forgotten_its_start(monkeypatch, tmp_path):
     short, (t, r) = run(0.0, 51)
     late = np.mean(r[25:] / t[25:])
     assert cooling.steady_ratio([short], law).mean == pytest.approx(late)
+
+
+@pytest.mark.parametrize(("count", "kinds"), [(60, (1, 4)), (400, (1, 1)), (3000, (1, 25))])
+def test_a_flow_in_a_cooling_gas_is_told_apart_from_independent_velocities(
+    tmp_path, rng, count, kinds
+):
+    """A wave of the velocity contains 0, 10 or 40 % of the energy of a mixture of unequal kT."""
+    mass = np.tile(np.array(kinds, float), count // 2)
+    thermal = np.sqrt(np.tile([1.0, 1.8], count // 2) / mass)[:, None]
+    for share in (0.0, 0.1, 0.4):
+        found = []
+        for k in range(12):
+            x, v = rng.uniform(size=(1, count, 2)), rng.normal(size=(1, count, 2)) * thermal
+            wave = np.sin(2 * np.pi * x[0, :, 0])
+            ratio = np.sum(mass[:, None] * v[0] ** 2) / np.sum(mass * wave**2)
+            v[0, :, 1] += np.sqrt(ratio * share / (1 - share)) * wave
+            path = tmp_path / f"{share}_{k}.h5"
+            more = {"mass": mass, "species": np.tile([1, 2], count // 2), "names": ("a", "b")}
+            run = written(path, x, v, periodic=(True, True), **more)
+            found.append(cooling.flow_share([run]))
+        mean, error = estimates.estimate([one.share for one in found])
+        fixed = 3 / count  # the fixed momentum of a few disks makes the share smaller
+        assert 0.7 * share - fixed - 4 * error < mean < share + 4 * error
+        apart = sum(not one.homogeneous for one in found)
+        assert apart <= 1 if share == 0 else apart >= 12 * (share * count > 100)
+
+
+def test_a_cooling_gas_that_is_not_homogeneous_is_named(tmp_path, rng, capsys):
+    """The script cooling and the table of a sweep warn that flows contain energy."""
+    (tmp_path / "scan").mkdir()
+    for seed, speed in enumerate((0.0, 1.5)):
+        x, v = rng.uniform(size=(2, 400, 2)), rng.normal(size=(2, 400, 2))
+        v[..., 0] += speed * np.sin(2 * np.pi * x[..., 1])
+        parameters = {"contact": {"restitution": 0.8 + 0.1 * seed}, "run": {"seed": seed}}
+        energy = np.sum(v**2, axis=2).mean(axis=1) / 2 * [1, 0.5]
+        observables = {f"{name}/kinetic_energy": energy for name in ("all", "disk")}
+        observables |= {"collisions": [0, 4000], "dissipated_energy": [0, 200]}
+        more = {"observables": observables, "parameters": parameters, "periodic": (True, True)}
+        write_run(tmp_path / "scan" / f"{seed}.h5", x, v, **more)
+    rows = drawn(tmp_path, "cooling", *sorted((tmp_path / "scan").glob("*.h5")))
+    said = capsys.readouterr()
+    assert rows and "flow_share" in said.out
+    assert "ξ = 0.9: at the end the gas is not homogeneous" in said.err
+    assert "ξ = 0.8:" not in said.err
+    assert run_script("gather", tmp_path / "scan", "--csv", tmp_path / "scan.csv") == 0
+    assert "1 of 2 cooling gases are not homogeneous" in capsys.readouterr().err
+    with (tmp_path / "scan.csv").open() as file:
+        shares = [float(row["flow_share"]) for row in csv.DictReader(file)]
+    assert abs(shares[0]) < 0.05 < 0.2 < shares[1]

@@ -6,22 +6,27 @@ estimates with errors.
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 
 from ..predictions import hard_disks, theory
+from ..reading.files import RunError
 from ..reading.nature import SOURCES, TRAITS, Refused, allow
 from ..reading.reader import Run
-from .estimates import Estimate, estimate, propagate_error
-from .equilibrium import free_disks, kt_at_start
+from .estimates import UNLIKELY, Estimate, estimate, propagate_error
+from .equilibrium import drift, free_disks, kt_at_start
 from .thermodynamics import lightest_and_heaviest, packing
 
 __all__ = [
+    "FlowShare",
     "energies",
     "energy_left",
     "exponent",
     "first_rate",
+    "flow_notes",
+    "flow_share",
     "haff",
     "rough",
     "rough_law",
@@ -39,6 +44,8 @@ SMOOTH = (
     "mixture",
     "rotating",
 )  # traits of gases that cool by Haff's law
+TOGETHER = 25  # number of disks in a cell in which a common velocity is measured
+FLOWING = 0.05  # share of flows in the kinetic energy above which a gas is not homogeneous
 SETTLED = 0.005  # relative distance from its limit at which the ratio is regarded as steady
 
 
@@ -104,6 +111,105 @@ def moving_energy(run: Run, name: str = "all") -> np.ndarray:
     if name == "all" and not energy[0] > 0:
         raise Refused(f"{run.path}: starts with disks at rest, which cannot cool")
     return energy
+
+
+# --- homogeneity ---
+
+
+class FlowShare(NamedTuple):
+    """Share of the kinetic energy of a gas that belongs to flows."""
+
+    share: float  # 0 on average for independent velocities, as in a homogeneous gas
+    p: float  # probability of larger velocities of cells if the velocities are independent
+
+    @property
+    def homogeneous(self) -> bool:
+        """Whether the velocities are independent, or the share of the flows is negligible."""
+        return self.p >= UNLIKELY or self.share <= FLOWING
+
+
+def flow_share(runs: Sequence[Run], frame: int = -1) -> FlowShare:
+    """Measure the share of flows in the kinetic energy of cooling gases.
+
+    A cooling gas does not stay homogeneous: neighbouring disks begin to move in parallel.  The box
+    is divided into cells of about 25 disks (`TOGETHER`).  If the velocities of the disks are
+    independent, the squared momentum of a cell is on average the sum of the squared momenta of its
+    disks.  The excess, divided by twice the mass of the cell, is the kinetic energy of a flow.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        (R,) runs of one input, which differ by their seed
+    frame : int
+        index of the frame [the last frame]
+
+    Returns
+    -------
+    FlowShare
+        the share in all runs together, and the p-value of independent velocities; the share is NaN
+        if frames do not contain velocities
+
+    Examples
+    --------
+    >>> cooling.flow_share(cooling_runs, 0).homogeneous
+    True
+    """
+    try:
+        excess, total, squares, freedom = np.sum([cell_sums(run, frame) for run in runs], axis=0)
+    except RunError:  # frames without velocities
+        return FlowShare(np.nan, 1.0)
+    if not total > 0:
+        return FlowShare(0.0, 1.0)
+    return FlowShare(float(excess / total), float(scipy.special.chdtrc(freedom, squares)))
+
+
+def cell_sums(run: Run, frame: int) -> tuple[float, float, float, float]:
+    """Return sums over the cells of a frame of a run.
+
+    The sums are the kinetic energy of flows, the total kinetic energy, the squared momenta of cells
+    in units of the variance of a component, and the number of the components.
+    """
+    momentum = run.mass[:, None] * (run.velocity[frame] - drift(run))
+    side = np.sqrt(run.edges.prod() * TOGETHER / run.n_disks)
+    cells = np.maximum(2, np.rint(run.edges / side)).astype(int)
+    place = ((run.position[frame] - run.lower) / run.edges * cells).astype(int)
+    cell = np.clip(place, 0, cells - 1) @ (1, cells[0])
+    mass, own = (np.bincount(cell, each) for each in (run.mass, np.sum(momentum**2, axis=1)))
+    square = sum(np.bincount(cell, part) ** 2 for part in momentum.T)
+    some = own > 0
+    excess = np.sum((square - own)[some] / (2 * mass[some]))
+    total = np.sum(momentum**2 / (2 * run.mass[:, None]))
+    return excess, total, 2 * np.sum(square[some] / own[some]), 2 * some.sum()
+
+
+def flow_notes(groups: Sequence[tuple[str, Sequence[Run]]]) -> list[str]:
+    """Return a note for each named group of cooling gases that are not homogeneous at their end.
+
+    Parameters
+    ----------
+    groups : sequence of tuple
+        (G,) name and runs of each group
+
+    Returns
+    -------
+    list of str
+        the notes
+
+    Examples
+    --------
+    >>> cooling.flow_notes([("all", cooling_runs[:0])])
+    []
+    """
+    notes = []
+    for name, runs in groups:
+        found = flow_share(cooled) if (cooled := [r for r in runs if r.nature.cooling]) else None
+        if found and not found.homogeneous:
+            notes.append(
+                f"{name}: at the end the gas is not homogeneous; flows contain "
+                f"{100 * found.share:.2g} % of its kinetic energy, and its temperatures are not "
+                "those of the homogeneous state"
+            )
+    return notes
 
 
 # --- Haff's law ---
