@@ -106,7 +106,8 @@ def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Fi
             style = {"color": colour, "label": f"{kind.label}: {len(speeds)} speeds"}
             bars(axes, binned(speeds, bins), bins, fill=True, alpha=0.45, **style)
             axes.plot([], [], ls="", label=words)
-            axes.set(ylabel="probability density $P(v)$", ylim=(0, 1.4 * axes.get_ylim()[1]))
+            density = runs[0].units.label("probability density $P(v)$", "1/speed")
+            axes.set(ylabel=density, ylim=(0, 1.4 * axes.get_ylim()[1]))
             axes.legend(loc="upper right")
     panels[0, 0].set_title("Start")
     panels[0, 1].set_title("Equilibrium")

@@ -152,10 +152,11 @@ def pooled(
 
 
 class Scale(NamedTuple):
-    """Axis of speeds, with its label and with the thermal speed in units of the axis."""
+    """Axis of speeds, with labels and with the thermal speed in units of the axis."""
 
     thermal: float = 1.0  # sqrt(2 kT / m), or 1
     label: str = "speed $u = v\\,/\\,\\sqrt{2kT/m}$"
+    density: str = "probability density $P(u)$"  # label of the other axis
 
     @property
     def law(self) -> str:
@@ -169,7 +170,11 @@ def scale_of(run: Run, kt: float, unscaled: bool) -> Scale:
     """Return the axis of speeds at a temperature, for v if `unscaled` is true, otherwise for u."""
     if not unscaled:
         return Scale()
-    return Scale(float(np.sqrt(2 * kt / run.mass[0])), run.units.label("speed v", "speed"))
+    labels = (
+        run.units.label("speed v", "speed"),
+        run.units.label("probability density $P(v)$", "1/speed"),
+    )
+    return Scale(float(np.sqrt(2 * kt / run.mass[0])), *labels)
 
 
 def draw_histogram(
@@ -186,7 +191,7 @@ def draw_histogram(
         law = maxwell_pdf(fine) / scale.thermal
         axes.plot(fine * scale.thermal, law, color="black", lw=1.2, label=scale.law)
     axes.set(xlabel=scales[0].label, xlim=(0, 3 * max(scale.thermal for scale in scales)))
-    axes.set_ylabel(f"probability density $P({'u' if scales[0] == Scale() else 'v'})$")
+    axes.set_ylabel(scales[0].density)
     axes.legend()
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from ricochet import read_run, script
 from ricochet.reading.units import POWERS, UNNAMED, Units, units_of
+from synthetic_gases import falling, gas as relaxed
 from synthetic_run import ROOT, maxwell_velocities, run_script, write_run
 
 
@@ -26,6 +27,7 @@ def test_units_are_made_of_length_time_and_mass():
         "viscosity": "kg/s",
         "heat flux": "kg m/s³",
     }
+    assert units.name("1/speed") == "s/m" and units.name("1/squared speed") == "s²/m²"
     assert units._replace(energy="J").name("energy") == "J"
     assert Units(time="s").label("time t", "time") == "time t (s)"
     assert Units(time="s").label("speed") == "speed (reduced units)", "its length is unknown"
@@ -74,3 +76,28 @@ def test_the_axes_of_a_figure_have_the_named_units(tmp_path, rng, monkeypatch):
     page = tmp_path / "a.html"
     assert run_script("player", path, "-o", page, *words) == 0
     assert "speed (cm/s)" in page.read_text()
+
+
+@pytest.mark.parametrize(
+    ("script", "words", "units"),
+    [
+        ("gravity", [], {"s²/cm²", "1/cm"}),
+        ("mixture", [], {"s/cm"}),
+        ("speeds", ["--unscaled"], {"s/cm"}),
+    ],
+)
+def test_the_axes_of_densities_have_the_reciprocal_unit(
+    tmp_path, rng, monkeypatch, script, words, units
+):
+    path, labels = falling(tmp_path / "gas.h5", rng), []
+
+    def kept(figure, *_):
+        labels.extend(axes.get_ylabel() for axes in figure.axes)
+
+    monkeypatch.setattr("ricochet.script.save", kept)
+    if script == "speeds":
+        path = relaxed(tmp_path / "one.h5", rng)
+    given = ["--units", "length=cm,time=s,mass=g", "-o", tmp_path / "a.png"]
+    assert run_script(script, path, *given, *words) == 0
+    found = {label.rpartition("(")[2].strip(")") for label in labels if "density" in label}
+    assert found == units

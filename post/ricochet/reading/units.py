@@ -39,6 +39,8 @@ class Units(NamedTuple):
         """Return the label of an axis, for example 'time (s)' or 'time (reduced units)'.
 
         The unit is found in `POWERS` by the key `quantity` or, if `quantity` is empty, by `words`.
+        The unit of a probability density is that of the reciprocal of a quantity, for example
+        '1/speed'.
         """
         unit = self.name(quantity or words)
         return f"{words} ({unit})" if unit else words
@@ -54,8 +56,10 @@ class Units(NamedTuple):
         """Return the unit of a quantity, or 'reduced units' if the name of a unit is unknown."""
         if quantity == "energy" and self.energy:
             return self.energy
-        powers = zip(POWERS[quantity][::-1], self[2::-1], strict=True)  # mass is written first
-        parts = [(power, name) for power, name in powers if power]
+        whole = quantity.removeprefix("1/")
+        sign = 1 if whole == quantity else -1
+        powers = zip(POWERS[whole][::-1], self[2::-1], strict=True)  # mass is written first
+        parts = [(sign * power, name) for power, name in powers if power]
         return product(parts) if all(name for _, name in parts) else "reduced units"
 
 
