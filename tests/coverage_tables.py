@@ -29,6 +29,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "post"), str(ROOT / "tests")]
 
 import crater_scan  # noqa: E402
+import discharge  # noqa: E402
 import driven  # noqa: E402
 import equipartition  # noqa: E402
 import gravity  # noqa: E402
@@ -41,14 +42,32 @@ from ricochet import (  # noqa: E402
     Run,
     cooling,
     correlations,
+    equilibrium,
     fields,
     read_run,
     speed_laws,
     speeds,
     statistics,
+    streams,
     structure,
     thermodynamics as td,
     transport,
+)
+from coverage_inputs import (  # noqa: E402
+    DRUM,
+    FALLING,
+    INELASTIC,
+    MOUTHS,
+    PERIODIC,
+    STEPPED,
+    THERMAL,
+    billiard,
+    by_collisions,
+    crater,
+    gas,
+    grains,
+    hopper,
+    text,
 )
 from validation import report  # noqa: E402
 
@@ -56,28 +75,7 @@ SEEDS, P_SEEDS = 400, 200
 FIRST_SEED = 1001  # of the published tables
 Found = dict[str, tuple[float, float]]  # mean and error by quantity
 Input = str | Callable[[int], str]  # text of an input file, or a function of the seed
-PERIODIC = "boundary = 'periodic', 'periodic'"
-SIDES = ("left", "right", "bottom", "top")
-THERMAL = " ".join(f"&side name = '{side}' temperature = 1 /" for side in SIDES)
 
-
-def gas(count: int, eta: float = 0.1, mass: float = 1, name: str = "a") -> str:
-    """Return the group of a species that starts with equal speeds, so that all seeds share a kT."""
-    head = f"&species name = '{name}' count = {count} packing_fraction = {eta} mass = {mass}"
-    return f"{head} speed = {np.sqrt(2 / mass)} /"
-
-
-def text(
-    box: str, groups: str, length: float, frames: float, unit: str = "time", more: str = ""
-) -> str:
-    """Return an input, where `frames` is the time or the collisions per disk between frames."""
-    stop, each = ("time", "time") if unit == "time" else (unit, unit)
-    samples = f"&output frames_every_{each} = {frames} observables_every_{each} = {frames}"
-    samples += f" {more} /"
-    return f"&box {box} / {groups} &stop {stop} = {length} / {samples}"
-
-
-by_collisions = partial(text, unit="collisions_per_disk")
 
 # --- error bars ---
 
@@ -92,6 +90,20 @@ def of_fields(run: Run) -> Found:
     """fields.py, in the cell in the middle."""
     found = fields.fields([run], None, (3, 3)).found
     return {name: (one.mean[4], one.error[4]) for name, one in found.items()}
+
+
+def of_stream(run: Run) -> Found:
+    """fields.py --grid: the flux between the centre of a drum and its wall."""
+    psi = streams.stream_function([run], None, (3, 3)).middles
+    return {"stream function": (psi.mean[4], psi.error[4])}
+
+
+def of_discharge(*runs: Run) -> Found:
+    """discharge.py: rate of one mouth, or constants of Beverloo's law from several mouths."""
+    found = discharge.measured_rates(list(runs), 4)
+    if fit := discharge.fit_of(found):
+        return {name: tuple(map(float, one)) for name, one in fit.items()}
+    return {"W": (found.rows[0]["W"], found.rows[0]["W_error"])}
 
 
 def of_speeds(run: Run) -> Found:
@@ -133,9 +145,10 @@ def of_driven(show: str, run: Run) -> Found:
 
 def of_gravity(run: Run) -> Found:
     """gravity.py."""
-    frames = td.frames_from(run, td.start_of_equilibrium(run))
+    start = equilibrium.relaxed_start(run)[0]
+    frames = td.frames_from(run, start)
     species = [gravity.samples(run, kind, frames) for kind in run.by_species]
-    (row,) = gravity.table(run, species, td.temperature(run))
+    (row,) = gravity.table(run, species, td.temperature_after(run, start))
     return {n: (row[n], row[f"{n}_error"]) for n in ("kT", "K_x", "speed_slope", "height_slope")}
 
 
@@ -229,33 +242,6 @@ def batched(runs: tuple[Run, ...], size: int) -> list[tuple[Run, ...]]:
     return [runs[k : k + size] for k in range(0, len(runs), size)]
 
 
-def billiard(shift: float, seed: int) -> str:
-    """Return the input of a Sinai billiard, whose disk starts at a random position."""
-    x, y, angle = np.random.default_rng(seed).uniform((0.02, 0.02, 0), (0.22, 0.98, 2 * np.pi))
-    place, v = f"{x + shift:.17g}, {y:.17g}", f"{np.cos(angle):.17g}, {np.sin(angle):.17g}"
-    disk = f"&species name = 'a' radius = 0.01 position = {place} velocity = {v} /"
-    groups = f"&obstacle centre = 0.5, 0.5 radius = 0.25 / {disk}"
-    return text("", groups, 20, 0.1).replace("&stop", "&stop events = 1000000")
-
-
-def crater(mass: float) -> str:
-    """Return the input of a projectile of a mass that digs a crater in 500 disks."""
-    bed = "&species name = 'bed' count = 500 packing_fraction = 0.5 region = 0, 1, 0, 0.5 /"
-    hit = f"name = 'projectile' relative_to = 'bed' mass = {mass} radius = 2 position = 0.5, 0.75"
-    contact = "&contact restitution = 0.5 contact_time = 1e-5 / &stop energy_fraction = 0.1 /"
-    samples = "&output observables_every_time = 0.01 /"
-    return f"{bed} &species {hit} velocity = 0, -5 / {contact} {samples}"
-
-
-INELASTIC = "&contact restitution = 0.9 /"
-FALLING = " ".join(
-    f"&species name = '{name}' count = 150 mass = {mass} radius = 0.005 region = 0, 1, 0, 1 "
-    "velocities = 'uniform' speed = 1 /" for name, mass in (("a", 1), ("b", 4))
-)  # fmt: skip
-STEPPED = "&species name = 'a' count = 40 radius = 0.01 speed = 1.4 / &stop time = 60 / "
-STEPPED += "&output observables_every_time = 0.5 /"
-
-
 class Group(NamedTuple):
     """Runs from which a script calculates the measured quantities."""
 
@@ -283,6 +269,14 @@ GROUPS: dict[str, Group] = {
     "3 pairs with and without time steps": Group(
         (STEPPED, f"{STEPPED} &run dynamics = 'steps' dt = 0.003 /"), of_missed, 3
     ),
+    "4 runs of a hopper with drawn radii": Group(
+        (hopper(0.3, grains(120, 0.03, spread=0.1)),), of_discharge, 4
+    ),
+    "hoppers of 4 widths": Group(
+        tuple(hopper(w, grains(60, 0.027) + grains(60, 0.033, "b")) for w in MOUTHS),
+        of_discharge,
+        1,
+    ),
     "craters of 3 masses, 4 runs each": Group(tuple(map(crater, (1, 2, 4))), of_craters, 4),
 }
 
@@ -291,6 +285,10 @@ BARS: dict[str, tuple[str, Callable[[Run], Found]]] = {
     "40 disks between sides": (by_collisions("", gas(40), 150, 1), of_rates),
     "40 disks between thermal sides": (by_collisions("", gas(40) + THERMAL, 200, 1), of_rates),
     "fields of the same": (by_collisions("", gas(40) + THERMAL, 250, 0.5), of_fields),
+    "40 disks in a rotating drum": (DRUM, of_stream),
+    "a hopper with two sizes of grains": (
+        hopper(0.3, grains(60, 0.027) + grains(60, 0.033, "b")), of_discharge
+    ),
     "speeds of 60 disks in a periodic box": (by_collisions(PERIODIC, gas(60), 200, 5), of_speeds),
     "a mixture 1:4 between sides": (
         by_collisions("", gas(30) + gas(30, 0.1, 4, "b"), 300, 5),
@@ -336,7 +334,13 @@ class Pool(NamedTuple):
 FALL = (ROOT / "input" / "gravity.nml").read_text().replace("time = 100", "time = 12")
 FALL = FALL.replace("frames_every_time = 0.04", "frames_every_time = 12")
 POOLS = {f"{size} runs of 60 disks that fall": Pool(FALL, 3000, size) for size in (25, 100)}
-EXACT = {("40 disks between thermal sides", "kT"): 1.0, ("fields of the same", "temperature"): 1.0}
+EXACT = {
+    ("40 disks between thermal sides", "kT"): 1.0,
+    ("fields of the same", "temperature"): 1.0,
+    # Rigid rotation: the wall sets the velocity of centres at the distance 0.95 from the axis.
+    ("40 disks in a rotating drum", "stream function"): 40 * 1.5 / 0.95 / (2 * np.pi),
+    ("4 pairs of Sinai billiards", "exponent"): 1.836,  # growth of a narrow beam, 10^7 collisions
+}
 
 # --- p-values ---
 
