@@ -21,7 +21,7 @@ for k in {1..64}; do
       printf "%sposition=%.17g,%.17g", set, x, y
       printf "%svelocity=%.17g,%.17g", set, cos(2.4 * k), sin(2.4 * k)
     }'
-    printf ' --set %s' stop.time=30 output.frames_every_time=0.1 stop.events=1000000
+    printf ' --set %s' stop.time=60 output.frames_every_time=0.1 stop.events=1000000
     printf '\n'
   done
 done | replace "$data/sinai_pairs/members.txt"
