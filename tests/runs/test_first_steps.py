@@ -1,4 +1,4 @@
-"""Tests of what a newcomer can do after `make demo` alone, in a clone with an environment of its own."""
+"""Tests of what a newcomer can do after `make demo` alone, with the environment that it makes."""
 
 import re
 from pathlib import Path
@@ -22,7 +22,7 @@ def clone(tmp_path_factory) -> Path:
 
 
 def newcomer(**more) -> dict[str, str]:
-    """Return an environment that leads to no other program, package or `make` than those of the clone."""
+    """Return an environment that leads to no program or package outside of the clone."""
     mine = environment(MPLBACKEND="Agg", **more)
     foreign = ("RICOCHET", "RICOCHET_LIBRARY", "PYTHONPATH", "BUILD", "MAKEFLAGS", "MAKELEVEL")
     return {name: value for name, value in mine.items() if name not in foreign}
