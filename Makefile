@@ -227,6 +227,7 @@ wheel:
 	@PATH="$$PWD/.venv/bin:$$PATH" $(venv) -m auditwheel repair --plat auto -w build/wheels '$(BUILD)'/bare/*.whl
 
 unit-tests:  ## unit tests; DEBUG=1 tests=tests/unit/test_X.pf: of a module
+	@$(foreach test,$(filter-out $(wildcard $(tests)),$(tests)),$(error $(test): is no file with unit tests; they are in $(suites)/test_*.pf))
 	@$(if $(PFUNIT_DIR),$(or $(if $(pfunit_mk),:),$(error PFUNIT_DIR=$(PFUNIT_DIR): no pFUnit is installed there (include/PFUNIT.mk is missing))),:)
 	@+$(build) $(BUILD)/unit_tests
 	@tests/support/run_unit_tests.sh "$(if $(PFUNIT_DIR),pFUnit $(PFUNIT_VERSION),the substitute for pFUnit)" \

@@ -102,6 +102,10 @@ def test_a_linker_that_cannot_redirect_gets_no_hints(small, tmp_path):
             ["unit-tests", "PFUNIT_DIR=nowhere", "BUILD={}"],
             "PFUNIT_DIR=nowhere: no pFUnit is installed there",
         ),
+        (
+            ["unit-tests", "tests=tests/unit/test_no.pf", "BUILD={}"],
+            "tests/unit/test_no.pf: is no file with unit tests; they are in tests/unit/test_*.pf",
+        ),
         (["BUILD=/proc/build"], "Cannot write to /proc/build; BUILD=folder takes another"),
         (["install", "PREFIX=here"], "write folders that begin with /"),
         (["film"], "make film INPUT=input/crater.nml"),
