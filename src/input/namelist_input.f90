@@ -492,8 +492,11 @@ contains
         else if (instance == "") then
           call problems%add(line, group, "several groups have this name; write "//group//"."//trim(names(1)) &
             //".VARIABLE; known: "//joined(names, ", "))
+        else if (any(matches)) then
+          call problems%add(line, group//"."//instance, "several groups have this name")
         else
-          call problems%add(line, group//"."//instance, "unknown or not unique; "//suggestion(instance, names))
+          call problems%add(line, group//"."//instance, "the input has no &"//group//" with this name; " &
+            //suggestion(instance, names))
         end if
       end associate
     end subroutine find_group
