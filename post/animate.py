@@ -4,7 +4,7 @@
     python post/animate.py runs/crater.h5 --colour speed --count 500 --fps 30
 
 If the name of the film has no file name extension, the script appends .mp4 if ffmpeg is installed,
-and .gif otherwise.  Without -o the film has the name of the run.  The command `.venv/bin/pip
+and .gif otherwise.  Without -o the film has the name of the run.  The command `python -m pip
 install imageio-ffmpeg` installs ffmpeg if the system does not contain it.
 """
 
@@ -33,7 +33,7 @@ from ricochet.figures.drawing import (
     values_of,
     warn,
 )
-from ricochet.reading.files import destination
+from ricochet.reading.files import destination, installing
 from ricochet.script import chosen_frames, command_line, launch, positive, report
 
 from matplotlib import animation
@@ -53,7 +53,8 @@ def film_path(wish: Path | None, run: Run) -> Path:
     if not path.suffix:
         path = path.with_suffix(".mp4" if ffmpeg else ".gif")
     if path.suffix == ".mp4" and not ffmpeg:
-        raise RunError(f"{path}: mp4 needs ffmpeg: pip install imageio-ffmpeg, or write a .gif")
+        way = f"`{installing('imageio-ffmpeg')}`, or write a .gif"
+        raise RunError(f"{path}: mp4 needs ffmpeg: {way}")
     if path.suffix not in (".mp4", ".gif"):
         raise RunError(f"{path}: a film ends in .mp4 or .gif")
     return path

@@ -538,7 +538,8 @@ def test_a_film_takes_the_ffmpeg_of_a_python_package(tmp_path, monkeypatch, caps
     with plt.rc_context({"animation.ffmpeg_path": "no-ffmpeg"}):
         monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)  # as if it were not installed
         assert run_script("animate", path, "-o", film) == 2
-        assert "mp4 needs ffmpeg" in capsys.readouterr().err and not film.exists()
+        way = f"mp4 needs ffmpeg: `{sys.executable} -m pip install imageio-ffmpeg`, or write a"
+        assert way in capsys.readouterr().err and not film.exists()
         package = SimpleNamespace(get_ffmpeg_exe=lambda: str(ffmpeg))
         monkeypatch.setitem(sys.modules, "imageio_ffmpeg", package)
         assert run_script("animate", path, "-o", film) == 0

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -31,13 +32,18 @@ class Unsound(Exception):
     """
 
 
+def installing(package: str) -> str:
+    """Return the command that installs a package in the environment of the running Python."""
+    return f"{sys.executable} -m pip install {package}"
+
+
 def optional_package(module: str, user: str) -> Any:
     """Import an optional module, or raise an ImportError that states how to install the module."""
     try:
         return import_module(module)
     except ImportError:
         package = module.partition(".")[0]
-        raise ImportError(f"{user} needs a package: pip install {package}") from None
+        raise ImportError(f"{user} needs a package: {installing(package)}") from None
 
 
 @contextmanager
