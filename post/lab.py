@@ -23,10 +23,12 @@ from player import INPUTS, chooser, lab_page, view
 from ricochet import RunError
 from ricochet.pages.lab import Lab, form
 from ricochet.pages.live import application, page_of, serving
+from ricochet.running.engine import library
 from ricochet.script import Parser, launch
 
 from aiohttp import web
 
+USUAL_PORT = 8642  # links of the lesson lead to this port
 #: Python code that a worker process executes.  The module `player` is in the folder of this file.
 WORKER = """import sys; sys.path[:0] = [{!r}]
 from player import scene
@@ -52,11 +54,11 @@ def routes(lab: Lab) -> dict:
     }
 
 
-async def open_lab(lab: Lab, port: int, visit: bool) -> None:
+async def open_lab(lab: Lab, ports: list[int], visit: bool) -> None:
     """Serve the page of the laboratory until a signal arrives."""
     lab.prepare()
     try:
-        async with serving(application(routes(lab), frames="'self'"), port) as (address, stop):
+        async with serving(application(routes(lab), frames="'self'"), *ports) as (address, stop):
             if visit:
                 threading.Thread(target=webbrowser.open, args=[address], daemon=True).start()
             await stop.wait()
@@ -85,7 +87,10 @@ def main() -> None:
     opened = "open the page in your browser [no]"
     parser.add_argument("--open", action=BooleanOptionalAction, help=opened)
     parser.add_argument(
-        "--port", type=port, default=0, metavar="N", help="port of the server [any free port]"
+        "--port",
+        type=port,
+        metavar="N",
+        help=f"port of the server [{USUAL_PORT} if it is free, otherwise any free port]",
     )
     more = "further folder from which inputs may read files"
     parser.add_argument("--files", type=Path, action="append", default=[], metavar="DIR", help=more)
@@ -93,12 +98,14 @@ def main() -> None:
     for path in args.inputs:
         if path.suffix != ".nml" or not path.is_file():
             raise RunError(f"{path}: is not an input file; the name must end in .nml")
+    library()  # without it no run could start
     names = {path.stem for path in args.inputs}  # each name is listed once
     chosen = json.loads((INPUTS / "chooser.json").read_text(encoding="utf-8"))
     inputs = [INPUTS / f"{name}.nml" for name in sorted(chosen) if name not in names]
     folders = [INPUTS, *(path.parent for path in args.inputs), *args.files]
     command = [sys.executable, "-c", WORKER.format(str(Path(__file__).parent))]
-    asyncio.run(open_lab(Lab(args.inputs + inputs, folders, command), args.port, args.open))
+    ports = [USUAL_PORT, 0] if args.port is None else [args.port]
+    asyncio.run(open_lab(Lab(args.inputs + inputs, folders, command), ports, args.open))
     print("stopped the server and all runs")
 
 

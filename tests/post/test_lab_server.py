@@ -4,16 +4,20 @@ import asyncio
 import os
 import resource
 import signal
+import socket
+import sys
 from contextlib import AsyncExitStack
 from pathlib import Path
 
 import aiohttp
 import pytest
+from aiohttp import web
 
 from laboratory import film, laboratory
+from ricochet import RunError, live
 from ricochet import lab as module
 from synthetic_run import ROOT, run_script
-from whole_runs import PATIENCE, wait_for
+from whole_runs import PATIENCE, ran, wait_for
 
 
 def test_no_file_is_read_by_another_door(address):
@@ -201,3 +205,29 @@ def test_wrong_words_are_refused_in_one_line(address, program, monkeypatch, caps
     ):
         assert run_script("lab", *words) == 2
         assert reason in capsys.readouterr().err
+
+
+def test_a_port_that_is_taken_is_replaced_by_the_next_of_the_list():
+    async def chosen(*ports):
+        runner = web.AppRunner(web.Application())
+        await runner.setup()
+        try:
+            await live.listen(runner, ports)
+            return runner.addresses[0][1]
+        finally:
+            await runner.cleanup()
+
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        taken = other.getsockname()[1]
+        assert asyncio.run(chosen(taken, 0)) not in (0, taken)
+        with pytest.raises(RunError, match=f"port {taken}: Address already in use"):
+            asyncio.run(chosen(taken))
+
+
+def test_a_laboratory_without_the_library_does_not_start(program, tmp_path, monkeypatch):
+    """The page would wait for ever for a run that cannot start."""
+    monkeypatch.setenv("RICOCHET", str(program))
+    monkeypatch.setenv("RICOCHET_LIBRARY", str(tmp_path))
+    done = ran(sys.executable, ROOT / "post/lab.py")
+    assert done.returncode == 2 and done.stdout == ""
+    assert done.stderr == f"lab.py: no libricochet.so in {tmp_path}: run make library in a clone\n"

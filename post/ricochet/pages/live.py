@@ -10,7 +10,7 @@ import logging
 import os
 import signal
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
@@ -90,11 +90,23 @@ async def close_silent(app: web.Application, server: web.Server) -> None:
                 one.force_close()
 
 
+async def listen(runner: web.AppRunner, ports: Sequence[int]) -> None:
+    """Listen on the first free port of a list, or raise RunError."""
+    for port in ports:
+        try:
+            await web.TCPSite(runner, ADDRESS, port, backlog=512).start()
+            return
+        except OSError as problem:
+            reason = os.strerror(problem.errno)
+    raise RunError(f"port {port}: {reason}")
+
+
 @asynccontextmanager
-async def serving(app: web.Application, port: int = 0):
+async def serving(app: web.Application, *ports: int):
     """Run the server; yield its address and an event that Ctrl-C, TERM and HUP set.
 
-    The function raises RunError if another program uses the port.
+    The server uses the first free port of `ports`; port 0 stands for any free port.  The function
+    raises RunError if other programs use all these ports.
     """
     for name in ("aiohttp", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # requests are not logged
@@ -104,11 +116,7 @@ async def serving(app: web.Application, port: int = 0):
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=1.0)
     await runner.setup()
     try:
-        site = web.TCPSite(runner, ADDRESS, port, backlog=512)
-        try:
-            await site.start()
-        except OSError as problem:
-            raise RunError(f"port {port}: {os.strerror(problem.errno)}") from None
+        await listen(runner, ports)
         app[SERVER]["port"] = runner.addresses[0][1]
         watch = asyncio.create_task(close_silent(app, runner.server))
         address = f"http://{ADDRESS}:{app[SERVER]['port']}/"
@@ -233,7 +241,7 @@ def serve(
 async def serve_until_end(live: Live, page: str, open_page: Callable[[str], object] | None) -> None:
     """Serve the page until it has shown the end of the run, or until a signal arrives."""
     app = application({"/": page_of(page), "/film": live.film})
-    async with serving(app) as (address, stop):
+    async with serving(app, 0) as (address, stop):
         if open_page:
             threading.Thread(target=open_page, args=[address], daemon=True).start()
         clock = asyncio.get_running_loop().time
