@@ -203,7 +203,7 @@ def species(run: Run) -> list[dict]:
             "count": int(kind.disks.sum()),
             "mass": kind.mass,
             "alike": kind.alike,
-            "sizes": f"m = {span(kind.masses)}, r = {span(kind.radii)}",
+            "sizes": f"m = {span(kind.masses, 4)}, r = {span(kind.radii, 4)}",
             "colour": colours[k % len(colours)],
         }
         for k, kind in enumerate(run.by_species)

@@ -176,7 +176,7 @@ class Restitution(NamedTuple):
         return 1 - y + c * y**2
 
 
-def span(values: np.ndarray) -> str:
+def span(values: np.ndarray, digits: int = 6) -> str:
     """Return the smallest and largest value as text, or one value if all values are equal."""
-    ends = (f"{values.min():g}", f"{values.max():g}")
+    ends = (f"{values.min():.{digits}g}", f"{values.max():.{digits}g}")
     return ends[0] if ends[0] == ends[1] else " to ".join(ends)
