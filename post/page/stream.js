@@ -4,6 +4,7 @@
 // memory, every second frame of their older half is removed. If the user goes back and plays the film, the page first shows the
 // kept frames, and then new frames of the worker process.
 const PAST_ROOM = 6e7, HEAD = 6, MOST_CURVE = 3000;  // memory for frames [bytes]; numbers before the positions of a message; samples of a plot
+const SAME_TIME = 1e-13;  // largest relative difference of two times of one moment
 const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
 
 function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSON.stringify(wish)); }
@@ -116,7 +117,8 @@ function take(buffer) {
   // The interval between two frames is so short that no disk moves farther than half of the box.
   cross(frame, ({ place }, k) => film.periodic[k % 2] ? Math.round((place[k] - frame.place[k]) / film.edges[k % 2]) : 0);
   const isFirst = !past.length, follows = stream.live && moment.time === past.at(-1)?.time;
-  if (past.at(-1)?.time === frame.time) past.pop();  // at a start or a change the same time occurs again
+  // At a start the same time occurs again; a change acts at a time that is later by a rounding error only.
+  if (frame.time - past.at(-1)?.time <= SAME_TIME * Math.abs(frame.time)) past.pop();
   past.push(frame);
   if (past.length > 2 && past.length * buffer.byteLength > PAST_ROOM) past = past.filter((_, k) => k % 2 === 0 || 2 * k > past.length);
   stream.fresh++;

@@ -261,6 +261,20 @@ def test_a_paused_run_goes_back_step_by_step_and_on(opened):
     wait_for(lambda: inside(opened, "moment.time") > before + 0.01)
 
 
+def test_the_frame_before_a_change_is_one_step_back(opened):
+    """A change of the paused run replaces the newest frame, and adds none."""
+    wait_for(lambda: inside(opened, "past.length") > 3)
+    opened.press("p")
+    wait_for(lambda: not inside(opened, "state.playing"))
+    for disk in (0, 1):
+        opened.run("filmOf(current()).send({ do: 'push', disk: arguments[0] })", disk)
+        wait_for(lambda n=disk: len(opened.run("return current().changes")) > n)
+    times = inside(opened, "past.map(frame => frame.time)")
+    assert times[-1] - times[-2] > 1e-6
+    opened.press("\ue012")  # arrow left
+    assert inside(opened, "moment.time") == times[-2]
+
+
 def test_what_is_clicked_is_downloaded_or_measured(opened, tmp_path):
     """Script and output have the same time, the input can be run, and a scan returns energies."""
     slide(opened, 3, 0.5)  # restitution
