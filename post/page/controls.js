@@ -168,21 +168,32 @@ function zoomBy(factor, px, py) {
 
 // { side } or { disk }, the pointer, its first position, the distance from there to the side or disk, and when the worker was last told [ms]
 let grabbed = null;
+const GRIP = 14;  // greatest distance of the mouse from the side that it drags [CSS pixels]
+const CURSORS = ['ew-resize', 'ns-resize'];  // over a vertical and a horizontal side
 const HOLDABLE = [undefined, 'still', 'constant_velocity', 'piston'], TOLD_AGAIN = 100;
 const isFinger = ({ pointerType }) => pointerType === 'touch', reachOf = (event, mouse) => isFinger(event) ? 22 : mouse;  // [CSS pixels]
+
+const canHold = k => !film.periodic[k >> 1] && HOLDABLE.includes(film.sides[k].motion);
+
+// Returns the number of the side near a point of the canvas, or -1 if there is none that the user can drag now.
+function sideAt(px, py, event) {
+  if (!isPart || !state.playing || !stream.live) return -1;
+  const [x0, x1, y0, y1] = sidesAt(moment.shown), reach = reachOf(event, GRIP) * page.dots;
+  const gaps = [x0, x1].map(x => Math.abs(across(x) - px)).concat([y0, y1].map(y => Math.abs(up(y) - py)));
+  return gaps.findIndex((gap, k) => gap < reach && canHold(k));
+}
 
 // Returns the side or the disk at a point of the canvas, if the user can drag the side or the disk. Of the disks, a finger can drag
 // only the one whose trace is shown. A finger that starts on another disk scrolls the page or moves the picture.
 function grabAt(px, py, event) {
-  if (!isPart || !(state.playing ? stream.live : moment.time === last())) return null;
+  if (!isPart) return null;
   const own = { pointer: event.pointerId, from: [px, py] }, away = (x, y) => [x - backAcross(px), y - backUp(py)];
-  if (!state.playing) {
+  if (!state.playing && moment.time === last()) {
     const i = isFinger(event) ? diskAt(px, py, reachOf(event), state.traced) : diskAt(px, py, 0);
     return i === null ? null : { ...own, disk: i, away: away(X[i], Y[i]) };
   }
-  const [x0, x1, y0, y1] = sidesAt(moment.shown), reach = reachOf(event, 10) * page.dots, gaps = [x0, x1].map(x => Math.abs(across(x) - px)).concat([y0, y1].map(y => Math.abs(up(y) - py)));
-  const side = gaps.findIndex((gap, k) => gap < reach && !film.periodic[k >> 1] && HOLDABLE.includes(film.sides[k].motion));
-  return side < 0 ? null : { ...own, side, away: side < 2 ? away([x0, x1][side], 0) : away(0, [y0, y1][side - 2]), told: -Infinity };
+  const side = sideAt(px, py, event), place = side < 0 ? 0 : sidesAt(moment.shown)[side];
+  return side < 0 ? null : { ...own, side, away: side < 2 ? away(place, 0) : away(0, place), told: -Infinity };
 }
 
 // Returns whether the page must not be scrolled during the motion that drags a side or disk. A vertical motion along a left or right
@@ -213,7 +224,7 @@ function release(cancelled) {
 
 function pointerMoved(event) {
   const before = pointers.get(event.pointerId), here = onStage(event);
-  if (!before) return;
+  if (!before) { $('stage').style.cursor = CURSORS[sideAt(...here, event) >> 1] ?? ''; return; }
   const others = [...pointers].filter(([id]) => id !== event.pointerId).map(([, place]) => place);
   pointers.set(event.pointerId, here);
   const dx = here[0] - before[0], dy = here[1] - before[1];

@@ -12,12 +12,20 @@ function tell() {
   const share = (time - first()) / (last() - first() || 1);
   $('scrub').value = share;
   $('scrub').setAttribute('aria-valuetext', `time ${short(time)} of ${short(last())}`);
-  $('clock').innerHTML = `t = <b>${long(+moment.shown.toPrecision(5))}</b> · ${source.counted()}`
-    + (disks > 1 ? ` · ${short(+collisions.toPrecision(3))} collisions per disk` : '');
+  $('clock').innerHTML = `t = <b>${long(+moment.shown.toPrecision(5))}</b><span class="counted"> · ${source.counted()}</span>`
+    + (disks > 1 ? `<span> · ${short(+collisions.toPrecision(3))} collisions per disk</span>` : '');
   $('traced').hidden = !state.traced.length;
+  $('hint').textContent = state.traced.length ? '' : hint();
   $('push').hidden = !isPart || state.traced.length !== 1;
   $('disk').innerHTML = state.traced.map(i =>
     `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) at <b>${short(X[i])}, ${short(Y[i])}</b>`).join('<br>');
+}
+
+// Returns the words that stand below the controls while no disk is selected.
+function hint() {
+  if (!isPart) return 'Select a disk to see its trace.';
+  if (!state.playing) return 'Drag a disk, or select it to see its trace.';
+  return `${film.sides.some((_, k) => canHold(k)) ? 'Drag a side of the box, or select' : 'Select'} a disk to see its trace.`;
 }
 
 // Writes descriptions of the picture and of each plot for screen readers.
@@ -65,7 +73,9 @@ function drawLegend() {
       <span><b>0</b><b>${short(+middle.toPrecision(2))}</b><b>≥ ${short(+scale[1].toPrecision(2))}</b></span></div>`;
     legend.querySelector('i').style.background = `linear-gradient(to right, ${stops})`;  // the security policy of the page refuses inline styles
   }
-  const notes = [scale?.[0], ...film.sides.map((law, k) => describeLaw(film.surfaces[k], law))].filter(Boolean);
+  // The motion is that at the start: a note about a side that is dragged would change the size of the picture meanwhile.
+  const sides = film.sides.map((law, k) => ({ ...law, motion: (film.atStart ?? film.sides)[k].motion }));
+  const notes = [scale?.[0], ...sides.map((law, k) => describeLaw(film.surfaces[k], law))].filter(Boolean);
   if (notes.length) legend.append(Object.assign(document.createElement('p'), { textContent: notes.join('; ') }));
 }
 

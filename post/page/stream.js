@@ -84,7 +84,7 @@ const hear = {
 };
 
 function open({ facts, blocks, run }) {
-  setScene(facts, blocks);
+  setScene({ ...facts, atStart: facts.sides }, blocks);
   angles = facts.turning ? new Float32Array(disks) : null;
   const each = there => there ? kinds.map(() => []) : null;
   const curves = { time: [], kinetic: each(true), potential: each(facts.gravity.some(Boolean)), rotational: each(facts.turning), pressure: [], news: [] };

@@ -1,5 +1,6 @@
 """The page of the laboratory: sliders, texts, keys, mouse, downloads and addresses."""
 
+import itertools
 import random
 
 import numpy as np
@@ -170,6 +171,28 @@ def repeated(browser):
     script, space = browser.run("return window.kept"), {}
     exec(script.replace("    print(", "    end = simulation.time, simulation.position  # ("), space)
     return space["end"]
+
+
+def test_the_mouse_grips_each_side_from_both_faces(opened):
+    """The pointer has another shape within 12 pixels of a side, which it drags inwards."""
+    names = ("left", "right", "bottom", "top")
+    for shift, number in itertools.product((-12, 12), range(4)):
+        axis, inwards = number // 2, (1, -1, -1, 1)[number]  # in window coordinates
+        place = [0.4, 0.4]
+        place[axis] = inside(opened, "past.at(-1).sides")[number]
+        start = pixel(opened, *place)
+        start[axis] += shift
+        end = start[:]
+        end[axis] += 9 * inwards
+        count = len(opened.run("return current().changes"))
+        mouse(opened, start)
+        cursor = "filmOf(current()).document.getElementById('stage').style.cursor"
+        wait_for(lambda shape=f"{'en'[axis]}": opened.run(f"return {cursor}[0]") == shape)
+        mouse(opened, "down", end)
+        wait_for(lambda n=count: len(opened.run("return current().changes")) > n)
+        mouse(opened, "up")
+        last = "return current().changes.at(-1)[2]"
+        assert opened.run(last) == f"the {names[number]} side is dragged"
 
 
 def test_a_dragged_side_follows_the_mouse_and_then_stays(opened):
