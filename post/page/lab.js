@@ -255,7 +255,8 @@ function isComparing() { return shownBoxes().length > 1; }
 function newBox() {
   const taken = state.boxes.map(({ letter }) => letter), letter = [...'ABCDEFGHIJ'].find(one => !taken.includes(one));
   const frame = make('iframe', { title: 'the run', allow: 'fullscreen', src: 'view' });
-  const figure = make('section', { className: 'run' }, make('p', { className: 'caption' }), frame), box = { letter, figure, frame, words: '', changes: [], shown: true };
+  const advice = make('p', { className: 'advice', textContent: 'Change a slider: the next run appears here.' });
+  const figure = make('section', { className: 'run' }, make('p', { className: 'caption' }), advice, frame), box = { letter, figure, frame, words: '', changes: [], shown: true };
   state.boxes.push(box);
   $('runs').append(figure);
   return box;
@@ -368,6 +369,12 @@ function regroup() {
 
 const whatIs = ({ words: text, changes }) => text + (changes.length ? `, then ${changeInWords(changes.at(-1))}` : '');
 
+// Returns the line above the film of a run. Above a run that repeats the run before it, the line says how to change that.
+function captionOf(box) {
+  const before = shownBoxes().at(-2), text = whatIs(box);
+  return `${box.letter}: ${box === current() && before && whatIs(before) === text ? 'change a slider' : text}`;
+}
+
 function tellShelf() {
   $('shelf').replaceChildren(...state.boxes.filter(({ run: number }) => number).map(box => {
     const file = part => make('button', { type: 'button', textContent: part, onclick: () => filmOf(box).send({ do: 'keep', part }) });
@@ -377,31 +384,45 @@ function tellShelf() {
       filmOf(box).play(box.shown && !state.paused);
       regroup();
     });
-    const away = make('button', { type: 'button', textContent: '×', title: `remove run ${box.letter}`, onclick: () => remove(box) });
+    const away = make('button', { type: 'button', textContent: '×', ariaLabel: `remove run ${box.letter}`, onclick: () => remove(box) });
     const own = box === current(), parts = [make('b', { textContent: `${box.letter}: ` }), whatIs(box)];
     return make('li', {}, make('p', {}, ...(own ? [] : [seen, ' ']), ...parts), make('p', { className: 'links' }, ...['input', ...(box.changes.length ? ['script'] : []), 'output'].map(file), ...(own ? [] : [away])));
   }));
   const changes = current()?.changes ?? [];
   $('changes').replaceChildren(...changes.slice(-6).map(change => make('li', { textContent: `t = ${short(change[0])}: ${changeInWords(change)}` })));
-  state.boxes.forEach(box => { box.figure.firstChild.textContent = `${box.letter}: ${whatIs(box)}`; });
+  state.boxes.forEach(box => { box.figure.firstChild.textContent = captionOf(box); });
 }
 
-// Arranges the films of all runs side by side, with equal sizes. The plots appear beside the newest run and include the curves of
-// the earlier runs.
+// Returns the width of a scroll bar beside the content of an element [CSS pixels]; touch screens have none.
+function widthOfScrollBar() {
+  const box = document.body.appendChild(make('div', { className: 'measure' })), width = box.offsetWidth - box.clientWidth;
+  box.remove();
+  return width;
+}
+const scrollBar = widthOfScrollBar();
+
+// Returns the run whose film contains the controls and the plots: the newest run, as soon as it has a picture.
+const leader = () => isThere(current()) && filmOf(current()).inside().film ? current() : shownBoxes().at(-2) ?? current();
+
+// Arranges the films of all runs side by side, with equal sizes. The plots are part of the film of one run and include the curves of
+// the other runs.
 function arrangeAll() {
   const boxes = shownBoxes(), many = isComparing(), { clientWidth, clientHeight } = $('runs');
-  const upright = clientWidth < 560, count = many ? boxes.length : 1, width = Math.floor(clientWidth / count);
+  const upright = clientWidth < 560, count = many ? boxes.length : 1, width = Math.floor((clientWidth - scrollBar) / count);
   const shapes = films().map(one => one.inside().film?.edges).filter(Boolean).map(([x, y]) => y / x), highest = clientHeight * (upright ? 0.36 : 0.42) - 26;
-  const size = many ? { width: width - 12, height: Math.floor(Math.min(highest, (width - 12) * Math.max(0.5, ...shapes))) } : null;
+  const size = { width: width - 12, height: Math.floor(Math.min(highest, (width - 12) * Math.max(0.5, ...shapes))) }, lead = leader();
   $('runs').classList.toggle('many', many);
-  $('runs').style.gridTemplateColumns = `repeat(${count}, minmax(0, 1fr))`;
+  $('runs').style.gridTemplateColumns = many ? `repeat(${count}, ${width}px) 1fr` : 'minmax(0, 1fr)';
   for (const box of state.boxes) {
-    box.figure.style.gridColumn = many && box !== current() ? boxes.indexOf(box) + 1 : '';
-    box.figure.hidden = !boxes.includes(box);
-    box.figure.style.height = many && box !== current() ? `${size.height + 50}px` : '';
-    box.figure.classList.toggle('current', box === current());
+    const bare = many && box !== lead, column = boxes.indexOf(box), left = many && !bare ? column * width : 0;
+    box.figure.style.gridColumn = bare ? column + 1 : '';
+    box.figure.hidden = column < 0;
+    box.figure.style.height = bare ? `${size.height + 50}px` : '';
+    box.figure.classList.toggle('lead', !bare);
+    box.figure.classList.toggle('waiting', bare && box === current());
     box.figure.firstChild.style.width = many ? `${size.width}px` : '';
-    if (isThere(box)) filmOf(box).arrange(size, many && box !== current());
+    box.figure.firstChild.style.marginLeft = `${left}px`;
+    if (isThere(box)) filmOf(box).arrange(many ? { ...size, left } : null, bare);
   }
   tellShelf();
   overlayAll();
@@ -501,6 +522,7 @@ function addToScan({ is, index, mean, error, problems }) {  // values that canno
 
 // ---------- event handlers of the page ----------
 
+const isBare = () => document.body.classList.contains('bare');
 function bare(on) {
   document.body.classList.toggle('bare', on);
   $('settings').ariaPressed = !on;
@@ -520,14 +542,14 @@ function dress() {
 const actions = {
   film: () => { current().frame.focus(); filmOf(current()).document.getElementById('play').focus(); },
   run, keep, scan: beginScan, choose: () => $('inputs').showModal(),
-  pause: () => filmOf(current()).play(state.paused), settings: () => bare(!document.body.classList.contains('bare')),
+  pause: () => filmOf(current()).play(state.paused), settings: () => bare(!isBare()),
   larger: () => { $('larger').ariaPressed = document.documentElement.classList.toggle('larger'); dress(); },
   theme: () => { const { dataset } = document.documentElement; dataset.theme = dataset.theme === 'dark' ? 'light' : 'dark'; dress(); },
   another: () => { if ($('add').value) addGroup(...$('add').value.split(' ')); },
 };
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());
 const MOVES = new Set(['ArrowLeft', 'ArrowRight', 'Home', 'End', 'n', ' ']);  // keys that act on the newest film, which the others follow
-const keys = { r: 'run', p: 'pause', k: 'keep', s: 'settings', l: 'larger' };
+const keys = { r: 'run', p: 'pause', c: 'keep', s: 'settings', l: 'larger' };
 
 // Keyboard shortcuts of the laboratory work unless an input field or a selection menu has the keyboard focus. Keyboard shortcuts
 // for films apply to the film with the focus, or to all films if no film has the focus.
@@ -552,6 +574,8 @@ addEventListener('pageshow', event => { if (event.persisted) location.reload(); 
 document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';
 buildInputs();
 newBox();
-bare(matchMedia('(max-height: 500px)').matches);
+const narrow = matchMedia('(max-width: 1099px), (max-height: 500px)');
+narrow.addEventListener('change', () => bare(narrow.matches));  // the form is then a drawer, which is closed at first
+bare(narrow.matches);
 addEventListener('hashchange', fromAddress);
 fromAddress();

@@ -326,9 +326,21 @@ function tellEnergies() {
 
 // ---------- table of measured values with errors, and theoretical values ----------
 
-function withError({ value, error }) {  // rounded to two digits of the error
-  const last = Math.floor(Math.log10(error)) - 1, rounded = one => (Math.round(one / 10 ** last) * 10 ** last).toFixed(Math.max(0, -last)).replace('-', '−');
-  return value === null ? '' : !error ? short(value) : [value, error].map(Math.abs(last) > 7 ? short : rounded).join(' ± ');
+// Rounds a number to a multiple of a power of ten, for example to 0.01 if the power is −2.
+const rounded = (value, power) => Math.abs(power) > 7 ? short(value)
+  : (Math.round(value / 10 ** power) * 10 ** power).toFixed(Math.max(0, -power)).replace('-', '−');
+const secondDigit = error => Math.floor(Math.log10(error.toPrecision(2))) - 1;
+
+// Returns a mean and its error, rounded to two digits of the error. A line can break before the sign ±, but not after it.
+function withError({ value, error }) {
+  if (value === null || !error) return value === null ? '' : short(value);
+  return [value, error].map(one => rounded(one, secondDigit(error))).join(' ±\u00a0');
+}
+
+// Returns a theoretical value with at least as many decimals as the mean beside it.
+function lawOf({ theory, error }) {
+  if (!theory || !error) return theory === null ? '' : short(theory);
+  return rounded(theory, Math.min(secondDigit(error), Math.floor(Math.log10(Math.abs(theory))) - 3));
 }
 
 // Returns the temperature and the mean speed of each species of the disks shown.
@@ -361,7 +373,7 @@ function tellNumbers() {
   const own = numbersNow(), seen = value => value === null ? '' : short(value), some = (rows, what) => rows.some(one => one[what] !== null);
   $('measured').hidden = !own.length;
   if (!own.length) return;
-  const runs = overlaid.map(({ letter, numbers }) => [letter, numbers()]), texts = { now: one => seen(one.now), mean: withError, theory: one => seen(one.theory) };
+  const runs = overlaid.map(({ letter, numbers }) => [letter, numbers()]), texts = { now: one => seen(one.now), mean: withError, theory: lawOf };
   runs.push([parent.letterOf?.(window), own]);
   const columns = runs.length === 1
     ? Object.entries(texts).filter(([name]) => some(own, name === 'mean' ? 'value' : name)).map(([name, text]) => [name, own, text])

@@ -62,7 +62,7 @@ function layOutStage() {
   page.width = Math.round(width * page.unit + 2 * margin);
   page.height = Math.round(height * page.unit + 2 * margin);
   for (const layer of layers) Object.assign(layer, { width: page.width, height: page.height });
-  const [wide, high] = [page.width, page.height].map(size => size / dots), rest = boxSize && `0 ${(boxSize.width - wide) / 2}px ${boxSize.height - high}px auto`;
+  const [wide, high] = [page.width, page.height].map(size => size / dots), rest = boxSize && `0 0 ${boxSize.height - high}px ${boxSize.left + (boxSize.width - wide) / 2}px`;
   Object.assign($('stage').style, { width: wide + 'px', height: high + 'px', margin: rest ?? '' });
   picture = disksBrush.createImageData(page.width, page.height);
   pixels = new Int32Array(picture.data.buffer);

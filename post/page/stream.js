@@ -123,6 +123,7 @@ function take(buffer) {
   if (past.length > 2 && past.length * buffer.byteLength > PAST_ROOM) past = past.filter((_, k) => k % 2 === 0 || 2 * k > past.length);
   stream.fresh++;
   if (isFirst) {
+    const opens = document.documentElement.classList.contains('empty');
     document.documentElement.classList.remove('empty');
     origins = frame.place;
     const squares = Array.from({ length: disks }, (_, i) => frame.velocity[2 * i] ** 2 + frame.velocity[2 * i + 1] ** 2).filter(Boolean);
@@ -130,6 +131,7 @@ function take(buffer) {
     move(frame.time);
     begin();
     refresh();
+    if (opens) parent.arrangeAll();  // the controls and the plots move from the previous film to this one
     play(!parent.isPaused());
   } else if (!state.playing && follows) {
     show(frame.time, true);
@@ -259,8 +261,9 @@ function replay() {
   play(true);
 }
 
-// Shows the film beside other films, with a picture of the given size. If no `size` is given, the film fills the whole page.
-let boxSize = null;
+// Shows the film beside other films, with a picture of the given size and distance from the left side of the page. If no `size` is
+// given, the film fills the whole page. A film that is `bare` has neither controls nor plots.
+let boxSize = null;  // { left, width, height } [CSS pixels]
 function arrange(size, bare) {
   boxSize = size;
   document.documentElement.classList.toggle('boxed', !!size);

@@ -7,7 +7,7 @@ from whole_runs import wait_for
 
 
 def test_kept_runs_stand_beside_the_next_in_equal_boxes_and_plots(opened):
-    opened.press("k")
+    opened.press("c")
     moving(opened, 1)
     slide(opened, 0, 0.7)
     wait_for(lambda: "speed" in opened.run("return current().words"))
@@ -37,7 +37,7 @@ def test_compared_runs_show_one_time_and_go_on_alone(opened):
     """This holds while they play, at each step, and when a paused film goes to another time."""
     wait_for(lambda: inside(opened, "moment.time") > 0.1)
     for kept in (1, 2):
-        opened.press("k")
+        opened.press("c")
         moving(opened, kept)
     opened.run("set('species.gas.count', '3000')")
     moving(opened, 3)
@@ -101,7 +101,7 @@ def test_a_run_that_waits_for_the_page_goes_on_beside_another_run(opened):
 
 def test_compared_runs_replay_the_times_that_all_of_them_have(opened):
     """A film that lacks frames of another film never shows an earlier time than the other film."""
-    opened.press("k")
+    opened.press("c")
     moving(opened, 1)
     wait_for(lambda: inside(opened, "past.length") > 60)
     # Every second frame of the second run is removed, as when a film needs too much memory.
@@ -135,7 +135,7 @@ def test_a_value_typed_beside_a_kept_run_starts_both_from_their_start(opened, na
     wait_for(lambda: opened.run("return document.querySelectorAll('.slider').length") == 5)
     key = opened.run("return state.input.sliders[0].key")
     for kept, text in enumerate(LESSON[name], 1):
-        opened.press("k")
+        opened.press("c")
         wait_for(lambda count=kept: opened.run("return state.boxes.length") == count + 1)
         type_at(opened, 0, text)
         wait_for(lambda now=text: opened.run("return state.has[arguments[0]]", key) == now)
@@ -154,7 +154,7 @@ def test_a_value_typed_beside_a_kept_run_starts_both_from_their_start(opened, na
 
 
 def test_compared_runs_have_numbers_and_histograms_side_by_side(opened):
-    opened.press("k")
+    opened.press("c")
     moving(opened, 1)
     opened.run("set('species.gas.speed', '2')")
     wait_for(lambda: "speed" in opened.run("return current().words"))
@@ -180,7 +180,7 @@ def test_compared_runs_have_numbers_and_histograms_side_by_side(opened):
 
 def test_another_input_removes_the_kept_runs_and_the_same_input_keeps_them(opened):
     """Plots never contain curves of different inputs."""
-    opened.press("k")
+    opened.press("c")
     moving(opened, 1)
     for name, letters in (("gas", ["A", "B"]), ("cooling", ["A"])):
         before = opened.run("return current().run")
@@ -194,7 +194,7 @@ def test_another_input_removes_the_kept_runs_and_the_same_input_keeps_them(opene
 
 def test_a_scan_beside_a_kept_run_is_seen_and_moves_nothing(opened):
     """The figure is in the form, in the visible part of the window, and covers no other element."""
-    opened.press("k")
+    opened.press("c")
     moving(opened, 1)
     places = """const parts = ['stage', 'controls', 'speeds', 'energy', 'pressure'];
         return films().flatMap(one => parts.map(id => one.document.getElementById(id)))

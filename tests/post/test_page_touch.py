@@ -137,6 +137,7 @@ def test_a_refused_position_is_told_until_the_next_change(touched):
 
 def test_a_finger_that_scrolls_over_a_slider_leaves_its_value(touched):
     run = touched.run("return current().run")
+    touched.press("s")
     x, y, width, value = touched.run(SLIDER, 3)
     for fraction in (0.2, 0.7):
         start = [x + fraction * width, y]
