@@ -142,3 +142,21 @@ def test_the_guides_make_their_own_figures():
             assert name in made, f"no command of {page.name} makes runs/{name}.png"
             shown[name] = page
     assert {path.stem for path in ROOT.glob("docs/guides/*.png")} == {*shown}
+
+
+#: Advice that a page must contain if the code of the page contains one of these words.
+NEEDED = {
+    r"import pandas|to_dataframe\(|\bsweep\(": "python -m pip install pandas",
+    r"write_gsd|import gsd": "python -m pip install gsd",
+    r"import freud": "python -m pip install freud-analysis",
+    r"\bSimulation\(": "make library",
+}
+
+
+@pytest.mark.parametrize("page", RUN, ids=lambda path: path.stem)
+def test_a_page_says_what_its_code_needs(page):
+    """`make demo` installs neither optional packages nor the library."""
+    text = page.read_text()
+    code = "".join(one["code"] for one in BLOCK.finditer(text))
+    for used, advice in NEEDED.items():
+        assert not re.search(used, code) or advice in " ".join(text.split()), advice
