@@ -1,10 +1,13 @@
 """The inputs of the laboratory: their pictures, descriptions and sliders."""
 
 import importlib.util
+import re
+from urllib.parse import parse_qsl, urlsplit
 
 import pytest
 from PIL import Image
 
+import lab
 import player
 from laboratory_page import CHOOSER
 from ricochet import Simulation
@@ -46,3 +49,22 @@ def test_both_ends_of_each_slider_run(path, monkeypatch, program):
                 value[int(component)] = end
             with Simulation(path, {variable: value}) as run:
                 run.advance(time=1e-3)
+
+
+def test_the_links_of_the_lesson_lead_to_the_inputs_with_these_titles():
+    """Other values than those of the input are values of its sliders, and each heading has one."""
+    text = (ROOT / "docs/tutorials/lesson.md").read_text()
+    shown = set()
+    for title, link in re.findall(r"\[([^\]]+)\]\((http://[^)]+)\)", text):
+        address = urlsplit(link)
+        assert address.netloc == f"127.0.0.1:{lab.USUAL_PORT}"
+        (key, name), *settings = parse_qsl(address.fragment)
+        own = CHOOSER[name]
+        sliders = {variable: ends for variable, _, *ends in own["sliders"]}
+        assert key == "input" and title in (f"*{own['title']}*", "this state")
+        assert bool(settings) == (title == "this state")
+        for variable, value in settings:
+            low, high, *_ = sliders[variable]
+            assert low <= float(value) <= high
+        shown.add(name)
+    assert shown == {"gas", "mixture", "cooling", "crater"}
