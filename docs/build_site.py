@@ -15,6 +15,7 @@ code 1 if Sphinx prints a warning, or if a link within the site leads nowhere.
 
 import argparse
 import contextlib
+import html
 import importlib.util
 import json
 import os
@@ -48,6 +49,14 @@ OUTSIDE = {
     "post/ricochet/README.md": "python",
     "LICENSE": "licence",
 }
+GLOSSARY = "explanation/glossary"
+#: Script of the search page, which shows excerpts of pages.  A page that is opened as a file cannot
+#: read the other pages; therefore the script contains their texts.
+EXCERPTS = """const TEXTS = {texts};
+window.fetch = async page => ({{
+  text: async () => `<div role="main">${{TEXTS[page.replace(/^\\.\\//, "")] ?? ""}}</div>`,
+}});
+"""
 LINK = re.compile(r"(?<=\]\()[^)\s]+|(?<=\bsrc=\")[^\"]+")
 TO_FOLDER = re.compile(r"\[([^\[\]]*)\]\(([\w/.-]+)\)")
 ELSEWHERE = ("http:", "https:", "mailto:", "#", "data:")
@@ -182,6 +191,8 @@ class Stage:
             # from another server.
             text = self.relinked(page, text).replace("```mermaid", "```text")
             text = with_cards(text)
+            if name == GLOSSARY:
+                text = with_index_entries(text)
             own = page.startswith("docs/") and page.endswith("/README.md")
             if own or (ROOT / page).with_suffix("").is_dir():
                 text += self.contents(page, (ROOT / page).read_text(encoding="utf-8"))
@@ -292,6 +303,29 @@ def with_cards(text: str) -> str:
     return re.sub(r"^<!-- cards -->\n((?:- .*\n(?:  .*\n)*)+)", grid, text, flags=re.MULTILINE)
 
 
+def with_index_entries(text: str) -> str:
+    """Mark the terms of the glossary as entries of the index, so that a search finds them first.
+
+    A row of a table explains a term in its first column or, after a symbol, the words with which
+    the second column begins.
+    """
+
+    def mark(words: str) -> str:
+        return f"{{index}}`{words} <!{words}>`"
+
+    def marked(found: re.Match) -> str:
+        first, second = found[1], found[2]
+        begin = re.match(r"[a-zA-Z][a-zA-Z -]{3,}?(?=[:;,]| \(| and |$)", second)
+        if re.fullmatch("[a-zA-Z]{2,}[a-zA-Z -]*", first):
+            first = mark(first)
+        elif begin:
+            second = mark(begin[0]) + second[begin.end() :]
+        return f"| {first} | {second} |"
+
+    head, tables, rest = text.partition("## Symbols")
+    return head + tables + re.sub(r"^\| (?!symbol|term)(.+?) \| (.+) \|$", marked, rest, flags=re.M)
+
+
 class ParserFoundError(Exception):
     """Exception that stops a script when it parses its command line."""
 
@@ -350,7 +384,7 @@ def options_of(parser: argparse.ArgumentParser) -> Iterator[str]:
 
 
 class Page(HTMLParser):
-    """Parser that collects the links and the anchors of an HTML page of the site."""
+    """Parser that collects the links, the anchors and the text of an HTML page of the site."""
 
     def __init__(self, path: Path) -> None:
         """Read a page."""
@@ -358,14 +392,40 @@ class Page(HTMLParser):
         self.links: list[str] = []
         self.loaded: list[str] = []
         self.anchors: set[str] = set()
+        self.words: list[str] = []
+        self.articles = 0  # number of elements <article> around the present position
         self.feed(path.read_text(encoding="utf-8"))
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         given = dict(attrs)
+        self.articles += tag == "article"
         self.anchors |= {value for key in ("id", "name") if (value := given.get(key))}
         self.links += [value for key in ("href", "src") if (value := given.get(key))]
         loaded = given.get("href") if given.get("rel") == "stylesheet" else given.get("src")
         self.loaded += [loaded] if loaded else []
+
+    def handle_endtag(self, tag: str) -> None:
+        self.articles -= tag == "article"
+
+    def handle_data(self, data: str) -> None:
+        if self.articles:
+            self.words += data.replace("¶", "").split()
+
+
+def pages_of(site: Path) -> dict[Path, Page]:
+    """Return all pages of the site except those that FORD writes."""
+    return {path: Page(path) for path in site.rglob("*.html") if FORTRAN not in path.parts}
+
+
+def write_excerpts(site: Path) -> None:
+    """Write the script of the search page."""
+    texts = {
+        path.relative_to(site).as_posix(): html.escape(" ".join(page.words), quote=False)
+        for path, page in sorted(pages_of(site).items())
+        if path.name not in OWN
+    }
+    script = EXCERPTS.format(texts=json.dumps(texts, ensure_ascii=False))
+    (site / "_static" / "excerpts.js").write_text(script, encoding="utf-8")
 
 
 def broken(site: Path) -> list[str]:
@@ -374,7 +434,7 @@ def broken(site: Path) -> list[str]:
     Scripts, styles and pictures from other machines also count as broken, because the site works
     without a network.
     """
-    pages = {path: Page(path) for path in site.rglob("*.html") if FORTRAN not in path.parts}
+    pages = pages_of(site)
     found = []
     for path, page in pages.items():
         found += [
@@ -415,6 +475,7 @@ def main(build: Path) -> int:
         made_by_sphinx = name.parts[0] in ("_static", "_downloads", FORTRAN) or name.name in OWN
         if not made_by_sphinx and name not in names:  # of an earlier call
             path.unlink()
+    write_excerpts(site)
     if status == 0 and not (site / FORTRAN / "index.html").exists():
         print(f"{site}/{FORTRAN}: the pages of the Fortran source are missing", file=sys.stderr)
         status = 1

@@ -64,9 +64,16 @@ def without_aliases(app: Any, kind: str, name: str, *rest: Any) -> None:
         lines[:] = []
 
 
+def add_excerpts(app: Any, page: str, *_: Any) -> None:
+    """Load the texts of all pages, which docs/build_site.py writes, in the page of the search."""
+    if page == "search":
+        app.add_js_file("excerpts.js")
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Register the function that writes formulas, which Sphinx calls."""
     app.connect("autodoc-process-docstring", without_aliases)
+    app.connect("html-page-context", add_excerpts)
     app.add_html_math_renderer(
         "mathml",
         (lambda self, node: mathml(self, node, "inline"), None),

@@ -1,6 +1,7 @@
 """Tests of docs/build_site.py, which collects the pages of the documentation site for Sphinx."""
 
 import importlib.util
+import json
 import re
 
 import pytest
@@ -99,3 +100,27 @@ def test_each_script_has_a_page_with_its_options(stage):
     scripts = [p.stem for p in (ROOT / "post").glob("*.py") if "def main()" in p.read_text()]
     pages = {path.stem for path in stage.folder.glob("reference/scripts/*.md")}
     assert pages == {*scripts, "index"}
+
+
+def test_each_term_of_the_glossary_is_a_main_entry_of_the_index(stage):
+    """A search for the term lists such an entry before all other pages."""
+    page = (stage.folder / "explanation/glossary.md").read_text()
+    entries = re.findall(r"\{index\}`([^`]+) <!([^`]+)>`", page)
+    assert all(words == entry == words.strip() for words, entry in entries)
+    table = (ROOT / "docs/explanation/glossary.md").read_text().partition("## Terms")[2]
+    terms = {*re.findall(r"^\| ([\w -]+) \|", table, re.M)} - {"term"}
+    names = {entry for _, entry in entries}
+    assert len(entries) == len(names)
+    assert terms | {"packing fraction", "diffusion coefficient", "pressure"} <= names
+
+
+def test_the_search_page_has_the_text_of_each_page(site, tmp_path):
+    (tmp_path / "_static").mkdir()
+    (tmp_path / "sub").mkdir()
+    text = '<p>menu</p><article role="main"><h1>A &lt; B<a href="#">¶</a></h1>"1"\n 2</article>end'
+    (tmp_path / "sub" / "a.html").write_text(text)
+    (tmp_path / "search.html").write_text("<article>form</article>")
+    site.write_excerpts(tmp_path)
+    script = (tmp_path / "_static" / "excerpts.js").read_text()
+    texts = json.loads(script.partition(" = ")[2].partition(";\nwindow.fetch")[0])
+    assert texts == {"sub/a.html": 'A &lt; B "1" 2'}
