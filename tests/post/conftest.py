@@ -104,9 +104,13 @@ def address(program, tmp_path_factory):
 
 #: Settings of the gases that the fixture `bulk` simulates.
 RUNS = (
-    ("species.disks.packing_fraction=0.05",),
-    ("species.disks.packing_fraction=0.3",),
-    ("species.disks.packing_fraction=0.02", "contact.restitution=0.9"),
+    ("species.disks.packing_fraction=0.05", "output.frames_every_time=0.04"),
+    ("species.disks.packing_fraction=0.3", "output.frames_every_time=0.02"),
+    (
+        "species.disks.packing_fraction=0.02",
+        "output.frames_every_time=0.1",
+        "contact.restitution=0.9",
+    ),
 )
 
 
@@ -114,8 +118,7 @@ RUNS = (
 def bulk(simulated):
     """Simulate small gases at two packing fractions and a cooling gas."""
     settings = ["species.disks.count=100", "stop.collisions_per_disk=60"]
-    settings += ["output.frames_every_time=0.02", "output.observables_every_collisions=25"]
-    settings += ["output.event_log=true"]
+    settings += ["output.observables_every_collisions=25", "output.event_log=true"]
     system = ROOT / "input" / "bulk.nml"
     each = enumerate(RUNS)
     return [simulated(system, *settings, *more, name=f"{k}").path for k, more in each]

@@ -21,7 +21,10 @@ from synthetic_run import drawn, run_script, write_run, written
 
 
 def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp_path, capsys):
-    """Diffusion coefficient, pressure and equation of state are not defined."""
+    """Diffusion coefficient, pressure and equation of state are not defined.
+
+    The test draws the figures of four scripts, among them the structure of a dilute gas.
+    """
     rows = drawn(tmp_path, "correlations", bulk[2])
     assert "no steady state without flow: time correlations" in capsys.readouterr().err
     assert {row["what"] for row in rows} == {"psi6_local", "psi6_global", "a2", "g", "g6", "S"}

@@ -13,9 +13,12 @@ import pytest
 from laboratory import HEAD, film, laboratory
 from ricochet import Simulation
 from ricochet.pages.worker import FRAMES_AHEAD
+from sampling import STATISTICS
 from synthetic_run import ROOT
 
 INPUTS = sorted(json.loads((ROOT / "input/chooser.json").read_text()))
+#: Every fourth input is tested in `make test`, and all inputs are tested in `.ci/run`.
+OF_EACH = [pytest.param(one, marks=STATISTICS if k % 4 else ()) for k, one in enumerate(INPUTS)]
 
 
 def place(frame):
@@ -24,7 +27,7 @@ def place(frame):
     return np.frombuffer(frame, np.float32, 2 * count, 8 * HEAD).reshape(-1, 2)
 
 
-@pytest.mark.parametrize("name", INPUTS)
+@pytest.mark.parametrize("name", OF_EACH)
 def test_what_was_done_is_done_again_by_the_script_to_the_last_bit(address, tmp_path, name):
     """Each input is run with changes at random times, including heating and cooling."""
     rng = random.Random(name)

@@ -54,6 +54,7 @@ def test_free_paths_scatter_as_their_errors_say(monkeypatch, rng):
 
 
 def test_diffusion_of_a_gas_is_found_twice_and_near_that_of_enskog(bulk, tmp_path):
+    """The structure factor of a dilute gas, with many wave vectors, is calculated three times."""
     rows = {row["what"]: row for row in drawn(tmp_path, "correlations", *bulk[:1])}
     both = [rows[f"D_{way}"] for way in ("displacement", "velocities")]
     one, other = (float(row["y"]) for row in both)

@@ -328,7 +328,10 @@ def test_what_is_found_on_the_fly_and_in_parts_is_that_of_the_file(simulated, tm
 
 
 def test_the_figure_of_a_mixture_names_all_curves_and_marks_those_without_error(simulated):
-    """A single run has no error of long lags.  Its curves of species differ by colour."""
+    """A single run has no error of long lags.  Its curves of species differ by colour.
+
+    The structure is calculated for all pairs of species.
+    """
     run = simulated(MIXED.format(seed=1, packing=0.2, until=0.6))
     found = correlations.analysed([run], 0.0)
     groups = [(0.4, [run])]
