@@ -59,7 +59,7 @@ EVENTS_SENT = 6  # number of next events that are shown
 MOST_SAMPLES = 4000  # largest number of samples that are kept
 SCAN_SAMPLES = 160  # samples of a value in a scan
 SCAN_EVENTS = 1000  # smallest number of events in four intervals of samples
-SCAN_SECONDS = 4.0  # s that a value in a scan may take
+SCAN_SECONDS = 4.0  # s that a value in a scan may take, unless the request contains `seconds`
 COUNTED = ("collisions", "dissipated_energy")  # observables that are counts since the start
 #: Names of the input variables that define the motion of a side.
 MOTION = ("motion", "velocity", "start_time", "end_time", "amplitude", "period", "phase")
@@ -498,15 +498,18 @@ def scan(request: dict) -> None:
     for index, value in enumerate(request["values"]):
         try:
             lines = setting_lines(request["settings"] | {request["variable"]: value})
-            mean, error = measure(request["text"], lines, request["of"])
+            seconds = request.get("seconds", SCAN_SECONDS)
+            mean, error = measure(request["text"], lines, request["of"], seconds)
             found = {"mean": mean, "error": error}
         except (ProgramError, ValueError) as problem:
             found = {"problems": problems(problem)}
         send_json({"is": "scan", "index": index} | found)
 
 
-def measure(text: str, lines: list[str], name: str) -> tuple[float, float | None]:
-    """Return the time average of an observable and its error.
+def measure(
+    text: str, lines: list[str], name: str, seconds: float
+) -> tuple[float, float | None]:
+    """Return the time average of an observable and its error, after at most `seconds`.
 
     If the observable is a count (in `COUNTED`), the function returns the rate at which the count
     grows.  The interval between samples is half a collision per disk.  The average is taken over
@@ -516,12 +519,10 @@ def measure(text: str, lines: list[str], name: str) -> tuple[float, float | None
     with Simulation._of(text, lines) as simulation:
         count, settles = simulation.n_disks, simulation.nature.in_equilibrium
         step = max(count, SCAN_EVENTS) // 4
-        while len(samples) < SCAN_SAMPLES and time.perf_counter() < began + SCAN_SECONDS:
+        while len(samples) < SCAN_SAMPLES and time.perf_counter() < began + seconds:
             value = observed(simulation)
             samples.append((*sampled(count, value), value[name]))
-            simulation._go_on(
-                (np.inf, NEVER, simulation.events + step), SCAN_SECONDS / SCAN_SAMPLES
-            )
+            simulation._go_on((np.inf, NEVER, simulation.events + step), seconds / SCAN_SAMPLES)
     late = np.array(samples[len(samples) // 2 :]).T
     apart = np.diff(late[0])
     if not apart.any():
