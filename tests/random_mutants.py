@@ -45,6 +45,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mutants import FAILURE, ROOT, UNIT_BUILD, git
+
 sys.path.insert(0, str(Path(__file__).parent / "support"))
 from protecting_tests import protecting_tests
 

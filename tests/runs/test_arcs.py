@@ -75,7 +75,7 @@ def test_a_closed_arc_is_a_container(law, more, box):
 
 @pytest.mark.parametrize(
     ("law", "box"),
-    zip(LAWS, ["boundary = 'periodic', 'periodic'", "gravity = 0, -1"] * 2, strict=True),
+    [*zip(LAWS, ["boundary = 'periodic', 'periodic'", "gravity = 0, -1"] * 2, strict=True)],
 )
 def test_a_closed_arc_is_a_peg(law, box):
     """Disks bounce off the outside of an arc of 360 degrees as off a circle, up to rounding."""

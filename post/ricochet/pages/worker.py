@@ -506,9 +506,7 @@ def scan(request: dict) -> None:
         send_json({"is": "scan", "index": index} | found)
 
 
-def measure(
-    text: str, lines: list[str], name: str, seconds: float
-) -> tuple[float, float | None]:
+def measure(text: str, lines: list[str], name: str, seconds: float) -> tuple[float, float | None]:
     """Return the time average of an observable and its error, after at most `seconds`.
 
     If the observable is a count (in `COUNTED`), the function returns the rate at which the count
