@@ -371,12 +371,11 @@ def test_disks_that_differ_by_their_mass_alone_have_the_structure_of_equal_ones(
         assert s.y[0] == pytest.approx(law, abs=4 * s.error[0]) and s.error[0] < 0.1
 
 
-@samples(3, 8)
-def test_a_dilute_mixture_flies_as_maxwells_law_has_it(simulated, samples):
-    """F_s = exp(-k^2 kT t^2 / 2 m) and <r^2> = 2 kT t^2 / m, within four errors."""
+def test_a_dilute_mixture_flies_as_maxwells_law_has_it(simulated):
+    """F_s = exp(-k^2 kT t^2 / 2 m) and <r^2> = 2 kT t^2 / m, within four errors of eight seeds."""
     runs = [
         simulated(MIXED.format(seed=seed, packing=1e-5, until=0.1), name=f"{seed}")
-        for seed in range(samples)
+        for seed in range(8)
     ]
     found = pairs.measured(runs, waves=[20.0], skip=0)
     for name, mass in (("a", 3.0), ("b", 1.0)):
@@ -384,7 +383,7 @@ def test_a_dilute_mixture_flies_as_maxwells_law_has_it(simulated, samples):
         msd, laws = found[name]["msd"], (np.exp(-400 * lag**2 / mass), 4 * lag**2 / mass)
         for (mean, error), law in ((f_s, laws[0]), ((msd.y[1:], msd.error[1:]), laws[1])):
             assert np.all(np.abs(mean - law) < 4 * error)
-            assert np.all(error < 0.03 * np.sqrt(8 / samples) * np.maximum(law, law.max()))
+            assert np.all(error < 0.03 * np.maximum(law, law.max()))
 
 
 @samples(8, 50)
