@@ -306,7 +306,10 @@ ENDINGS = {"animate": "gif", "export": "xyz", "player": "html"}
 
 @pytest.mark.parametrize("system", range(len(RUNNING)))
 def test_running_simulations_are_drawn(started, tmp_path, system, capsys):
-    """The simulation is suspended while the scripts read its file, and has not finished."""
+    """The simulation is suspended while the scripts read its file, and has not finished.
+
+    All scripts that a system allows draw their figures.
+    """
     texts, scripts = RUNNING[system]
     parts = []
     for k, text in enumerate(texts):

@@ -311,7 +311,10 @@ def test_the_code_that_the_page_on_output_shows_runs_the_program(program, tmp_pa
 
 
 def test_the_code_on_time_correlations_of_the_page_on_output_works(program, tmp_path):
-    """The example is executed with a tenth of the disks and a fiftieth of the time."""
+    """The example is executed with a tenth of the disks and a fiftieth of the time.
+
+    The start of each of the eight runs is a dense packing, which takes most of the time.
+    """
     page = section("output", "## Time correlations and structure")
     blocks = [textwrap.dedent(one) for one in re.findall(r"(?:^    .*\n)+", page, re.M)]
     assert len(blocks) == 3

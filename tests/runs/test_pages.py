@@ -98,6 +98,7 @@ def execute(blocks: list[Block], folder: Path, program: Path) -> None:
 
 @pytest.mark.parametrize("page", RUN, ids=lambda path: f"{path.parent.name}/{path.stem}")
 def test_the_code_of_a_page_works(page, program, tmp_path):
+    """The longest pages use about ten seconds, because they simulate and draw a dozen runs."""
     text = page.read_text()
     if "libricochet" in text and not libraries(program):
         pytest.skip("make library builds it")
