@@ -51,6 +51,7 @@ def test_the_blocks_of_the_readme_work(clone):
 @pytest.mark.parametrize("page", RUN, ids=lambda path: f"{path.parent.name}/{path.stem}")
 def test_the_first_commands_of_a_page_work(page, clone):
     """The first block that is executed, with the files that the blocks before it contain."""
+    ran("git", "clean", "-fdxq", "--exclude=demo", "runs", cwd=clone, check=True)
     for language, code in blocks_of(page.read_text()):
         if language in FIRST_LINE:
             (clone / re.match(FIRST_LINE[language], code)[1]).write_text(code)
