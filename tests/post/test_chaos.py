@@ -98,7 +98,7 @@ def test_the_exponent_depends_neither_on_the_starts_nor_on_waiting_times(rng):
             often = rng.uniform(size=400) < 0.8
             waits = rng.exponential(np.where(often, 0.2, 2.0))
             steps = rng.exponential(0.5, 400)
-            steps[:3] *= 0.2
+            steps[:8] *= 0.1
             at = np.cumsum(waits)
             tracks.append(-27 + np.interp(time, at, np.cumsum(steps), left=0))
         apart = np.exp(np.minimum(tracks, 0))

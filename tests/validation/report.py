@@ -245,8 +245,9 @@ command `python tests/coverage_tables.py` writes these tables. The systems and q
 chosen before the first run. The seeds of the tables were not used to improve the estimators, with
 four exceptions: the first tables showed that the errors of the flow, of the slopes under gravity,
 of the coefficients from Helfand moments and of the thermalisation time were wrong. The rows of
-these quantities were measured again with corrected estimators. Curves of cooling gases against time
-are compared at one fixed time.
+these quantities were measured again with corrected estimators. The rows of the Lyapunov exponent
+and of gases under gravity were repeated after the bias of the exponent and the equilibration had
+been changed. Curves of cooling gases against time are compared at one fixed time.
 
 An error bar belongs to a single run, or to a group of runs if the name of the system states a
 number of runs. The columns are:

@@ -175,7 +175,7 @@ def cell_sums(run: Run, frame: int) -> tuple[float, float, float, float]:
     place = ((run.position[frame] - run.lower) / run.edges * cells).astype(int)
     cell = np.clip(place, 0, cells - 1) @ (1, cells[0])
     mass, own = (np.bincount(cell, each) for each in (run.mass, np.sum(momentum**2, axis=1)))
-    square = sum(np.bincount(cell, part) ** 2 for part in momentum.T)
+    square = np.sum([np.bincount(cell, part) ** 2 for part in momentum.T], axis=0)
     some = own > 0
     excess = np.sum((square - own)[some] / (2 * mass[some]))
     total = np.sum(momentum**2 / (2 * run.mass[:, None]))

@@ -46,12 +46,12 @@ class Mesh(NamedTuple):
     """Grid of bilinear finite elements that cover the box of a run."""
 
     run: Run
-    count: tuple[int, int]  # elements along x and y
+    elements: tuple[int, int]  # numbers of elements along x and y
 
     @property
     def size(self) -> np.ndarray:
         """Lengths (2,) of the sides of an element."""
-        return np.asarray(self.run.edges / self.count)
+        return np.asarray(self.run.edges / self.elements)
 
     def corners_of(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the elements that contain points (P, 2) as nodes and functions at their corners.
@@ -61,11 +61,11 @@ class Mesh(NamedTuple):
         basis functions along x and y.
         """
         place = (points - self.run.lower) / self.size
-        cell = np.clip(place.astype(int), 0, np.array(self.count) - 1)
+        cell = np.clip(place.astype(int), 0, np.array(self.elements) - 1)
         s, t = (place - cell).clip(0, 1).T
         width, height = self.size
-        number = cell[:, 1] * (self.count[0] + 1) + cell[:, 0]
-        nodes = np.stack([number + a + b * (self.count[0] + 1) for b in (0, 1) for a in (0, 1)])
+        number = cell[:, 1] * (self.elements[0] + 1) + cell[:, 0]
+        nodes = np.stack([number + a + b * (self.elements[0] + 1) for b in (0, 1) for a in (0, 1)])
         along_x, along_y = ((1 - s, s), (1 - t, t))
         values = np.stack([along_x[a] * along_y[b] for b in (0, 1) for a in (0, 1)])
         slopes = np.stack(
@@ -85,13 +85,13 @@ class Mesh(NamedTuple):
         """
         nodes, _, slopes = self.corners_of(points)
         parts = velocity[:, 0] * slopes[:, 1] - velocity[:, 1] * slopes[:, 0]
-        total = (self.count[0] + 1) * (self.count[1] + 1)
+        total = (self.elements[0] + 1) * (self.elements[1] + 1)
         return np.bincount(nodes.ravel(), parts.ravel(), minlength=total)
 
     def stiffness(self) -> scipy.sparse.csr_array:
         """Return the integrals (nodes, nodes) of the products of gradients of basis functions."""
         parts = []
-        for count, width in zip(self.count, self.size, strict=True):
+        for count, width in zip(self.elements, self.size, strict=True):
             ends = np.ones(count + 1)
             ends[[0, -1]] = 0.5
             beside = np.ones(count)
@@ -104,7 +104,7 @@ class Mesh(NamedTuple):
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """Return the stream functions (nodes, B) of B loads (nodes, B), which are 0 at node 0."""
-        unknowns, nodes = node_unknowns(self.count[1], self.count[0], self.run.periodic)
+        unknowns, nodes = node_unknowns(self.elements[1], self.elements[0], self.run.periodic)
         if not unknowns:
             return np.zeros(loads.shape)
         matrix = scipy.sparse.csc_array(nodes.T @ self.stiffness() @ nodes)
@@ -163,7 +163,7 @@ def stream_function(
         for block in blocks
     ]
     psi = mesh.solve(np.stack(loads, axis=1))
-    shape = tuple(count + 1 for count in mesh.count[::-1])
+    shape = tuple(count + 1 for count in mesh.elements[::-1])
     corners = psi.reshape(*shape, -1)[:: finer[1], :: finer[0]]
     nodes, values, _ = mesh.corners_of(places(run, cells))
     middles = np.sum(values[..., None] * psi[nodes], axis=0)
