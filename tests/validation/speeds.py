@@ -13,7 +13,7 @@ from ricochet.predictions.theory import finite_n_cdf, maxwell_cdf
 
 from .case import AT_MOST, Case, Member, relative, sigmas, within
 from .estimators import at_collisions, middle, over
-from .inputs import PERIODIC, gases, light_and_heavy
+from .inputs import PERIODIC, ensemble, gases, light_and_heavy
 
 LEAST = 1.63  #: KS distance times sqrt(n); larger values have a probability below 1 %
 
@@ -213,6 +213,40 @@ def ratios(*runs: Run) -> np.ndarray:
     return heavy / light
 
 
+# --- exchange of energy in single collisions ---
+
+
+def exchanging(mass: float) -> tuple[Member, ...]:
+    """Return dilute gases whose light and heavy disks have Maxwell's velocities of unequal kT."""
+    disks = {"count": 30000, "radius": 0.0005}
+    light = {"name": "light", "temperature": 0.1, **disks}
+    heavy = {"name": "heavy", "temperature": 1.0, "mass": mass, **disks}
+    return ensemble(
+        4, box=PERIODIC, species=[light, heavy], stop={"collisions_per_disk": 0.1},
+        output={"event_log": True},
+    )  # fmt: skip
+
+
+def exchanged(run: Run) -> float:
+    """Return the share of the difference of kT that a light-heavy collision exchanges on average.
+
+    The difference is the mean of its values at the start and at the end of a run that is so short
+    that the velocities remain Maxwell's.
+    """
+    log, v, mass = run.event_log(), run.velocity[0].copy(), run.mass
+    gained, mixed = 0.0, 0
+    for i, j, change in zip(log.i - 1, log.j - 1, log.momentum_change, strict=True):
+        if run.species[i] != run.species[j]:
+            k, to_light = (i, change) if run.species[i] == 1 else (j, -change)
+            gained += to_light @ (2 * v[k] + to_light / mass[k]) / 2
+            mixed += 1
+        v[i] += change / mass[i]
+        v[j] -= change / mass[j]
+    kinetic = [run.kinetic_energy(frame) for frame in (0, -1)]
+    heavier = [k[run.species == 2].mean() - k[run.species == 1].mean() for k in kinetic]
+    return gained / mixed / np.mean(heavier)
+
+
 MIXTURE = [
     Case(
         "P5-05", "start with equal speeds: a2 after 0 to 8 collisions per disk",
@@ -229,6 +263,14 @@ MIXTURE = [
         MIXING, ratios, [4, 2.02, 1.455, 1.228, 1.115, 1.062, 1.031, 1.005],
         within(0.02 + 0.063 / sqrt(len(MIXING))), "DSMC",
     ),
+    *[
+        Case(
+            "P6-04", f"light and heavy disks of unequal kT, masses 1 : {mass}: share of the "
+            "difference that a collision exchanges",
+            exchanging(mass), over(exchanged), 4 * mass / (1 + mass) ** 2, sigmas(4, 0.08), "D",
+        )
+        for mass in (4, 25)
+    ],
 ]  # fmt: skip
 
 CASES = LAWS + COLLISIONS + MIXTURE

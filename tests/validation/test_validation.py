@@ -13,7 +13,7 @@ from validation.case import AT_LEAST, AT_MOST, EXACT, Case, Member, judge, relat
 from validation.running import validate
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "explanation"
-QUICK = ("P1-", "P2-", "P3-", "P4-", "P9-07", "P9-1", "P10-07", "P12-", "P13-02")
+QUICK = ("P1-", "P2-", "P3-", "P4-", "P6-04", "P9-07", "P9-1", "P10-07", "P12-", "P13-02")
 QUICK += ("P13-04", "P13-06", "W1-", "P15-01", "P15-07", "P15-11")
 
 
