@@ -268,7 +268,8 @@ contains
 
   !> Pressure in two dimensions by the virial theorem, P A = K + W/(2t). K is the present kinetic energy, A is the present
   !> accessible area, and t is the time since the start of the run. W is the sum of impulse times distance over all collisions of
-  !> disks since the start of the run.
+  !> disks since the start of the run. Between walls P differs from the mean force per length of a wall, because walls act at the
+  !> distance of a radius on the centres of disks.
   pure function pressure(sim, kinetic)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: kinetic           !! kinetic energy relative to the velocity profile of a sheared box [energy]

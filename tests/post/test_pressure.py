@@ -30,7 +30,8 @@ INPUTS = {
 def simulated(program, tmp_path, monkeypatch):
     """Run a gas with additional input."""
     monkeypatch.setenv("RICOCHET", str(program))
-    return lambda more: ricochet.run(GAS + OFTEN + more, output=tmp_path / "gas.h5")
+    path = tmp_path / "gas.h5"
+    return lambda more, often=OFTEN: ricochet.run(GAS + often + more, output=path)
 
 
 @pytest.mark.parametrize("kind", INPUTS)
@@ -53,6 +54,39 @@ def test_the_pressure_of_a_whole_run_is_the_last_one_in_the_file(simulated):
     assert run.pressure(0, 2) == pytest.approx(
         run.observable("virial_pressure").value[-1], rel=1e-12
     )
+
+
+def moment(run, frame) -> float:
+    """Return the sum of m v (x - centre of the box) over all disks, whose mean rate is zero."""
+    return float(np.sum(run.mass[:, None] * run.velocity[frame] * (run.position[frame] - (1, 0.5))))
+
+
+def test_the_pressure_is_less_than_the_force_per_length_of_a_wall(simulated):
+    """It is smaller by the factor 1 - 2 r / L of the laws page."""
+    run = simulated("&box upper = 2, 1 /\n")
+    (time,), (impulse,) = run.time[[-1]], run.observable("side_impulse").value[[-1]]
+    (width, height), r = run.edges, run.radius[0]
+    p_x, p_y = np.reshape(impulse, (2, 2)).mean(axis=1) / time / (height, width)
+    force = (p_x * (1 - 2 * r / width) + p_y * (1 - 2 * r / height)) / 2
+    force += (moment(run, -1) - moment(run, 0)) / (2 * width * height * time)
+    assert run.observable("virial_pressure").value[-1] == pytest.approx(force, rel=1e-12)
+
+
+@pytest.mark.parametrize("container", [False, True])
+def test_each_disk_of_a_mixture_presses_at_its_own_distance(simulated, container):
+    """A wall acts on the centre of a disk one radius away, in a box and in a container."""
+    mixture = "&species name = 'b' radius = 0.05 count = 10 mass = 3 temperature = 1 /\n"
+    mixture += "&box upper = 2, 1 /\n&output event_log = .true. /\n"
+    if container:
+        mixture += "&obstacle centre = 1, 0.5 radius = 0.48 side = 'inside' /\n"
+    run = simulated(mixture, often="")
+    log = run.event_log()
+    hits = log.j <= 0
+    half = np.full(hits.sum(), 0.48) if container else run.edges[-log.j[hits] // 2] / 2
+    reach = half - run.radius[log.i[hits] - 1]
+    force = log.impulse[hits] @ reach + moment(run, -1) - moment(run, 0)
+    force /= 2 * run.accessible_area(run.time[-1]) * run.time[-1]
+    assert run.observable("virial_pressure").value[-1] == pytest.approx(force, rel=1e-11)
 
 
 @pytest.mark.parametrize("kind", ["walls", "heated", "sheared", "container"])

@@ -298,7 +298,9 @@ class Run(BoxResults):
         The pressure is (<K> + dW / (2 dt)) / <A>.  Here K is the kinetic energy, A the accessible
         area, and dW the increase of the virial during the time dt between the two samples.  In a
         sheared box, K is the kinetic energy relative to the mean flow.  Averages over time are
-        calculated with the trapezoidal rule.
+        calculated with the trapezoidal rule.  Between walls this pressure is smaller than the mean
+        force per length of a wall: for equal disks of radius r in a square of side L, by the factor
+        1 - 2 r / L.
 
         Parameters
         ----------
