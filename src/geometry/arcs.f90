@@ -10,7 +10,7 @@
 module arcs
   use free_flight, only: flight, later_time_to_circle, time_to_circle
   use kinds, only: never, pi, real64
-  use shapes, only: magnitude, shape_t, spare
+  use shapes, only: magnitude, shape_t, spare, unit_vector
   implicit none
   private
   public :: arc_t, new_arc
@@ -52,15 +52,15 @@ contains
     integer :: k
 
     arc%radius = radius
-    arc%end_direction(:, 1) = unit_vector(from_angle)
-    arc%end_direction(:, 2) = unit_vector(to_angle)
+    arc%end_direction(:, 1) = vector_at(from_angle)
+    arc%end_direction(:, 2) = vector_at(to_angle)
     arc%is_large = to_angle - from_angle > 180
     arc%is_closed = to_angle - from_angle >= 360
     arc%is_convex = .false.
     low = radius*minval(arc%end_direction, dim=2)
     high = radius*maxval(arc%end_direction, dim=2)
     do k = 0, 3  ! the points of the circle that are farthest to the right, to the top, to the left and to the bottom
-      point = unit_vector(90.0_real64*k)
+      point = vector_at(90.0_real64*k)
       if (.not. arc%is_in_window(point)) cycle
       low = min(low, radius*point)
       high = max(high, radius*point)
@@ -74,7 +74,7 @@ contains
   end function new_arc
 
   !> Unit vector in the direction of an angle. For a multiple of 90 degrees the result is exact.
-  pure function unit_vector(angle) result(e)
+  pure function vector_at(angle) result(e)
     real(real64), intent(in) :: angle           !! [degrees]
     real(real64) :: e(2), rest
     integer :: quarter
@@ -91,7 +91,7 @@ contains
       e = [e(2), -e(1)]
     case default                                ! 0: the vector needs no rotation
     end select
-  end function unit_vector
+  end function vector_at
 
   !> Whether the direction of a vector from the centre of the circle is between the first and the last angle of the arc.
   pure function is_in_window(self, c) result(yes)
@@ -135,7 +135,8 @@ contains
       k = minloc([magnitude(d - self%end_point(1)), magnitude(d - self%end_point(2))], dim=1)
       outwards = self%end_direction(:, k)
     end if
-    along = [-outwards(2), outwards(1)]/magnitude(outwards)
+    outwards = unit_vector(outwards, otherwise=-normal)        ! a disk at the centre touches the inner face
+    along = [-outwards(2), outwards(1)]
     along = along - dot_product(along, normal)*normal
   end function direction
 
@@ -228,10 +229,10 @@ contains
 
     c = d - self%centre
     if (self%is_in_window(c)) then
-      direction = sign(1.0_real64, magnitude(c) - self%radius)*c/max(magnitude(c), tiny(c))
+      direction = unit_vector(sign(1.0_real64, magnitude(c) - self%radius)*c, heading)
     else
       k = minloc([magnitude(d - self%end_point(1)), magnitude(d - self%end_point(2))], dim=1)
-      direction = (d - self%end_point(k))/magnitude(d - self%end_point(k))
+      direction = unit_vector(d - self%end_point(k), heading)
     end if
     if (.not. present(heading)) return
     touching = self%gap(d, 0.0_real64)
@@ -239,7 +240,7 @@ contains
     do k = 1, 2
       other = d - self%end_point(k)
       if (magnitude(other) > touching) cycle
-      other = other/magnitude(other)
+      other = unit_vector(other, heading)
       if (dot_product(heading, other) > dot_product(heading, direction)) direction = other
     end do
   end function normal

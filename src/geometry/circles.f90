@@ -3,7 +3,7 @@ module circles
   use free_flight, only: time_to_circle
   use images, only: images_t
   use kinds, only: never, pi, real64
-  use shapes, only: magnitude, shape_t, spare
+  use shapes, only: magnitude, shape_t, spare, unit_vector
   implicit none
   private
   public :: circle_t, new_circle
@@ -91,14 +91,14 @@ contains
   end function gap
 
   !> Unit vector from the point of contact on the circle to the centre of a disk that touches the circle. The argument `heading` is
-  !> not used, because a disk touches a circle only at one point.
+  !> used only at the centre of the circle; elsewhere a disk touches the circle at one point.
   pure function normal(self, d, heading) result(direction)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
     real(real64), intent(in), optional :: heading(2)
     real(real64) :: direction(2)
 
-    direction = merge(-d, d, self%encloses)/magnitude(d)
+    direction = unit_vector(merge(-d, d, self%encloses), heading)
   end function normal
 
   !> Whether a disk whose centre is in a rectangle can touch the circle.

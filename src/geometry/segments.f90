@@ -7,7 +7,7 @@
 module segments
   use free_flight, only: flight, time_to_circle, time_to_line
   use kinds, only: never, real64
-  use shapes, only: magnitude, shape_t, spare
+  use shapes, only: shape_t, spare, unit_vector
   implicit none
   private
   public :: segment_t, new_segment
@@ -114,8 +114,8 @@ contains
   end function gap
 
   !> Unit vector from the point of contact on the wall to the centre of a disk that touches the wall. Between the ends of the wall
-  !> the result is exactly the normal of the wall, without rounding errors even for very small disks. The argument `heading` is not
-  !> used, because a disk touches a straight wall only at one point.
+  !> the result is exactly the normal of the wall, without rounding errors even for very small disks. The argument `heading` is used
+  !> only at an end of the wall; elsewhere a disk touches a straight wall at one point.
   pure function normal(self, d, heading) result(direction)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -126,8 +126,7 @@ contains
       direction = [-self%along(2), self%along(1)]
       direction = sign(1.0_real64, dot_product(d, direction))*direction
     else
-      direction = self%from_outline(d)
-      direction = direction/magnitude(direction)
+      direction = unit_vector(self%from_outline(d), heading)
     end if
   end function normal
 

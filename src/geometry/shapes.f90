@@ -6,7 +6,7 @@ module shapes
   use kinds, only: real64
   implicit none
   private
-  public :: shape_t, magnitude, spare
+  public :: shape_t, magnitude, spare, unit_vector
 
   !> Relative safety margin, larger than all rounding errors. If rounding errors make the result of a test uncertain, the margin
   !> ensures that the test returns the result with which no contact is missed.
@@ -58,6 +58,7 @@ module shapes
 
     !> Unit vector from the point of contact on the outline to the centre of a disk that touches the outline. If the disk touches
     !> the outline at several points, the function chooses the point whose normal has the smallest angle to the vector `heading`.
+    !> The result is a unit vector even if the centre of the disk is on the outline or at the centre of a circle.
     pure function normal(self, d, heading) result(direction)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -104,6 +105,23 @@ contains
 
     magnitude = sqrt(v(1)*v(1) + v(2)*v(2))
   end function magnitude
+
+  !> Unit vector in the direction of v. If v vanishes, its direction is undetermined, and the result has the direction of
+  !> `otherwise`. This occurs at the centre of a container that is hardly larger than a disk, and where a disk in a time-stepped
+  !> simulation stops exactly on an obstacle.
+  pure function unit_vector(v, otherwise) result(e)
+    real(real64), intent(in) :: v(2)
+    real(real64), intent(in), optional :: otherwise(2)  !! the x direction, if absent or 0
+    real(real64) :: e(2)
+    real(real64), parameter :: shortest = sqrt(tiny(1.0_real64))   ! the squares of smaller components are not precise
+
+    e = [1.0_real64, 0.0_real64]
+    if (magnitude(v) > shortest) then
+      e = v/magnitude(v)
+    else if (present(otherwise)) then
+      if (magnitude(otherwise) > shortest) e = otherwise/magnitude(otherwise)
+    end if
+  end function unit_vector
 
   !> Vector to the point x from the middle of the nearest periodic image of the obstacle. The distances of x from the outlines of
   !> all images are compared, because the nearest image of a long wall is not always the image whose middle is nearest to x. If x is
