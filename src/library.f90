@@ -27,7 +27,7 @@ module library
   use texts, only: eol, growing_text_t, lines_of, lower_case, place_of, text_t, written, written_exactly
   use timeline, only: adapted_iterations, advance_once, collapse_note
   use variable_help, only: input_of
-  use variables, only: change_of, in_motion, obstacle_groups, row_of
+  use variables, only: change_of, in_motion, obstacle_groups, row_of, table, words_of
   implicit none
   private
   public :: advance_to, answer, begin, check_files, goal_of, renew_changed, session_of, session_t, text_of
@@ -197,6 +197,7 @@ contains
       input%path = session%input%path
       input%overrides = lines
       call read_groups(input_of(session%input%groups), lines, input%groups, problems, complete)
+      call drop_former_motion(session%input%groups, input%groups)
       call keep_sides(session, input%groups)
       call resolve_input(input, complete, problems, error, stepped=.true.)
     end if
@@ -284,6 +285,26 @@ contains
       end do
     end do
   end subroutine check_files
+
+  !> Drops the variables of a side that have no effect with its new motion, such as the force on a piston that is now held. A
+  !> variable that the change itself sets is kept, so that it is reported.
+  subroutine drop_former_motion(before, groups)
+    type(group_t), intent(in) :: before(:)            !! groups of the present input
+    type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
+    integer :: g, v, old
+
+    do g = 1, size(groups)
+      old = findloc(before%name == "side" .and. before%instance == groups(g)%instance, .true., dim=1)
+      if (groups(g)%name /= "side" .or. old == 0) cycle
+      if (before(old)%text_of("motion") == groups(g)%text_of("motion")) cycle
+      do v = 1, size(groups(g)%values)
+        associate (slot => groups(g)%values(v), words => words_of(table(groups(g)%values(v)%row)%goes_with))
+          if (.not. any(words == "motion") .or. slot%line < 0) cycle    ! an override has a negative line number
+          slot%given = slot%given .and. any(words == groups(g)%text_of("motion"))
+        end associate
+      end do
+    end do
+  end subroutine drop_former_motion
 
   !> Sets the positions of all sides whose motion changes, so that each side starts its new motion at its present position.
   subroutine keep_sides(session, groups)

@@ -30,8 +30,9 @@ module boundary_variables
       "Name of the side of the box that the group describes. The side must be a wall (box.boundary). At most one group may " &
       //"describe each side.", choices="left right bottom top"), &
     variable_t("side", "motion", "text", 1, "default", "'still'", &
-      "Motion of the side along its normal. The work of a moving side on the disks is an observable.", choices=motions, &
-      may_change=in_motion), &
+      "Motion of the side along its normal. The work of a moving side on the disks is an observable. In a running simulation " &
+      //"a side begins a new motion where it is. Variables of the former motion that the new one does not have are dropped, " &
+      //"unless the same change sets them.", choices=motions, may_change=in_motion), &
     variable_t("side", "amplitude", "real", 1, "required", "0.05", &
       "Amplitude of the oscillation: the largest displacement of the side from its mean position, which box.lower or " &
       //"box.upper defines.", &

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import ricochet
 from library_systems import GAS
 from ricochet import ProgramError, Simulation, read_run
 from whole_runs import ran
@@ -79,6 +80,54 @@ def test_a_side_is_held_moved_and_released_where_it_is():
     place = gas.observable("sides/right/position")
     assert gas.advance(time=8).observable("sides/right/position") == place
     assert balance() == pytest.approx(start, rel=1e-12)
+
+
+#: Variables of each motion of a side at its mean position.
+MOTIONS = {
+    "still": {},
+    "sine": {"amplitude": 0.01, "period": 1, "phase": 0},
+    "parabolic": {"amplitude": 0.01, "period": 1, "phase": 0},
+    "sawtooth": {"velocity": 1},
+    "constant_velocity": {"velocity": 0.1, "start_time": 1, "end_time": 2},
+    "piston": {"mass": 10, "force": 100},
+}
+
+
+@pytest.mark.parametrize("new", MOTIONS)
+@pytest.mark.parametrize("former", MOTIONS)
+def test_a_new_motion_drops_the_variables_of_the_former_one(former, new):
+    """Only variables that the same change sets are reported if they have no effect."""
+    system = {"side": {"name": "right", "motion": former} | MOTIONS[former]}
+    system["species"] = {"count": 5, "radius": 0.02, "temperature": 1}
+    change = {f"side.right.{name}": value for name, value in MOTIONS[new].items()}
+    change["side.right.motion"] = new
+    with Simulation(system) as gas:
+        for name in sorted(MOTIONS[former].keys() - MOTIONS[new].keys()):
+            with pytest.raises(ProgramError, match=f"{name}: has no effect with motion = '{new}'"):
+                gas.change(change | {f"side.right.{name}": MOTIONS[former][name]})
+        side = gas.change(change).parameters["side"]["right"]
+        assert side.keys() & {name for own in MOTIONS.values() for name in own} == {*MOTIONS[new]}
+        assert gas.changes == ([] if former == new else gas.changes) and side["motion"] == new
+        energy = gas.advance(time=0.3).observable("total_energy")
+        with Simulation(gas.input) as again:
+            if former in ("still", new):
+                assert again.advance(time=0.3).observable("total_energy") == energy
+
+
+def test_a_piston_is_held_by_its_motion_alone(program, tmp_path, monkeypatch):
+    """It stays where it is, and the program continues the run with the saved input."""
+    monkeypatch.chdir(tmp_path)
+    gas = Simulation(ricochet.example("constant_pressure"), {"stop.time": 9}).advance(time=1)
+    place = gas.observable("sides/right/position")
+    gas.change({"side.right.motion": "still"})
+    assert "force" not in gas.input and "mass" not in gas.parameters["side"]["right"]
+    assert gas.parameters["side"]["right"]["position"] == pytest.approx(place, rel=1e-15)
+    gas.save("gas.h5", input="gas.nml")
+    ran(program, "gas.nml", "-o", "gas.h5", "--resume", "--set=stop.time=1.5", check=True)
+    assert np.array_equal(read_run("gas.h5").position[-1], gas.advance(time=1.5).position)
+    assert gas.observable("sides/right/position") == place
+    gas.change({"side.right.motion": "piston", "side.right.mass": 10, "side.right.force": 100})
+    assert gas.advance(time=2).observable("sides/right/position") != place
 
 
 def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypatch):
