@@ -46,7 +46,7 @@ contains
     end if
     input%saved_at = session%sim%time()
     if (.not. allocated(error)) call output%claim(text_of(path), error)
-    if (.not. allocated(error)) call output%open(input, first, force /= 0, error)
+    if (.not. allocated(error)) call output%open(input, first, force /= 0, error, only_start=.true.)
     if (.not. allocated(error)) call output%save(session%sim, error)
     call output%release()
     code = answer(error, message, room)

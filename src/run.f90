@@ -11,7 +11,7 @@ module run
   use memory, only: memory_needed
   use kinds, only: int64, never, real64
   use observables, only: energies
-  use output, only: output_t, planned_bytes
+  use output, only: estimate_size, output_t
   use partners, only: n_sides
   use progress_line, only: progress_line_t
   use run_files, only: is_file, source_of, unfinished
@@ -100,16 +100,19 @@ contains
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
     logical :: folder_is_new, over_broken
+    integer(int64) :: bytes                                ! smallest possible size of the output
+    character(len=:), allocatable :: size_of_output
 
     call new_simulation(run%input, run%line, run%sim, error, unrelaxed=run%command%check)
     call run%line%clear()
     if (allocated(error)) return
+    call estimate_size(run%input, run%sim, bytes, size_of_output)
     associate (command => run%command)
       if (.not. command%quiet) call warn(run)
       if (command%check) then
         call print_text(legible(command%input)//": valid; "//counted(int(run%sim%n_disks(), int64), "disk")// &
-          "; the run needs about "//size_text(memory_needed(run%input%settings))//" of memory, the output at least " &
-          //size_text(planned_bytes(run%input, run%sim)), error)
+          "; the run needs about "//size_text(memory_needed(run%input%settings))//" of memory, the output " &
+          //size_of_output, error)
         return
       end if
       folder_is_new = .not. is_folder(folder_of(command%output))
@@ -119,8 +122,7 @@ contains
       if (allocated(error) .or. command%quiet) return
       if (over_broken .and. .not. command%force) write (error_unit, "(a)") "note: "//legible(command%output)//unfinished// &
         ", of a run that broke off, has been replaced"
-      if (planned_bytes(run%input, run%sim) > much) write (error_unit, "(a)") &
-        "note: the output needs at least "//size_text(planned_bytes(run%input, run%sim))
+      if (bytes > much) write (error_unit, "(a)") "note: the output needs "//size_of_output
       if (folder_is_new) write (error_unit, "(a)") &
         "note: folder "//legible(folder_of(command%output))//" has been created for the output"
     end associate

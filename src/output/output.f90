@@ -7,7 +7,7 @@
 !> with an atomic renaming, whenever its space is used up. At the end of the run, the output file is replaced by a copy without
 !> unused space.
 module output
-  use kinds, only: int64, real64
+  use kinds, only: int64, never, real64
   use sampling_schedule, only: frames, progress_t, values
   use checkpoint, only: checkpoint_bytes, copy_checkpoints, has_both_checkpoints, has_broken_off, make_checkpoints, &
     mark_as_broken, put_checkpoint, put_last_checkpoint
@@ -27,10 +27,10 @@ module output
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
   use system, only: free_bytes, identity_of, is_folder, largest_file, last_problem, lock_t, make_folders_of, remove_file, seconds
-  use texts, only: written
+  use texts, only: size_text, written
   implicit none
   private
-  public :: output_t, planned_bytes
+  public :: estimate_size, output_t
 
   real(real64), parameter :: longest_wait = 0.05_real64  !! longest time that a sample waits in a buffer while the run is active [s]
   integer, parameter :: events = 3              !! index of the track of the event log, which follows `frames` and `values`
@@ -45,6 +45,8 @@ module output
     type(hdf5_file_t), allocatable, private :: file
     type(track_t), allocatable, private :: track(:)      !! (2 or 3) tracks of frames, observables and, if requested, events
     type(frame_column_t), allocatable, private :: columns(:)  !! columns of the frames
+    !> Whether a copy of the file, without unused space, must be expected at the end of the run
+    logical, private :: is_copied = .true.
     type(lock_t), private :: lock
     integer(int64), private :: replaced(3) = 0_int64     !! identity of the file that existed at `path` when the run started
     real(real64), private :: opened = 0.0_real64  !! time when this part of the run started, on the clock `seconds` [s]
@@ -60,7 +62,8 @@ module output
     procedure :: break_off
     procedure :: save
     procedure :: release
-    procedure, private :: check_start, plan, create_file, take_sample, add, flush_buffers, rebuild, write_end
+    procedure, private :: check_start, check_room, plan, create_file, take_sample, add, flush_buffers, rebuild, write_end
+    procedure, private :: bytes_of_file, lacks_log
   end type output_t
 
 contains
@@ -95,28 +98,26 @@ contains
   end subroutine claim
 
   !> Opens the output of a new run after `claim`, and writes the first samples.
-  subroutine open_output(self, input, sim, force, error)
+  subroutine open_output(self, input, sim, force, error, only_start)
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(inout) :: sim
     !> .true. allows the run to replace an unfinished output now, and a finished output at the end of the run.
     logical, intent(in) :: force
     type(error_t), allocatable, intent(out) :: error
-    integer(int64) :: planned
+    !> .true. to reserve space only for the first samples, because another run will write all later samples
+    logical, intent(in), optional :: only_start
     integer :: k
 
     if (.not. force) call self%check_start(error)
     if (allocated(error)) return
     self%progress = progress_t(input%settings)
     call self%plan(input, sim)
-    planned = planned_bytes(input, sim)
-    if (planned > largest_file()) then
-      call fail(error, exit_files, self%path//": the output will have "//written(planned)//" bytes, and files may have at most " &
-        //written(largest_file())//" (ulimit -f); choose fewer frames or raise the limit")
-    else if (planned > free_bytes(self%path)) then
-      call fail(error, exit_files, self%path//": the output will have "//written(planned)//" bytes, " &
-        //written(free_bytes(self%path))//" are free; choose fewer frames or make room")
+    if (present(only_start)) then
+      self%is_copied = self%is_copied .and. .not. only_start
+      if (only_start) self%track%planned = 1
     end if
+    call self%check_room(sim, error)
     if (allocated(error)) return
     call remove_file(self%path//unfinished)
     call self%create_file(self%file, sim)
@@ -148,9 +149,31 @@ contains
     end if
   end subroutine check_start
 
+  !> Reports an error if there is not enough space for the output and for its copy at the end of the run.
+  subroutine check_room(self, sim, error)
+    class(output_t), intent(in) :: self
+    type(simulation_t), intent(inout) :: sim      !! unchanged on return
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64) :: planned, free
+    character(len=:), allocatable :: text
+
+    planned = self%bytes_of_file(sim)
+    free = free_bytes(self%path)
+    text = self%path//": the output will have "//written(planned)//" bytes"
+    if (self%lacks_log()) text = text//" without the event log, whose length is unknown"
+    if (planned > largest_file()) then
+      call fail(error, exit_files, text//", and files may have at most "//written(largest_file()) &
+        //" (ulimit -f); choose fewer frames or raise the limit")
+    else if (planned > free .or. (self%is_copied .and. planned > free/2)) then
+      if (self%is_copied) text = text//", its copy at the end of the run as many"
+      call fail(error, exit_files, text//", "//written(free)//" are free; choose fewer frames or make room")
+    end if
+  end subroutine check_room
+
   !> Opens the output of a resumed run after `claim`. New samples follow the samples that had been written before the checkpoint. If
   !> a finished run is continued, the finished output is not changed until the continued run has finished. If the description of the
-  !> input in the file differs from the present input, a new file is written.
+  !> input in the file differs from the present input, or if the file has less space than a new run would reserve, a new file is
+  !> written.
   subroutine resume(self, input, sim, progress, finished, error)
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
@@ -184,7 +207,10 @@ contains
     fits = .not. finished
     if (fits) fits = describes(self%file, input)
     if (fits) fits = has_both_checkpoints(self%file)
+    if (fits) fits = all(self%track%capacity >= self%track%first_capacity())   ! .false. for a saved simulation in memory
     if (.not. fits) then
+      call self%check_room(sim, error)
+      if (allocated(error)) return
       call self%rebuild([(max(self%track(k)%first_capacity(), counts(k)), k=1, size(self%track))], sim, anew)
     else
       do k = 1, size(self%track)
@@ -212,26 +238,64 @@ contains
       self%track(values)%counter = sample_counter
       self%track(values)%series = observable_series(observed(sim))
       self%track(:values)%planned = self%progress%schedule%planned(rule%limits)
-      if (.not. settings%event_log) return
-      self%track(events)%counter = event_counter
-      self%track(events)%series = event_series()
+      if (settings%event_log) then
+        self%track(events)%counter = event_counter
+        self%track(events)%series = event_series()
+        self%track(events)%planned = planned_events(rule%limits)
+      end if
+      self%is_copied = any(self%track%planned == 0)
+      ! Collisions with boundaries are logged, too, and do not count as collisions of two disks.
+      if (settings%event_log) self%is_copied = self%is_copied .or. (rule%limits%collisions < huge(0_int64) &
+        .and. (sim%box%has_obstacles() .or. .not. all(sim%box%periodic)))
     end associate
   end subroutine plan
 
-  !> Smallest possible size of the output of a run in bytes. If the number of samples is unknown, the result allows only for the
-  !> first and the last sample.
-  function planned_bytes(input, sim) result(bytes)
-    type(run_input_t), intent(in) :: input
+  !> Smallest number of events in the log of a run that ends at a number of events or collisions; 0 if another rule can end the run.
+  pure function planned_events(limits) result(n)
+    type(limits_t), intent(in) :: limits          !! limits of the run
+    integer(int64) :: n
+
+    n = 0
+    if (limits%watches() .or. limits%at_rest .or. limits%time < never) return
+    if (max(limits%events, limits%collisions) == huge(n)) n = min(limits%events, limits%collisions)
+    if (n == huge(n)) n = 0
+  end function planned_events
+
+  !> Whether the size of the output is known only without the event log.
+  pure function lacks_log(self) result(yes)
+    class(output_t), intent(in) :: self
+    logical :: yes
+
+    yes = size(self%track) == events
+    if (yes) yes = self%track(events)%planned == 0
+  end function lacks_log
+
+  !> Smallest possible size of the file, in bytes. If the number of samples is unknown, the result allows only for the first and the
+  !> last sample.
+  function bytes_of_file(self, sim) result(bytes)
+    class(output_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim      !! unchanged on return
     integer(int64) :: bytes
     real(real64), parameter :: constants = 24.0_real64    !! size of id, species, mass and radius of a disk [bytes]
+
+    bytes = int(min(9.0e18_real64, constants*sim%n_disks() + 2*checkpoint_bytes(sim) &
+      + sum(real(max(self%track%planned, 2_int64), real64)*real(self%track%bytes_per_sample(), real64))), int64)
+  end function bytes_of_file
+
+  !> Estimates the smallest possible size of the output of a run.
+  subroutine estimate_size(input, sim, bytes, text)
+    type(run_input_t), intent(in) :: input
+    type(simulation_t), intent(inout) :: sim      !! unchanged on return
+    integer(int64), intent(out) :: bytes
+    character(len=:), allocatable, intent(out) :: text   !! part of a message
     type(output_t) :: output
 
     output%progress = progress_t(input%settings)
     call output%plan(input, sim)
-    bytes = int(min(9.0e18_real64, constants*sim%n_disks() + 2*checkpoint_bytes(sim) &
-      + sum(real(max(output%track%planned, 2_int64), real64)*real(output%track%bytes_per_sample(), real64))), int64)
-  end function planned_bytes
+    bytes = output%bytes_of_file(sim)
+    text = "at least "//size_text(bytes)
+    if (output%lacks_log()) text = text//" without the event log"
+  end subroutine estimate_size
 
   !> Creates a file with a temporary name and writes all contents except tracks and checkpoints.
   subroutine create_file(self, file, sim)

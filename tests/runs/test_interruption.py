@@ -440,6 +440,44 @@ def test_the_planned_output_is_compared_with_the_room(ricochet, tmp_path, small_
     assert "will have" in one_line(run) and "are free" in one_line(run)
 
 
+LOGGING = """&species count = 200 radius = 0.01 speed = 1 /
+&output event_log = .true. {} /
+&stop {} /
+"""
+
+
+@pytest.mark.parametrize(
+    ("output", "stop", "planned", "words"),
+    [
+        ("", "events = 40000", 40000 * 40, []),
+        ("", "collisions = 20000", 20000 * 40, ["its copy at the end of the run as many"]),
+        ("", "collisions_per_disk = 200", 20000 * 40, ["its copy at the end"]),
+        ("", "events = 40000 time = 1", 45_000, ["its copy", "without the event log, whose"]),
+        ("frames_every_collisions = 50", "collisions = 20000", 3_600_000, ["its copy"]),
+        ("frames_every_time = 0.01", "time = 9", 6_000_000, ["its copy", "without the event log"]),
+    ],
+)
+def test_the_event_log_and_the_final_copy_are_planned(
+    output, stop, planned, words, ricochet, tmp_path, small_disk
+):
+    """A run that is refused needs at least the stated room, also for the copy at its end."""
+    write_input(tmp_path, LOGGING.format(output, stop))
+    copies = 2 if any("copy" in word for word in words) else 1
+    small_disk(copies * planned * 9 // 10240)
+    run = ricochet("gas.nml", "-o", "disk/gas.h5")
+    assert run.returncode == FILES and all(word in one_line(run) for word in words)
+    assert ("copy" in run.stderr) == (copies == 2)
+    assert ("without the event log" in run.stderr) == (len(words) == 2)
+    stated = int(re.search(r"will have (\d+) bytes", run.stderr)[1])
+    assert planned <= stated < 1.2 * planned
+    checked = ricochet("gas.nml", "--check").stdout
+    assert ("without the event log" in checked) == (len(words) == 2)
+    small_disk(20_000)
+    assert ricochet("gas.nml", "-o", "disk/gas.h5").returncode == FINISHED
+    size = (tmp_path / "disk" / "gas.h5").stat().st_size
+    assert stated * (0.9 if stop == "events = 40000" else 0.5) < size
+
+
 def start_long(started, folder, *options):
     """Start a long run, and return its process after several frames have been written."""
     write_input(folder, BUSY)

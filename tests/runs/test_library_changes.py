@@ -1,6 +1,7 @@
 """Changes of a running simulation, saved simulations, and their continuation by the program."""
 
 import json
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -128,6 +129,26 @@ def test_a_piston_is_held_by_its_motion_alone(program, tmp_path, monkeypatch):
     assert gas.observable("sides/right/position") == place
     gas.change({"side.right.motion": "piston", "side.right.mass": 10, "side.right.force": 100})
     assert gas.advance(time=2).observable("sides/right/position") != place
+
+
+@pytest.mark.parametrize("schedule", ["frames_every_time = 1e-9", "event_log = .true."])
+def test_a_saved_simulation_needs_room_for_what_is_written_only(
+    schedule, program, tmp_path, monkeypatch
+):
+    """Its file grows when the program continues the run, to the file of an undisturbed run."""
+    monkeypatch.chdir(tmp_path)
+    text = "&species count = 50 radius = 0.01 speed = 1 /\n&stop time = 0.9 /\n"
+    text += f"&output {schedule} /\n"
+    gas = Simulation(text).advance(time=2.5e-8)
+    saved = gas.save("gas.h5", input="gas.nml")
+    assert saved.stat().st_size < 200_000 and len(pickle.dumps(gas)) < 200_000
+    copy = pickle.loads(pickle.dumps(gas)).advance(time=1e-7)
+    assert np.array_equal(copy.position, gas.copy().advance(time=1e-7).position)
+    ran(program, "gas.nml", "-o", "gas.h5", "--resume", "--set=stop.time=1e-7", check=True)
+    ran(program, "gas.nml", "-o", "whole.h5", "--set=stop.time=1e-7", check=True)
+    resumed, whole = read_run("gas.h5"), read_run("whole.h5")
+    assert np.array_equal(resumed.position[-1], whole.position[-1])
+    assert resumed.n_frames == (whole.n_frames - 25 if "frames" in schedule else 2)
 
 
 def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypatch):
