@@ -29,6 +29,12 @@ module input_fit
   !> equal size (Blind, 1969, see `densest_packing`)
   real(real64), parameter :: nearly_equal = 0.743_real64
 
+  !> Area and range of radii of the disks of a species.
+  type :: extent_t
+    real(real64) :: area = 0.0_real64                         !! sum over all disks [length**2]
+    real(real64) :: smallest = 0.0_real64, largest = 0.0_real64   !! radii [length]
+  end type extent_t
+
 contains
 
   !> Completes the settings with values from starting files and with the drawn radii, and determines the features of the run.
@@ -93,6 +99,7 @@ contains
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: misfit                   ! name of the variable, a colon, and the problem
     real(real64) :: beyond(2, 2)
+    type(extent_t) :: extent(size(settings%species))
     integer :: o(2), s(2), k
 
     o = range_of(groups, obstacle_groups)
@@ -109,8 +116,11 @@ contains
         call check_species(groups(s(1) + k - 1), species(k), box, settings%n_disks() == 1, problems)
       end do
       if (settings%drive%moves_disks()) call check_recycling(settings, groups(place_of("drive", groups%name)), problems)
-      if (problems%count == 0) call check_compressed(species, settings%run%seed, groups(s(1):s(2)), problems)
-      if (problems%count == 0) call check_strokes(box, pi*sum(species%count*species%radius**2), groups, problems)
+      if (problems%count > 0) return
+      extent = [(extent_of(species(k), k, settings%run%seed), k=1, size(species))]
+      call check_packing(species, extent, groups(s(1):s(2)), problems)
+      call check_containers(box, sum(extent%area), groups(s(1)), problems)
+      if (problems%count == 0) call check_strokes(box, sum(extent%area), groups, problems)
     end associate
   end subroutine check_fit
 
@@ -187,40 +197,69 @@ contains
     end associate
   end function is_in_the_way
 
-  !> Reports species with placement 'dense', 'grown' or 'relaxed' whose packing fraction would exceed a proven upper bound. The
-  !> packing fraction of a region includes the disks of all species that have the same region. Regions with disks whose radii come
-  !> from a file are not checked.
-  subroutine check_compressed(species, seed, groups, problems)
-    type(species_settings_t), intent(in) :: species(:)
+  !> Area and range of radii of the disks of the k-th species.
+  pure function extent_of(species, k, seed) result(extent)
+    type(species_settings_t), intent(in) :: species
+    integer, intent(in) :: k
     integer(int64), intent(in) :: seed                        !! seed of the run
+    type(extent_t) :: extent
+    real(real64), allocatable :: radius(:)                    ! [length]
+
+    extent = extent_t(species%count*pi*species%radius**2, species%radius, species%radius)
+    if (species%radius_in_file) then
+      radius = species%in_file%table(radius_row, :)
+    else if (species%polydispersity > 0) then
+      radius = drawn_radii(species, k, seed)
+    end if
+    if (allocated(radius)) extent = extent_t(pi*sum(radius**2), minval(radius), maxval(radius))
+  end function extent_of
+
+  !> Reports a region whose packing fraction would exceed a proven upper bound. No method could place the disks, and some would try
+  !> for a long time. The packing fraction of a region includes the disks of all species that are placed within the region. Given
+  !> positions are not bound to a region.
+  pure subroutine check_packing(species, extent, groups, problems)
+    type(species_settings_t), intent(in) :: species(:)
+    type(extent_t), intent(in) :: extent(:)                   !! areas and radii of the disks of each species
     type(group_t), intent(in) :: groups(:)                    !! groups of the species
     type(problem_list_t), intent(inout) :: problems
     real(real64) :: packing, smallest, largest, most
-    real(real64), allocatable :: radius(:)                    ! [length]
-    logical :: together(size(species))
+    logical :: within(size(species))
     integer :: k, j
 
     do k = 1, size(species)
-      if (.not. any(["dense  ", "grown  ", "relaxed"] == species(k)%placement)) cycle
-      together = [(all(species(j)%region <= species(k)%region .and. species(j)%region >= species(k)%region), j=1, size(species))]
-      if (any(together .and. (species%radius_in_file .or. species%radius <= 0 .or. species%count < 1))) cycle
-      packing = 0
-      smallest = huge(smallest)
-      largest = 0
-      do j = 1, size(species)
-        if (.not. together(j)) cycle
-        radius = drawn_radii(species(j), j, seed)
-        packing = packing + pi*sum(radius**2)/product(species(k)%region([2, 4]) - species(k)%region([1, 3]))
-        smallest = min(smallest, minval(radius))
-        largest = max(largest, maxval(radius))
-      end do
+      associate (region => species(k)%region)
+        within = [(all(species(j)%region([1, 3]) >= region([1, 3])) .and. all(species(j)%region([2, 4]) <= region([2, 4])) &
+          .and. all(species(j)%placement /= [character(len=8) :: "explicit", "file"]), j=1, size(species))]
+        packing = sum(extent%area, mask=within)/product(region([2, 4]) - region([1, 3]))
+      end associate
+      if (.not. within(k)) cycle
+      smallest = minval(extent%smallest, mask=within)
+      largest = maxval(extent%largest, mask=within)
       most = densest_packing(smallest/largest)
       if (packing <= most*(1 + rounding)) cycle
       call groups(k)%complain("placement", "the disks in this region would fill "//written(packing)//" of it; disks with radii " &
         //"from "//written(smallest)//" to "//written(largest)//" fill at most "//written(most), problems)
       return
     end do
-  end subroutine check_compressed
+  end subroutine check_packing
+
+  !> Reports a container whose area is smaller than that of all disks.
+  pure subroutine check_containers(box, area, group, problems)
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: area                          !! total area of the disks [length**2]
+    type(group_t), intent(in) :: group                        !! group of the first species
+    type(problem_list_t), intent(inout) :: problems
+    integer(int32) :: k
+
+    do k = 1, box%n_obstacles()
+      associate (obstacle => box%obstacle(k))
+        if (.not. obstacle%shape%encloses .or. area <= obstacle%shape%area) cycle
+        call group%complain("count", "all disks have the area "//written(area)//', and obstacle "' &
+          //box%surface(obstacle%surface)%name//'" contains '//written(obstacle%shape%area), problems)
+        return
+      end associate
+    end do
+  end subroutine check_containers
 
   !> Upper bound of the packing fraction of disks in the plane. The bound also holds for a rectangle with sides and for a periodic
   !> box, because copies of a rectangle fill the plane. For disks of nearly equal radii the bound is the packing fraction of the

@@ -205,3 +205,13 @@ def test_a_relaxed_start_that_is_too_dense_is_told(ricochet, tmp_path):
     run = ricochet("gas.nml", "-o", "gas.h5", "--set", "species.large.radius=0.0385")
     assert run.returncode == USAGE
     assert "in steps: placement = 'grown'" in one_line(run)
+
+
+def test_disks_of_many_sizes_are_not_crushed_before_their_area_is_reached(ricochet, tmp_path):
+    """The largest radius does not count for all disks."""
+    text = "&species count = 200 packing_fraction = {} polydispersity = 0.4 /\n&stop time = 1 /\n"
+    text += "&side name = 'left' motion = 'constant_velocity' velocity = 0.5 end_time = 1 /\n"
+    for packing, answer in ((0.45, "valid"), (0.52, "would crush the disks, which need at least")):
+        (tmp_path / "gas.nml").write_text(text.format(packing))
+        run = ricochet("gas.nml", "--check")
+        assert answer in run.stdout + run.stderr
