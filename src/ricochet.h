@@ -70,15 +70,16 @@ void ricochet_close(ricochet *);
 
 /* Advances a simulation until the first of three limits is reached: a time, a number of collisions of disks with disks, or a
    number of events, all counted from the start of the run. INFINITY and INT64_MAX stand for no limit. If no argument is a limit,
-   the stop rule of the input applies, if the input contains a stop rule. The results do not depend on the number of calls with
-   which a simulation is advanced.
+   the stop rule of the input applies, if the input contains a stop rule. The two numbers are reached exactly, if necessary
+   between simultaneous events (except with time steps, which are always completed); the next call continues with the remaining
+   ones. The results do not depend on the number of calls with which a simulation is advanced.
    Returns 0 when a limit is reached, 1 if `patience` seconds have passed before a limit is reached (call the function again), or
    an exit code: 2 if `time` is NAN, other codes if the simulation cannot be continued. */
 int ricochet_advance(ricochet *, double time, int64_t collisions, int64_t events, double patience, char *message, int room);
 
-/* Advances a simulation like ricochet_advance, but at most to the time of the next event, and executes all events at this time.
-   The function also returns 0 if one of the limits was reached before an event occurred. ricochet_last_events copies the events
-   that were executed. */
+/* Advances a simulation like ricochet_advance, but at most by one event or, with time steps, by all events of the next step with
+   events. The function also returns 0 if one of the limits was reached before an event occurred. ricochet_last_events copies the
+   events that were executed. */
 int ricochet_advance_event(ricochet *, double time, int64_t collisions, int64_t events, double patience, char *message, int room);
 
 /* Copies the latest events.
@@ -111,6 +112,7 @@ int ricochet_observables(ricochet *, char *names, int room, double *values);
 
 /* Changes forces, contact laws and motions at the present time.
    overrides:  lines GROUP.VARIABLE=VALUE of box.gravity, drive, contact, side, wall and obstacle
+   A side starts a new motion where it is. Variables of its former motion that the new motion does not have are dropped.
    The change of the total energy counts as work. Returns an exit code; if the code is not 0, nothing is changed. */
 int ricochet_change(ricochet *, const char *overrides, char *message, int room);
 

@@ -130,6 +130,32 @@ def test_each_event_is_reported_in_the_state_of_its_moment(whole, threads):
     assert len(gas.event_log(10**12).time) == len(seen) and len(gas.event_log(0).time) == 0
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_call_may_end_between_simultaneous_events(seed):
+    """Counts are exact, and the next call continues with the remaining events of that time."""
+    rng = random.Random(seed)
+    count, rows = rng.randrange(2, 7), rng.randrange(1, 3)
+    places = [((k + 1) / (count + 1), 0.3 + 0.4 * r) for r in range(rows) for k in range(count)]
+    system = {"box": {"boundary": [rng.choice(["wall", "periodic"]), "wall"]}}
+    system["species"] = {"radius": 0.05, "position": places, "velocity": [(0, 1)] * len(places)}
+    with Simulation(system) as whole, Simulation(system) as parts, Simulation(system) as stopped:
+        log: list = []
+        whole.advance(events=5 * len(places), on_event=log.append)
+        assert len({event.time for event in log}) < len(log), "many are simultaneous"
+        for k, event in enumerate(log, start=1):
+            parts.advance(events=k)
+            stopped.advance(time=99, on_event=lambda _: True)
+            assert parts.events == stopped.events == k and parts.time == event.time
+            collisions = sum(one.j > 0 for one in log[:k])
+            assert parts.collisions == stopped.collisions == collisions
+            assert np.array_equal(parts.velocity, stopped.velocity)
+        assert np.array_equal(parts.velocity, whole.velocity)
+        ends = [one.advance(time=log[-1].time + 3) for one in (whole, parts, stopped)]
+        for name in ("events", "position", "velocity"):
+            first, *others = (getattr(one, name) for one in ends)
+            assert all(np.array_equal(first, other) for other in others)
+
+
 def test_a_function_of_events_may_stop_and_change_the_simulation():
     system = {"species": {"count": 30, "radius": 0.02, "temperature": 1}}
     gas = Simulation(system)

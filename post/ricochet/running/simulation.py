@@ -241,13 +241,15 @@ class Simulation(State):
         collisions : int, optional
             number of collisions of two disks
         events : int, optional
-            number of events (collisions of any kind); `advance` never ends between simultaneous
-            events
+            number of events (collisions of any kind).  `advance` ends exactly at a number of events
+            or collisions, if necessary between simultaneous events, and the next call continues
+            with the remaining ones.  Only time steps are always completed
         on_event : callable, optional
             function that is called with an `Event` after each event.  The function `on_event` may
             read and change the simulation, which is in the state just after the event.  If
-            `on_event` returns a true value, `advance` ends after all events that are simultaneous
-            with this event.  If `on_event` is given, each event takes about 20 microseconds
+            `on_event` returns a true value, `advance` ends after this event, even if simultaneous
+            events are still to come.  If `on_event` is given, each event takes about 20
+            microseconds
 
         Returns
         -------
@@ -398,6 +400,9 @@ class Simulation(State):
         The variables that can change are gravity, the driving, the collision rules of disks and
         boundaries, and the temperatures, velocities and motions of boundaries.  A change of the
         total energy by this method is added to the observable `work`.
+
+        A side starts a new motion where it is.  Variables of its former motion that the new motion
+        does not have, such as the force on a piston that is held, are dropped.
 
         Parameters
         ----------
