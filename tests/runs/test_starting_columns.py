@@ -241,7 +241,7 @@ def test_arrays_in_files_of_numpy_become_starting_files(tmp_path):
         ({"position": np.ones((2, 3))}, "position: of shape (2, 3), not (N, 2)"),
         ({"position": np.ones((0, 2))}, "position: of 0 disks, not of 1"),
         ({"position": [[1, np.inf]]}, "position: not all numbers are finite"),
-        ({"position": [["a", "b"]]}, "position: not an array of numbers"),
+        ({"position": [["a", "b"]]}, "position: not an array of real numbers"),
         ({"position": [[1, 2]], "velocity": np.ones((2, 2))}, "velocity: of 2 disks, not of 1"),
         ({"position": [[1, 2]], "radius": [0]}, "radius: not all numbers are above 0"),
         ({"position": [[1, 2]], "species": ["a", "b"]}, "species: of 2 disks, not of 1"),

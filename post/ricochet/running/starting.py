@@ -33,10 +33,10 @@ def with_start(group: Mapping[str, Any], place: Path | None) -> Mapping[str, Any
         return group
     if "position" not in group:
         raise TypeError(f"species.{min(columns)}: values for each disk need a position for each")
-    position = np.reshape(np.asarray(group["position"], dtype=float), (-1, 2))
+    position = np.reshape(real_numbers("position", group["position"]), (-1, 2))
     rest = {name: group[name] for name in group.keys() - columns.keys() - {"position", "velocity"}}
     if "velocity" in group:
-        velocity = np.reshape(np.asarray(group["velocity"], dtype=float), (-1, 2))
+        velocity = np.reshape(real_numbers("velocity", group["velocity"]), (-1, 2))
         columns["velocity"] = np.broadcast_to(velocity, position.shape)
         rest["velocities"] = "file"
     name = f"start-{group.get('name', 'disks')}.txt"
@@ -132,14 +132,20 @@ def write_start(
 
 def table(name: str, values: ArrayLike, count: int | None = None, width: int = 0) -> np.ndarray:
     """Return finite numbers as an array of shape (count, width), or (count,) if width is 0."""
-    values = np.asarray(values)
-    if values.dtype.kind not in "iuf":
-        raise ValueError(f"{name}: not an array of numbers")
+    values = real_numbers(name, values)
     if width and (values.ndim != 2 or values.shape[1] != width):
         raise ValueError(f"{name}: of shape {values.shape}, not (N, {width})")
     values = sized(name, values, len(values) if count is None else count)
     if not np.isfinite(values).all():
         raise ValueError(f"{name}: not all numbers are finite")
+    return values
+
+
+def real_numbers(name: str, values: ArrayLike) -> np.ndarray:
+    """Return an array of real numbers; raise ValueError for other values, also complex numbers."""
+    values = np.asarray(values)
+    if values.dtype.kind not in "iuf":
+        raise ValueError(f"{name}: not an array of real numbers")
     return values
 
 

@@ -14,6 +14,7 @@ from ..reading.nature import Nature, nature_of
 from ..reading.reader import EventLog
 from .engine import ROOM, called, library
 from .session import Session
+from .starting import real_numbers
 
 FASTEST = 1e100  # largest number that is allowed in an input
 #: Type of the elements of each array of a simulation.
@@ -157,7 +158,7 @@ class State(Session):
 
     def _set(self, name: str, value: ArrayLike, function: Callable[..., int]) -> None:
         """Pass an array (N, 2) to a function of the library."""
-        array = np.ascontiguousarray(value, dtype=float)
+        array = np.ascontiguousarray(real_numbers(name, value), dtype=float)
         if array.shape != (self.n_disks, 2):
             raise ValueError(f"{name}: has the shape {array.shape}, not ({self.n_disks}, 2)")
         if not np.abs(array).max() < FASTEST:
