@@ -1,6 +1,8 @@
 """Runs are exchanged with OVITO, MDAnalysis, GSD, LAMMPS, freud, pandas, xarray and CSV."""
 
+import random
 import sys
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -337,6 +339,84 @@ def test_a_wrong_dump_file_is_answered_in_one_line(text, tmp_path):
     assert str(problem.value).startswith(str(tmp_path)) and "\n" not in str(problem.value)
     with pytest.raises(RunError, match="no such file"):
         bridges.read_lammps(tmp_path / "b.dump")
+
+
+DUMP = TORN.replace("ATOMS\n1", "ATOMS\n2") + "ITEM: ATOMS x y z vx vy radius mass omegaz\n"
+DUMP += "0.25 0.5 0 1 2 0.1 3 4\n0.75 0.5 0 1 2 0.1 3 4\n"
+IMPOSSIBLE = [
+    *(("STEP\n0", f"STEP\n{time}") for time in ("nan", "inf")),
+    *(("pp\n0 1", f"pp\n{bounds}") for bounds in ("1 1", "1 0", "0 inf", "nan 1")),
+    *(("\n0.25", f"\n{x}") for x in ("nan", "-inf", "1e999")),
+    *(("0.1 3", f"{radius} 3") for radius in ("0", "-0.1", "nan", "inf")),
+    *(("0.1 3", f"0.1 {mass}") for mass in ("0", "-3", "nan", "inf")),
+    *((" 0 1 2", f" {numbers}") for numbers in ("nan 1 2", "0 inf 2", "0 1 nan")),
+    ("3 4", "3 inf"),
+]
+
+
+@pytest.mark.parametrize(("old", "new"), IMPOSSIBLE)
+def test_a_dump_file_with_impossible_numbers_is_answered_in_one_line(old, new, tmp_path):
+    path = tmp_path / "a.dump"
+    path.write_text(DUMP)
+    assert bridges.read_lammps(path).input()["species"][0]["radius"].tolist() == [0.1, 0.1]
+    path.write_text(DUMP.replace(old, new, 1))
+    with pytest.raises(RunError, match=r"a\.dump: frame -1 is damaged \(.*\)$") as problem:
+        bridges.read_lammps(path)
+    assert "\n" not in str(problem.value)
+
+
+@pytest.fixture
+def damaged(kind, run, tmp_path):
+    """Return a function that damages an exported file by a change of its bytes, and reads it."""
+    whole = exported(run, f"run.{kind}").read_bytes()
+    path = tmp_path / f"damaged.{kind}"
+
+    def read(change, frame=-1):
+        path.write_bytes(change(bytearray(whole)))
+        return READERS[kind](path, frame)
+
+    return read
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_damaged_file_is_answered_in_one_line_or_read(damaged, kind):
+    """Bytes are changed at random, most of them in the header and in the index of a GSD file."""
+    rng = random.Random(1)
+
+    def spoil(content):
+        last = len(content) if kind == "lammpstrj" or rng.random() < 0.2 else 5000
+        for _ in range(rng.choice([1, 1, 2, 8])):
+            place = rng.randrange(last)
+            new = rng.choice([0, 255, rng.randrange(256), content[place] ^ 1 << rng.randrange(8)])
+            content[place : place + 1] = bytes([new] * rng.choice([1, 1, 4, 8]))
+        return content[: rng.randrange(len(content))] if rng.random() < 0.05 else content
+
+    answers: Counter[str] = Counter()
+    for _ in range(400):
+        try:
+            frame = damaged(spoil, rng.choice([-1, 0, 3]))
+        except RunError as problem:
+            answers[str(problem)] += 1
+        else:
+            assert all(np.isfinite(frame.disks[name]).all() for name in ("position", "radius"))
+            answers["read"] += 1
+    assert 20 < answers.pop("read") < 380
+    assert all(f"damaged.{kind}: " in answer and "\n" not in answer for answer in answers)
+
+
+@pytest.mark.parametrize("group", ["particles", "bonds", "pairs"])
+def test_a_gsd_file_that_counts_too_many_members_is_refused(group, tmp_path):
+    """The package gsd would fill arrays of that size with default values."""
+    reader("gsd.hoomd")
+    layer = reader("gsd.fl")
+    path = tmp_path / "a.gsd"
+    with layer.open(
+        str(path), "w", application="test", schema="hoomd", schema_version=[1, 4]
+    ) as file:
+        file.write_chunk(f"{group}/N", np.array([2**31], dtype=np.uint32))
+        file.end_frame()
+    with pytest.raises(RunError, match=rf"frame -1 .*{group}/N = 2147483648 exceeds the size"):
+        bridges.read_gsd(path)
 
 
 def test_what_cannot_be_exchanged_is_answered_in_one_line(simulated, tmp_path, monkeypatch, capsys):

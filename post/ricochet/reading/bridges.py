@@ -11,6 +11,7 @@ import numpy as np
 
 from .arrays import Index, chosen
 from .files import RunError, destination, optional_package
+from .foreign import DAMAGE, check_counts, check_index, check_values
 from .nature import Refused
 from .reader import Run
 
@@ -229,7 +230,7 @@ def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
     ImportError
         if gsd is not installed
     RunError
-        if the file is not a GSD file of disks in a rectangle
+        if the file is not a GSD file of disks in a rectangle, or is damaged
 
     Examples
     --------
@@ -240,15 +241,26 @@ def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
     """
     package, path = optional_package("gsd.hoomd", "read_gsd"), Path(path)
     try:
-        with package.open(str(path), "r") as file:
+        check_index(path)
+        with package.open(str(path), "r") as file, np.errstate(all="ignore"):
             count = len(file)
-            found = file[frame] if -count <= frame < count else None
+            if not -count <= frame < count:
+                raise RunError(f"{path}: has no frame {frame}; it has {count} frames")
+            check_counts(file.file, path, frame % count)
+            return imported_gsd(path, file[frame])
     except FileNotFoundError:
         raise RunError(f"{path}: no such file") from None
-    except (OSError, RuntimeError) as problem:
-        raise RunError(f"{path}: cannot be read as a GSD file ({problem})") from None
-    if found is None:
-        raise RunError(f"{path}: has no frame {frame}; it has {count} frames")
+    except DAMAGE as problem:
+        raise RunError(f"{path}: frame {frame} cannot be read ({in_words(problem)})") from None
+
+
+def in_words(problem: BaseException) -> str:
+    """Return the message of an exception in one line; some exceptions have only a name."""
+    return " ".join(str(problem).split()) or type(problem).__name__
+
+
+def imported_gsd(path: Path, found: Any) -> ImportedFrame:
+    """Return the disks of a frame of the package gsd."""
     box, particles, log = found.configuration.box, found.particles, found.log
     width, height, *_, xy, xz, yz = box.tolist()
     if any((xy, xz, yz)):
@@ -266,8 +278,7 @@ def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
     own = ("angular_velocity", "orientation")
     disks |= {one: log[f"particles/{one}"] for one in own if f"particles/{one}" in log}
     disks = {name: np.array(values, dtype=float) for name, values in disks.items()}
-    disks["position"] = wrapped(disks["position"], lower, upper - lower, periodic)
-    return ImportedFrame(time, lower, upper, periodic, disks | {"species": types[particles.typeid]})
+    return checked(time, lower, upper, periodic, disks | {"species": types[particles.typeid]})
 
 
 def gsd_diameters(particles: Any) -> np.ndarray:
@@ -280,8 +291,25 @@ def gsd_diameters(particles: Any) -> np.ndarray:
 
 def in_plane(path: Path, z: np.ndarray, edges: np.ndarray) -> None:
     """Raise RunError unless all disks have the same z."""
+    if not np.all(np.isfinite(z)):
+        raise ValueError("z: not all numbers are finite")
     if len(z) and np.ptp(z) > TOLERANCE * np.max(edges):
         raise RunError(f"{path}: is three-dimensional: its particles have different z")
+
+
+def checked(
+    time: float,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    periodic: np.ndarray,
+    disks: dict[str, np.ndarray],
+) -> ImportedFrame:
+    """Return a frame whose disks are in the box; raise ValueError if its numbers are impossible."""
+    numbers = {name: values for name, values in disks.items() if name != "species"}
+    own = {"time": np.array(time), "lower": lower, "upper": upper, "periodic": periodic}
+    check_values(own | numbers)
+    position = wrapped(disks["position"], lower, upper - lower, periodic)
+    return ImportedFrame(time, lower, upper, periodic, disks | {"position": position})
 
 
 def wrapped(
@@ -393,7 +421,7 @@ def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
     Raises
     ------
     RunError
-        if the file is not such a file, or its particles are not in a rectangle
+        if the file is not such a file or is damaged, or its particles are not in a rectangle
 
     Examples
     --------
@@ -406,7 +434,7 @@ def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
     """
     path = Path(path)
     try:
-        with path.open("rb") as file:
+        with path.open("rb") as file, np.errstate(all="ignore"):
             starts = [*frame_starts(file)]
             if not -len(starts) <= frame < len(starts):
                 count = f"it has {len(starts)} frames" if starts else "it is no dump file of LAMMPS"
@@ -419,8 +447,8 @@ def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
         raise RunError(f"{path}: {problem.strerror}") from None
     except KeyError as problem:
         raise RunError(f"{path}: frame {frame} has no ITEM: {problem.args[0]}") from None
-    except (IndexError, ValueError) as problem:
-        raise RunError(f"{path}: frame {frame} is damaged ({problem})") from None
+    except DAMAGE as problem:
+        raise RunError(f"{path}: frame {frame} is damaged ({in_words(problem)})") from None
 
 
 def frame_starts(file: BinaryIO) -> Iterator[int]:
@@ -482,7 +510,7 @@ def imported(path: Path, items: Items) -> ImportedFrame:
     places += [lower + vectors[way] * (upper - lower) for way in ("{}s", "{}su") if way in vectors]
     if not places:
         raise RunError(f"{path}: has no columns x and y (or xu and yu, or xs and ys)")
-    disks = {"position": wrapped(places[0], lower, upper - lower, periodic)}
+    disks = {"position": places[0]}
     disks |= {"velocity": vectors["v{}"]} if "v{}" in vectors else {}
     disks |= {"radius": numbers["diameter"] / 2} if "diameter" in numbers else {}
     disks |= {name: numbers[name] for name in ("radius", "mass", "orientation") if name in numbers}
@@ -490,4 +518,4 @@ def imported(path: Path, items: Items) -> ImportedFrame:
     kind = next((text[name] for name in ("element", "type") if name in text), None)
     disks["species"] = np.full(count, "disks") if kind is None else kind
     time = items["TIME" if "TIME" in items else "TIMESTEP"][1][0][0]
-    return ImportedFrame(float(time), lower, upper, periodic, disks)
+    return checked(float(time), lower, upper, periodic, disks)
