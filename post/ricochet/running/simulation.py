@@ -142,8 +142,9 @@ class Simulation(State):
     def save(self, path: str | Path, force: bool = False, input: str | Path | None = None) -> Path:
         """Write an output file that the command `ricochet INPUT -o path --resume` can continue.
 
-        The output file that `save` writes contains samples of the initial state and of the present
-        state.  If variables have been changed with `change`, INPUT must be a file with the changed
+        The output file that `save` writes contains the present state, and the samples of the
+        initial state (after a change: of the present state).  It needs space for these data only;
+        the command checks the space for the rest of the run.  If variables have been changed with `change`, INPUT must be a file with the changed
         values; `save` writes this file if the argument `input` is given.
 
         Parameters
