@@ -88,7 +88,7 @@ contains
       if (error%code == exit_files) error%message = error%message//"; --resume continues from the last checkpoint"
     else
       call end_at_signals("stopped; the run is finished, only its summary is missing", exit_finished)
-      if (run%sim%tally%collapse < never .and. .not. command%quiet) write (error_unit, "(a)") "note: "//note(run)
+      if (run%sim%has_collapsed() .and. .not. command%quiet) write (error_unit, "(a)") "note: "//note(run)
       call print_text(summary(run), error)
     end if
     call run%output%release()
@@ -277,6 +277,8 @@ contains
       if (sim%tally%collisions == 0) text = text//eol//"events_per_second = "//written(run%event_rate)
       if (run%input%settings%run%threads_asked > 1) text = text//eol//"threads = "//written(run%input%settings%run%threads)
       if (run%input%settings%run%threads > 1) text = text//eol//"events_on_one_core = "//written(run%serial_events)
+      if (sim%tally%series(1) > 0) text = text//eol//"simultaneous_collisions = "//written(sim%tally%simultaneous)// &
+        eol//"longest_series = "//written(sim%tally%series(1))//" collisions of "//written(sim%tally%series(2))//" disks"
       if (sim%drive%is_on()) text = text//eol//"kicks = "//written(sim%kicks)// &
         eol//"drive_energy = "//written(sim%tally%total(drive_energy))
       if (allocated(sim%recycled)) text = text//eol//"recycled = "//written(sum(sim%recycled))

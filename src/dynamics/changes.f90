@@ -4,7 +4,7 @@ module changes
   use box_sides, only: bounds
   use disks, only: advance_disk
   use epochs, only: restart_epoch
-  use kinds, only: int32, int64, real64
+  use kinds, only: int32, int64, never, real64
   use partners, only: n_sides
   use observables, only: total_energy
   use side_motion, only: piston, side_state_t
@@ -56,6 +56,7 @@ contains
     before = total_energy(sim)
     call advance_all(sim)
     sim%system_t = other%system_t
+    call sim%fit_series()
     call count_kicks()
     call restart_epoch(sim)
     call book(sim, before)
@@ -141,6 +142,8 @@ contains
     real(real64), intent(in) :: before                       !! total energy before the change [energy]
 
     sim%changes = sim%changes + 1
+    if (.not. sim%has_collapsed()) sim%tally%collapse = never       ! the change prevents a collapse that was about to occur
+    if (allocated(sim%series)) sim%series%known_until = 0
     sim%typical_speed2 = max(sim%typical_speed2, sim%mean_square_speed())
     call sim%choose_units()
     call sim%tally%sum(work)%add(total_energy(sim) - before)

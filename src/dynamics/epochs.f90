@@ -145,6 +145,7 @@ contains
       sim%disk(i)%collision_counter = 0
     end do
     if (sim%law%contact_time > 0) sim%extra%last_contact = sim%extra%last_contact - shift
+    if (allocated(sim%series)) sim%series%time = sim%series%time - shift
     sim%now = sim%now - shift
     sim%last_advance = sim%last_advance - shift
     sim%box%epoch = sim%box%epoch + shift

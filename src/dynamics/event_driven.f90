@@ -7,6 +7,7 @@
 module event_driven
   use kinds, only: int32, int64, never, real64
   use box_sides, only: side_time
+  use collapses, only: watch
   use calendar, only: most_coming, stages
   use cell_grid, only: cell_grid_t
   use encounters, only: collide, collide_pair, encounter_text, is_periodic_side, pass_side
@@ -41,6 +42,8 @@ module event_driven
     type(event_queue_t) :: queue
     logical :: windowed = .true.                   !! whether the queue uses the calendar in addition to the heap
     logical :: general = .false.                   !! whether collisions need the general procedure `collide`
+    logical :: lossy = .false.                     !! whether collisions can be part of an inelastic collapse
+    logical :: special = .false.                   !! whether collisions are general or lossy
     logical :: is_part = .false.  !! whether this engine advances a single domain of a parallel run
     class(histories_t), allocatable :: histories   !! records of the motion of disks in the domain
     integer(int64) :: last_count = 0               !! total number of events at which `run_events` returns
@@ -134,6 +137,8 @@ contains
     iterations = limits%iterations
     self%iterations_left = iterations
     self%general = present(log) .or. sim%features%need_general_collision() .or. sim%law%by_speed%speed > 0
+    self%lossy = sim%law%can_collapse()
+    self%special = self%general .or. self%lossy
     self%arrived = .false.
     do while (iterations > 0)
       if (limits%reached(sim%tally) .or. is_full(log)) return
@@ -234,7 +239,7 @@ contains
     integer(int32), intent(in) :: i, code          !! index of the disk, and code of its partner: see `partners`
     real(real64), intent(in) :: t
     type(event_log_t), intent(inout), optional :: log
-    logical :: counts
+    logical :: counts, is_general
 
     counts = .true.
     if (self%is_part) counts = self%histories%counts(sim%tag, i, code)
@@ -242,7 +247,12 @@ contains
       if (sim%disk(code)%collision_counter == sim%tag(i)%partner_counter) then
         ! The clocks of two disks are equal only if the disks are still in contact, or if both disks have collided at exactly the
         ! present time. Collisions of two disks with equal clocks are rare and need the general procedure.
-        if (self%general .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0) then
+        is_general = self%special .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0
+        if (is_general .and. self%lossy) then
+          call watch(sim, i, code, t, self%is_part)
+          is_general = self%general .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0
+        end if
+        if (is_general) then
           call collide(sim, i, code, t, counts, log)
         else
           call collide_pair(sim, i, code, t, counts, sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species))

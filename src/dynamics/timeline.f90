@@ -216,8 +216,8 @@ contains
     character(len=:), allocatable :: text
 
     text = ""
-    if (sim%tally%collapse < never) text = "an inelastic collapse occurred: " &
-      //counted(sim%tally%simultaneous, "collision")//" took no time, the first at time "//written(sim%tally%collapse) &
+    if (sim%has_collapsed()) text = "an inelastic collapse occurred: " &
+      //counted(sim%tally%simultaneous, "collision")//" took no time, the first collapse at time "//written(sim%tally%collapse) &
       //"; the motion after it depends on rounding errors; "//longer_contacts(sim)
   end function collapse_note
 

@@ -466,6 +466,7 @@ contains
         call record%exchange(file, tally%events)
         call record%exchange(file, tally%collisions)
         call record%exchange(file, tally%simultaneous)
+        call record%exchange(file, tally%series)
         call record%exchange(file, tally%collapse)
         call exchange_sums(tally%sum)
         call record%exchange(file, tally%surface_collisions)
@@ -510,6 +511,7 @@ contains
         ! checkpoint of a run with other features is detected.
         call record%exchange(file, settled)
       end do
+      if (allocated(sim%series)) call record%pass(file, c_loc(sim%series(1)), size(sim%series)*storage_size(sim%series)/64)
       if (allocated(sim%extra)) call record%pass(file, c_loc(sim%extra(1)), size(sim%extra)*storage_size(sim%extra)/64)
       if (.not. sim%features%own_sizes) return
       mass = sim%masses()                       ! individual masses are stored even if each mass equals the mass of the species

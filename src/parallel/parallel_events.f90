@@ -154,9 +154,11 @@ contains
         listed = log%n
         if (good) call merge_logs(self%parts%domain, log, good)
       end if
-      ! The serial engine, unlike the domains, finds the exact event at which a limit is reached or a collapse occurs.
+      ! The serial engine, unlike the domains, finds the exact event at which a limit is reached, and examines collisions that can
+      ! be part of a collapse.
       too_far = good
-      if (good) too_far = limits%outgrown(self%parts%total_tally(sim)) .or. t - sim%last_advance < sim%negligible_time
+      if (good) too_far = limits%outgrown(self%parts%total_tally(sim)) .or. t - sim%last_advance < sim%negligible_time &
+        .or. any(self%parts%domain%sim%tally%unexamined > 0)
       if (good .and. .not. too_far) then
         call self%parts%write_back_all(sim, t)
         self%arrived = t >= limits%time

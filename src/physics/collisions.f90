@@ -60,6 +60,7 @@ module collisions
     real(real64) :: inertia = 0.5_real64             !! moment of inertia divided by mass times radius squared
   contains
     procedure :: loses_energy
+    procedure :: can_collapse
   end type contact_law_t
 
 contains
@@ -71,6 +72,14 @@ contains
 
     yes = any(self%restitution < 1) .or. self%tangential%is_rough()
   end function loses_energy
+
+  !> Whether an inelastic collapse is possible. The TC model prevents the collapse of smooth disks.
+  pure function can_collapse(self) result(yes)
+    class(contact_law_t), intent(in) :: self
+    logical :: yes
+
+    yes = any(self%restitution < 1) .and. .not. self%contact_time > 0
+  end function can_collapse
 
   !> Coefficient of restitution at an impact velocity.
   elemental function restitution_at(self, restitution, g) result(xi)

@@ -4,10 +4,10 @@
 !> recomputed at every start.
 module disks
   use free_flight, only: flight, flight_velocity
-  use kinds, only: int16, int32, int64, real64
+  use kinds, only: int16, int32, int64, never, real64
   implicit none
   private
-  public :: disk_t, extra_t, species_t, tag_t, whole_disk_t
+  public :: disk_t, extra_t, series_t, species_t, tag_t, whole_disk_t
   public :: disks_before, advance_disk, longest_name, names_of, species_by_id
 
   !> Position, velocity and clock of a disk change only in the collisions of this disk, and when the disk passes a periodic side.
@@ -28,7 +28,7 @@ module disks
     integer(int32) :: species = 1               !! index of the species
     integer(int32) :: id = 0                    !! number of the disk in the order of the input file
     integer(int64) :: collisions = 0            !! number of events of the disk since the start of the run
-    integer(int32) :: last_partner = 0  !! last collision partner: id of a disk, code of an obstacle, or 0; see `partners: repeated`
+    integer(int32) :: last_partner = 0  !! last collision partner: id of a disk, code of an obstacle, or 0
     ! Derived data, which the search and the event queue use.
     integer(int16) :: cell(2) = 0_int16         !! column and row in the cell grid
     integer(int32) :: window = 0                !! time window to which the event queue has assigned the event
@@ -52,6 +52,16 @@ module disks
     real(real64) :: spin = 0.0_real64           !! angular velocity [1/time]
     real(real64) :: angle = 0.0_real64          !! orientation at `clock`, unwrapped [radian]
   end type extra_t
+
+  !> Membership of a disk in a series, which consists of the collisions of one time that are connected through shared disks. See
+  !> `collapses`.
+  type :: series_t
+    real(real64) :: time = -never               !! time of the last series, relative to the time origin `box%epoch` [time]
+    integer(int32) :: root = 0                  !! id of a disk of the same series; this leads to the disk that represents the series
+    integer(int32) :: disks = 0                 !! number of disks in the series that this disk represents
+    integer(int64) :: collisions = 0            !! number of collisions in the series that this disk represents
+    integer(int64) :: known_until = 0           !! number of events of this disk up to which no collapse is possible
+  end type series_t
 
   !> All data of one disk, combined in one type so that they can be copied together.
   type :: whole_disk_t

@@ -7,7 +7,7 @@ module encounters
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity
   use images, only: image_t, images_t
-  use partners, only: axis_of, is_side, is_wall, last_partner_id, most_repeats, repeated, repeats, sense_of
+  use partners, only: axis_of, is_side, is_wall, sense_of
   use shapes, only: magnitude
   use simulation_state, only: simulation_t
   use tally, only: dissipated, heat_virial, stress, virial, work
@@ -15,15 +15,7 @@ module encounters
   use boundary_collisions, only: collide_wall
   implicit none
   private
-  public :: collide, collide_pair, encounter_text, is_periodic_side, pass_side
-
-  !> Limits for the detection of an inelastic collapse. A series of at most `most_visible` simultaneous collisions of a pair is not
-  !> considered a collapse. The limit `rounded` is an approach velocity, divided by the speed of the faster disk and by 1 -
-  !> restitution. At approach velocities below `rounded`, further collisions only result from rounding errors. The limit `slowest`
-  !> is an absolute approach velocity, which is far below all velocities in an input [length/time]. The absolute limit `slowest` is
-  !> needed if collisions with walls slow down all disks.
-  integer(int32), parameter :: most_visible = most_repeats - 3
-  real(real64), parameter :: rounded = 1.0e-12_real64, slowest = 1.0e-120_real64
+  public :: are_in_contact, collide, collide_pair, encounter_text, is_periodic_side, pass_side, relative_motion
 
   !> Ratio of masses above which the velocity change of the heavy disk loses significant digits.
   real(real64), parameter :: far_heavier = 2.0_real64**20
@@ -43,9 +35,8 @@ contains
     logical, value :: counts                     !! whether the collision is included in the tally and the log
     type(event_log_t), intent(inout), optional :: log
     real(real64) :: v(2), w(2), change(2), restitution
-    integer(int32) :: first, second, ids(2), n_repeats
+    integer(int32) :: first, second, ids(2)
 
-    n_repeats = 0
     first = i
     second = min(code, 0)
     if (code > 0) then
@@ -55,8 +46,6 @@ contains
       end if
       first = merge(i, code, sim%tag(i)%id < sim%tag(code)%id)
       second = i + code - first
-      if (.not. min(sim%disk(i)%clock, sim%disk(code)%clock) < t) &
-        call count_simultaneous_collision(sim, i, code, t, counts, n_repeats)
       call sim%rotate_to(second, t)
     end if
     call sim%rotate_to(first, t)
@@ -67,7 +56,6 @@ contains
       restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species)
       if (sim%law%by_speed%speed > 0) restitution = sim%law%by_speed%restitution_at(restitution, impact_velocity(sim, i, code, t))
       call collide_pair(sim, i, code, t, counts, restitution)
-      if (n_repeats > 0) sim%tag([i, code])%last_partner = repeated(sim%tag([code, i])%id, n_repeats)
       if (sim%law%tangential%is_rough()) &
         call apply_tangential_impulse(sim, first, second, impulse_between(sim, first, second, v, w), counts)
     else
@@ -144,8 +132,20 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
+    real(real64) :: g, dx(2), dv(2)              ! [length/time], separation [length], relative velocity [length/time]
+
+    call relative_motion(sim, i, j, t, dx, dv)
+    g = abs(dot_product(dx, dv))/magnitude(dx)
+  end function impact_velocity
+
+  !> Separation and relative velocity of disk i and the nearest periodic image of disk j at the time t.
+  pure subroutine relative_motion(sim, i, j, t, dx, dv)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: t
+    real(real64), intent(out) :: dx(2)           !! [length]
+    real(real64), intent(out) :: dv(2)           !! [length/time]
     type(disk_t) :: p, q
-    real(real64) :: g, dx(2), dv(2)              ! [length/time]
 
     p = sim%disk(i)
     q = sim%disk(j)
@@ -154,36 +154,7 @@ contains
     dx = q%x - p%x
     dv = q%v - p%v
     call use_nearest_image(sim, t, dx, dv)
-    g = abs(dot_product(dx, dv))/magnitude(dx)
-  end function impact_velocity
-
-  !> Counts an inelastic collision of two disks, both of which have already collided at exactly the time t. A series of simultaneous
-  !> collisions is common when more than two disks are in contact, and is usually finite. An inelastic collapse is an infinite
-  !> series: the same disks collide again and again until their approach velocity is as small as the rounding error of their
-  !> velocities. Elastic disks and disks with a contact duration (TC model) cannot collapse.
-  pure subroutine count_simultaneous_collision(sim, i, j, t, counts, n)
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i, j
-    real(real64), intent(in) :: t
-    logical, intent(in) :: counts                !! whether the collision is included in the tally
-    integer(int32), intent(out) :: n             !! number of collisions in the series so far, at most `partners: most_repeats`
-    real(real64) :: restitution, fastest
-    integer(int32) :: last_partner(2)
-
-    n = 0
-    restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(j)%species)
-    if (sim%law%contact_time > 0 .or. .not. restitution < 1) return
-    last_partner = sim%tag([i, j])%last_partner
-    ! Each disk stores the number of collisions in its series of simultaneous collisions. If a collision with a wall has erased the
-    ! number of collisions that one disk stores, the number that the other disk stores is used.
-    n = minval(merge(repeats(last_partner), most_repeats, last_partner > 0)) + 1
-    fastest = max(magnitude(sim%disk(i)%v), magnitude(sim%disk(j)%v))
-    if (impact_velocity(sim, i, j, t) > max(rounded*(1 - restitution)*fastest, slowest)) n = min(n, most_visible)
-    n = min(n, most_repeats)
-    if (.not. counts) return
-    sim%tally%simultaneous = sim%tally%simultaneous + 1
-    if (n == most_repeats) sim%tally%collapse = min(sim%tally%collapse, sim%box%epoch + t)
-  end subroutine count_simultaneous_collision
+  end subroutine relative_motion
 
   !> Applies the tangential impulse in a collision of the rough disks i and j, after the normal impulse.
   subroutine apply_tangential_impulse(sim, i, j, normal_impulse, counts)
@@ -332,7 +303,7 @@ contains
     type(images_t) :: images
     real(real64) :: then(2), dx(2)
 
-    yes = last_partner_id(sim%tag(i)%last_partner) == sim%tag(j)%id .and. last_partner_id(sim%tag(j)%last_partner) == sim%tag(i)%id
+    yes = sim%tag(i)%last_partner == sim%tag(j)%id .and. sim%tag(j)%last_partner == sim%tag(i)%id
     if (.not. yes) return
     images = sim%images()
     associate (p => sim%disk(i), q => sim%disk(j), g => sim%box%gravity)

@@ -7,7 +7,6 @@ module partners
   implicit none
   private
   public :: n_sides, side_name, is_side, is_wall, axis_of, sense_of, crossing, side_crossed, looks_again, nothing
-  public :: last_partner_id, most_repeats, repeated, repeats
   public :: obstacle_code, obstacle_number
 
   integer(int32), parameter :: n_sides = 4
@@ -16,9 +15,6 @@ module partners
   !> If the disk leaves the region of the search through its right or upper edge, the code is `looks_again` - 1.
   integer(int32), parameter :: looks_again = first_crossing - n_sides
   integer(int32), parameter :: nothing = -huge(1_int32)
-  !> Largest number of collisions in a series of simultaneous collisions that `last_partner` can store.
-  integer(int32), parameter :: most_repeats = 11
-  integer(int32), parameter :: per_repeat = 2_int32**27    !! larger than the id of any disk
   character(len=6), parameter :: side_name(n_sides) = ["left  ", "right ", "bottom", "top   "]
 
 contains
@@ -90,32 +86,5 @@ contains
 
     side = code - first_crossing
   end function side_crossed
-
-  !> The value of `last_partner` after the n-th collision in a series of simultaneous collisions with the same partner. After any
-  !> other collision of two disks, `last_partner` is the id of the partner.
-  elemental function repeated(id, n) result(last_partner)
-    integer(int32), intent(in) :: id               !! id of the partner disk
-    integer(int32), intent(in) :: n                !! number of collisions in the series, at most `most_repeats`
-    integer(int32) :: last_partner
-
-    last_partner = id + n*per_repeat
-  end function repeated
-
-  !> The id of the last partner if the partner is a disk; otherwise the code of an obstacle, or 0.
-  elemental function last_partner_id(last_partner) result(id)
-    integer(int32), intent(in) :: last_partner
-    integer(int32) :: id
-
-    id = last_partner
-    if (last_partner > 0) id = modulo(last_partner, per_repeat)
-  end function last_partner_id
-
-  !> Number of collisions in the series of simultaneous collisions that includes the last collision of a disk.
-  elemental function repeats(last_partner) result(n)
-    integer(int32), intent(in) :: last_partner
-    integer(int32) :: n
-
-    n = max(last_partner, 0_int32)/per_repeat
-  end function repeats
 
 end module partners

@@ -1,10 +1,10 @@
 !> The complete state of a simulation. Checkpoints contain everything except the values given by the input and the data that
 !> are marked as derived in `disks`.
 module simulation_state
-  use kinds, only: int32, int64, real64
+  use kinds, only: int32, int64, never, real64
   use box_geometry, only: box_t
   use collisions, only: contact_law_t
-  use disks, only: disk_t, extra_t, species_by_id, species_t, tag_t, whole_disk_t
+  use disks, only: disk_t, extra_t, series_t, species_by_id, species_t, tag_t, whole_disk_t
   use drive, only: drive_t
   use features, only: features_t
   use free_flight, only: flight, flight_velocity
@@ -42,6 +42,8 @@ module simulation_state
     type(tag_t), allocatable :: tag(:)            !! (n)
     real(real64), allocatable :: own_mass(:)      !! (n) individual masses, allocated if masses within a species differ [mass]
     type(extra_t), allocatable :: extra(:)        !! (n) optional data, allocated if `has_extra`
+    !> (n) Series of simultaneous collisions, in the order of ids; allocated if disks can collapse.
+    type(series_t), allocatable :: series(:)
     !> (n) Number of times that each disk has been recycled, in the order of ids; allocated if the driving moves disks.
     integer(int64), allocatable :: recycled(:)
     real(real64) :: now = 0.0_real64              !! present time, relative to the time origin `box%epoch` [time]
@@ -49,8 +51,7 @@ module simulation_state
     real(real64) :: epoch_begin = 0.0_real64      !! start of the epoch, relative to the time origin `box%epoch` [time]
     real(real64) :: epoch_end = 0.0_real64        !! end of the epoch, relative to `box%epoch`; 0 if not known yet [time]
     integer(int64) :: epoch_events = 0            !! number of events from the start of the run to the start of the epoch
-    ! The components `negligible_time`, `last_advance` and `events_then` serve to detect an inelastic collapse, which is an infinite
-    ! series of events during which time does not advance.
+    ! The components `negligible_time`, `last_advance` and `events_then` serve to detect that time no longer advances.
     real(real64) :: negligible_time = 0.0_real64  !! duration in which no disk moves noticeably; 0 if not known yet [time]
     !> Time at which the simulation last advanced by more than `negligible_time`, relative to the time origin `box%epoch` [time]
     real(real64) :: last_advance = 0.0_real64
@@ -68,7 +69,9 @@ module simulation_state
     procedure :: n_disks
     procedure :: list_disks
     procedure :: has_extra
+    procedure :: has_collapsed
     procedure :: make_room
+    procedure :: fit_series
     procedure :: whole_disk
     procedure :: place_disk
     procedure :: mass_of
@@ -141,6 +144,27 @@ contains
     yes = any(self%box%periodic) .or. self%law%contact_time > 0 .or. self%features%rotation .or. self%features%orientation
   end function has_extra
 
+  !> Whether an inelastic collapse has occurred.
+  pure function has_collapsed(self) result(yes)
+    class(simulation_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%tally%collapse < never
+    if (yes) yes = self%tally%collapse <= self%time()
+  end function has_collapsed
+
+  !> Allocates the series of simultaneous collisions if disks can collapse, and deallocates them otherwise.
+  pure subroutine fit_series(self)
+    class(simulation_t), intent(inout) :: self
+
+    if (self%law%can_collapse() .eqv. allocated(self%series)) return
+    if (allocated(self%series)) then
+      deallocate (self%series)
+    else
+      allocate (self%series(self%n_disks()))
+    end if
+  end subroutine fit_series
+
   !> Allocates the arrays for n disks.
   pure subroutine make_room(self, n, like)
     class(simulation_t), intent(inout) :: self    !! in: simulation with all values given by the input
@@ -154,6 +178,7 @@ contains
     if (self%has_extra()) allocate (self%extra(n))
     if (own_masses) allocate (self%own_mass(n), source=0.0_real64)
     if (self%drive%moves_disks() .and. .not. present(like)) allocate (self%recycled(n), source=0_int64)
+    if (.not. present(like)) call self%fit_series()
   end subroutine make_room
 
   !> All data of disk i.

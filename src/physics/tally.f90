@@ -2,7 +2,7 @@
 !> of the terms or on the domains in which they were added.
 module tally
   use exact_sums, only: exact_sum_t
-  use kinds, only: int64, never, real64
+  use kinds, only: int32, int64, never, real64
   implicit none
   private
   public :: kinetic_flux, tally_t
@@ -38,12 +38,21 @@ module tally
   !> collisions with the surface [energy].
   integer, parameter, public :: impulse = 1, gain = 3
 
+  !> Largest number of collisions in a finite series, per square of the number of disks, if the coefficient of restitution is at
+  !> least 3 % above the limit of collapse of a row: the largest value among rows of up to 12 equal disks that touch, free or at a
+  !> wall, is 9.7.
+  integer(int64), parameter :: longest_finite = 10
+
   type :: tally_t
     integer(int64) :: events = 0                   !! number of events
     integer(int64) :: collisions = 0               !! number of collisions of disks
-    !> Number of simultaneous inelastic collisions, see `encounters: count_simultaneous_collision`.
+    !> Number of collisions of disks that had both already collided at the same time: see `collapses`.
     integer(int64) :: simultaneous = 0
-    real(real64) :: collapse = never               !! time of the first inelastic collapse, since the start of the run [time]
+    !> Number of collisions, and number of disks, in the longest series that is longer than `longest_finite`; 0 if there is none
+    integer(int64) :: series(2) = 0
+    !> Time of the first inelastic collapse, since the start of the run. The time is known shortly before. [time]
+    real(real64) :: collapse = never
+    integer(int64) :: unexamined = 0               !! number of collisions in a domain that only the serial engine can examine
     type(exact_sum_t) :: sum(size(sums))
     integer(int64), allocatable :: surface_collisions(:)  !! (surfaces) number of collisions with each surface
     type(exact_sum_t), allocatable :: surface_sums(:, :)   !! (3,surfaces) impulse along x and y, and energy gained by disks
@@ -51,6 +60,7 @@ module tally
     procedure :: make_room
     procedure :: choose_units
     procedure :: total
+    procedure :: note_series
     procedure :: include
     procedure :: clear
   end type tally_t
@@ -98,15 +108,23 @@ contains
     total = self%sum(k)%value()
   end function total
 
-  !> Adds the counters and sums of another tally with the same units.
+  !> Records the present length of a series of simultaneous collisions, if no finite series of equal disks in a row is as long.
+  pure subroutine note_series(self, collisions, disks)
+    class(tally_t), intent(inout) :: self
+    integer(int64), intent(in) :: collisions
+    integer(int32), intent(in) :: disks
+
+    if (collisions > max(longest_finite*int(disks, int64)**2, self%series(1))) self%series = [collisions, int(disks, int64)]
+  end subroutine note_series
+
+  !> Adds the counters and sums of another tally with the same units. The other tally belongs to a domain, which does not examine
+  !> series of simultaneous collisions.
   pure subroutine include(self, other)
     class(tally_t), intent(inout) :: self
     type(tally_t), intent(in) :: other
 
     self%events = self%events + other%events
     self%collisions = self%collisions + other%collisions
-    self%simultaneous = self%simultaneous + other%simultaneous
-    self%collapse = min(self%collapse, other%collapse)
     call self%sum%include(other%sum)
     self%surface_collisions = self%surface_collisions + other%surface_collisions
     call self%surface_sums%include(other%surface_sums)
@@ -119,7 +137,9 @@ contains
     self%events = 0
     self%collisions = 0
     self%simultaneous = 0
+    self%series = 0
     self%collapse = never
+    self%unexamined = 0
     call self%sum%clear()
     self%surface_collisions = 0
     call self%surface_sums%clear()

@@ -1,0 +1,303 @@
+!> Detects inelastic collapses, which are unbounded numbers of collisions in a finite time, and counts the collisions that occur at
+!> one time.
+!>
+!> If the gap of two disks was negligible before they collided, the collision may belong to a collapse. Whether it does cannot be
+!> seen from the simulation itself: near a limit of collapse, rounding errors of the positions and of a common velocity determine
+!> the motion before time stops. The disks that almost touch are therefore copied to a cluster, whose collisions are followed without
+!> such rounding errors (see `clusters`). The verdict depends on the state at a collision alone, and not on the search, the number
+!> of threads or the times at which the run pauses.
+module collapses
+  use kinds, only: int32, int64, never, real64
+  use box_geometry, only: wall_normal
+  use box_sides, only: bounds
+  use clusters, only: cluster_t, contact_t, most_disks
+  use disks, only: disk_t, advance_disk
+  use encounters, only: are_in_contact, relative_motion
+  use partners, only: axis_of, n_sides, obstacle_code, sense_of
+  use shapes, only: magnitude
+  use simulation_state, only: simulation_t
+  implicit none
+  private
+  public :: watch
+
+  !> Largest relative displacement of two disks since the later of their previous events, and largest decrease of their gap, for
+  !> which a collision is examined. [sum of the radii]
+  real(real64), parameter :: still = 2.0_real64**(-10), negligible = 2.0_real64**(-33)
+  !> Smallest decrease of a gap that rounding errors do not determine [spacing of the coordinates]
+  real(real64), parameter :: resolved = 4.0_real64
+  !> Largest gap between neighbouring disks of a cluster, and largest gap between a disk of the cluster and the colliding disks.
+  !> [sum of the radii]
+  real(real64), parameter :: reach = 0.125_real64, farthest = 16.0_real64
+
+contains
+
+  !> Examines the collision of disks i and j at the time t before it is executed.
+  subroutine watch(sim, i, j, t, is_part)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: t
+    logical, intent(in) :: is_part                   !! whether `sim` is a domain, which lacks disks of the cluster
+    real(real64) :: s, dx(2), dv(2)
+    logical :: is_resolved                           ! whether rounding errors are smaller than the decrease of the gap
+
+    associate (p => sim%disk(i), q => sim%disk(j))
+      s = t - max(p%clock, q%clock)
+      dv = q%v - p%v
+      if (s*s*(dv(1)*dv(1) + dv(2)*dv(2)) > (still*(p%radius + q%radius))**2) return
+    end associate
+    if (are_in_contact(sim, i, j, t)) return
+    call relative_motion(sim, i, j, t, dx, dv)
+    if (-dot_product(dx, dv)*s > negligible*dot_product(dx, dx)) return
+    if (is_part) then
+      sim%tally%unexamined = sim%tally%unexamined + 1
+      return
+    end if
+    if (.not. s > 0) call count_collision(sim, i, j, t)
+    if (sim%tally%collapse < never) return
+    associate (known => sim%series(sim%tag([i, j])%id)%known_until, events => sim%tag([i, j])%collisions)
+      if (all(events < known)) return
+      is_resolved = -dot_product(dx, dv)*s > resolved*spacing(maxval(abs([sim%disk(i)%x, sim%disk(j)%x])))*magnitude(dx)
+      if (is_resolved .or. any(events > known)) then
+        call judge(sim, i, j, t)
+      else
+        ! A series outlives its prediction because rounding errors now determine the gaps.
+        sim%series(sim%tag([i, j])%id)%known_until = events + 1
+      end if
+    end associate
+  end subroutine watch
+
+  !> Adds a collision to its series: the collisions of one time that are connected through shared disks. The first collision of a
+  !> series is added together with the second.
+  subroutine count_collision(sim, i, j, t)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: t
+    integer(int32) :: a, b
+
+    if (.not. min(sim%disk(i)%clock, sim%disk(j)%clock) < t) sim%tally%simultaneous = sim%tally%simultaneous + 1
+    call join(i)
+    call join(j)
+    a = sim%tag(i)%id
+    b = sim%tag(j)%id
+    call unite(a, b)
+  contains
+
+    !> Begins a series with disk k, unless the disk belongs to a series of this time. If the disk has already collided at this time,
+    !> this collision, with its last partner, is added.
+    subroutine join(k)
+      integer(int32), intent(in) :: k
+
+      associate (tag => sim%tag(k))
+        if (.not. sim%series(tag%id)%time < t) return
+        call begin(tag%id)
+        if (sim%disk(k)%clock < t .or. tag%last_partner <= 0) return
+        if (sim%series(tag%last_partner)%time < t) call begin(tag%last_partner)
+        call unite(tag%id, tag%last_partner)
+      end associate
+    end subroutine join
+
+    !> Begins a series that consists of one disk.
+    subroutine begin(id)
+      integer(int32), intent(in) :: id
+
+      associate (series => sim%series(id))
+        series%time = t
+        series%root = id
+        series%disks = 1
+        series%collisions = 0
+      end associate
+    end subroutine begin
+
+    !> Adds a collision of the disks with the ids a and b, whose series become one.
+    subroutine unite(a, b)
+      integer(int32), intent(in) :: a, b
+      integer(int32) :: root, other
+
+      root = root_of(a)
+      other = root_of(b)
+      associate (into => sim%series(root), from => sim%series(other))
+        if (root /= other) then
+          into%disks = into%disks + from%disks
+          into%collisions = into%collisions + from%collisions
+          from%root = root
+        end if
+        into%collisions = into%collisions + 1
+        call sim%tally%note_series(into%collisions, into%disks)
+      end associate
+    end subroutine unite
+
+    !> The id of the disk that represents the series of a disk.
+    function root_of(id) result(root)
+      integer(int32), intent(in) :: id
+      integer(int32) :: root
+
+      root = id
+      do while (sim%series(root)%root /= root)
+        sim%series(root)%root = sim%series(sim%series(root)%root)%root     ! makes later searches shorter
+        root = sim%series(root)%root
+      end do
+    end function root_of
+  end subroutine count_collision
+
+  !> Determines whether the collisions of disks i and j, and of the disks around them, are a collapse. If the collisions end, they
+  !> are not examined again before the disks have had as many collisions as predicted.
+  subroutine judge(sim, i, j, t)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: t
+    type(cluster_t) :: cluster
+    integer(int32) :: member(most_disks), k
+    integer :: events(most_disks)
+    real(real64) :: limit, duration
+    logical :: endless
+
+    call find_members(sim, i, j, t, member, cluster%n)
+    call list_contacts(sim, t, member(:cluster%n), cluster)
+    limit = sim%drive%time_of(sim%kicks + 1) - sim%box%epoch - t     ! a kick ends a series
+    call cluster%follow(limit, endless, duration, events)
+    if (endless) then
+      sim%tally%collapse = sim%box%epoch + t + duration
+      return
+    end if
+    do k = 1, cluster%n
+      associate (tag => sim%tag(member(k)))
+        associate (known_until => sim%series(tag%id)%known_until)
+          known_until = max(known_until, tag%collisions + events(k))
+        end associate
+      end associate
+    end do
+  end subroutine judge
+
+  !> Lists the disks of the cluster around disks i and j, in the order of their ids: disks that are connected with i through gaps of
+  !> at most `reach`.
+  subroutine find_members(sim, i, j, t, member, n)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: t
+    integer(int32), intent(out) :: member(most_disks), n
+    integer(int32), allocatable :: near(:)           ! indices of the disks that are not far from disk i
+    logical, allocatable :: found(:)
+    integer(int32) :: k, m, first
+
+    first = merge(i, j, sim%tag(i)%id < sim%tag(j)%id)
+    near = pack([(k, k=1, sim%n_disks())], [(gap(first, k) <= farthest, k=1, sim%n_disks())])
+    allocate (found(size(near)))
+    found = near == i .or. near == j
+    member(:2) = [first, i + j - first]
+    n = 2
+    m = 0
+    do while (m < n .and. n < most_disks)
+      m = m + 1
+      do k = 1, size(near, kind=int32)
+        if (found(k) .or. n == most_disks) cycle
+        if (gap(member(m), near(k)) > reach) cycle
+        found(k) = .true.
+        n = n + 1
+        member(n) = near(k)
+      end do
+    end do
+    do k = 2, n                                      ! insertion sort
+      do m = k, 2, -1
+        if (sim%tag(member(m))%id > sim%tag(member(m - 1))%id) exit
+        member([m - 1, m]) = member([m, m - 1])
+      end do
+    end do
+  contains
+
+    !> Gap of two disks, divided by the sum of the radii of disks i and j.
+    function gap(a, b)
+      integer(int32), intent(in) :: a, b
+      real(real64) :: gap, dx(2), dv(2)
+
+      call relative_motion(sim, a, b, t, dx, dv)
+      gap = (magnitude(dx) - sim%disk(a)%radius - sim%disk(b)%radius)/(sim%disk(i)%radius + sim%disk(j)%radius)
+    end function gap
+  end subroutine find_members
+
+  !> Lists all contacts in a cluster, in the order in which simultaneous collisions are executed.
+  subroutine list_contacts(sim, t, member, cluster)
+    type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: t
+    integer(int32), intent(in) :: member(:)
+    type(cluster_t), intent(inout) :: cluster
+    integer(int32) :: a, b
+    type(contact_t) :: contact
+
+    allocate (cluster%contact(0))
+    do a = 1, cluster%n
+      cluster%mass(a) = sim%mass_of(member(a))
+      cluster%contact = [cluster%contact, surface_contacts(sim, t, member(a), a)]
+      do b = a + 1, cluster%n
+        contact = contact_of(a, b)
+        if (contact%gap <= 2*reach*(sim%disk(member(a))%radius + sim%disk(member(b))%radius)) &
+          cluster%contact = [cluster%contact, contact]
+      end do
+    end do
+  contains
+
+    !> The contact of two disks.
+    function contact_of(a, b) result(contact)
+      integer(int32), intent(in) :: a, b
+      type(contact_t) :: contact
+      real(real64) :: dx(2), dv(2), distance, sigma
+
+      call relative_motion(sim, member(a), member(b), t, dx, dv)
+      distance = magnitude(dx)
+      sigma = sim%disk(member(a))%radius + sim%disk(member(b))%radius
+      contact%first = a
+      contact%second = b
+      contact%normal = dx/distance
+      contact%gap = max((dot_product(dx, dx) - sigma*sigma)/(distance + sigma), 0.0_real64)
+      contact%closing = -dot_product(dv, contact%normal)
+      contact%opening = (contact%normal(1)*dv(2) - contact%normal(2)*dv(1))**2/distance
+      contact%restitution = sim%law%restitution(sim%tag(member(a))%species, sim%tag(member(b))%species)
+      contact%by_speed = sim%law%by_speed
+    end function contact_of
+  end subroutine list_contacts
+
+  !> Contacts of disk i, whose number in the cluster is `number`, with sides and obstacles. A curved surface is replaced by its
+  !> tangent, and a thermal wall by an elastic wall.
+  function surface_contacts(sim, t, i, number) result(contacts)
+    type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: t
+    integer(int32), intent(in) :: i, number
+    type(contact_t), allocatable :: contacts(:)
+    type(disk_t) :: disk
+    real(real64) :: d(2), normal(2), lower(2), upper(2), position   ! [length]
+    integer(int32) :: side, k
+
+    allocate (contacts(0))
+    disk = sim%disk(i)
+    call advance_disk(disk, sim%box%gravity, t)
+    call bounds(sim%box, t, lower, upper)
+    do k = 1, n_sides
+      side = 1 - k
+      if (sim%box%periodic(axis_of(side))) cycle
+      normal = -wall_normal(sim%box, side, disk%x, disk%v)
+      position = merge(lower(axis_of(side)), upper(axis_of(side)), sense_of(side) < 0)
+      call add(sense_of(side)*(position - disk%x(axis_of(side))) - disk%radius, normal, sim%box%side_velocity(k, t), k)
+    end do
+    do k = 1, sim%box%n_obstacles()
+      associate (shape => sim%box%obstacle(k)%shape)
+        d = shape%from_nearest(disk%x, sim%box%images(), heading=-disk%v)
+        if (shape%gap(d, disk%radius) > reach*disk%radius) cycle
+        call add(shape%gap(d, disk%radius), -shape%normal(d, heading=-disk%v), 0.0_real64, sim%box%surface_of(obstacle_code(k)))
+      end associate
+    end do
+  contains
+
+    !> Adds a contact if its gap is not too large.
+    subroutine add(gap, normal, velocity, surface)
+      real(real64), intent(in) :: gap, normal(2)     !! [length], unit vector towards the surface
+      real(real64), intent(in) :: velocity           !! velocity of the surface towards the disk [length/time]
+      integer, intent(in) :: surface                 !! index of the surface
+
+      if (gap > reach*disk%radius) return
+      associate (law => sim%box%surface(surface)%law)
+        contacts = [contacts, contact_t(number, 0, normal, max(gap, 0.0_real64), dot_product(disk%v, normal) + velocity, &
+          0.0_real64, merge(law%restitution, 1.0_real64, .not. law%temperature > 0), law%by_speed)]
+      end associate
+    end subroutine add
+  end function surface_contacts
+
+end module collapses
