@@ -25,7 +25,7 @@ module library
   use system, only: seconds
   use team, only: make_team
   use texts, only: eol, growing_text_t, lines_of, lower_case, place_of, text_t, written, written_exactly
-  use timeline, only: adapted_iterations, advance_once, collapse_note
+  use timeline, only: adapted_iterations, advance_once, collapse_note, report_rest
   use variable_help, only: input_of
   use variables, only: change_of, in_motion, obstacle_groups, row_of, table, words_of
   implicit none
@@ -114,9 +114,12 @@ contains
     integer(c_int) :: code
     type(session_t), pointer :: session
     type(error_t), allocatable :: error
+    type(stop_rule_t) :: rule
 
     session => session_of(handle)
-    call advance_to(session, goal_of(session, time, collisions, events), patience, code, error)
+    rule = goal_of(session, time, collisions, events)
+    call advance_to(session, rule, patience, code, error)
+    if (code == 0) call report_rest(session%evolution, session%sim, rule%limits, error)
     if (allocated(error) .or. code /= going_on) code = answer(error, message, room)
   end function advance
 

@@ -23,7 +23,7 @@ module run
   use system, only: folder_of, is_folder, print_text, seconds
   use tally, only: dissipated, drive_energy
   use texts, only: counted, eol, legible, size_text, written
-  use timeline, only: adapted_iterations, advance_once, collapse_note
+  use timeline, only: adapted_iterations, advance_once, collapse_note, report_rest
   implicit none
   private
   public :: perform_run
@@ -250,6 +250,7 @@ contains
       end if
       call run%line%report(run%sim, run%stop_rule)
     end do
+    call report_rest(run%evolution, run%sim, run%stop_rule%limits, error)
     call run%line%clear()
   end subroutine main_loop
 

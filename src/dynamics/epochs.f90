@@ -12,7 +12,7 @@ module epochs
   implicit none
   private
   public :: are_crushed, restart_epoch, begin_first_epoch, ends_by_event, ends_by_kick, is_at_rest, last_time, most_events
-  public :: move_epoch, stands_still
+  public :: has_come_to_rest, move_epoch, stands_still
 
   !> Intended number of collisions per disk in an epoch. The time origin moves at the end of each epoch, so that times keep their
   !> precision.
@@ -236,21 +236,37 @@ contains
       .and. sim%tally%events - sim%events_then >= max(collapse_length, collapse_length_per_disk*sim%n_disks())
   end function stands_still
 
+  !> Whether all disks under gravity are at rest at the end of an epoch. The test is made only there, so that it does not depend on
+  !> the times at which the caller pauses. A state in which the epoch has ended in spite of this remains the last state of the run.
+  pure function has_come_to_rest(sim) result(yes)
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+
+    yes = sim%box%has_gravity() .and. sim%tally%events > sim%epoch_events &
+      .and. (sim%tally%events >= most_events(sim) .or. sim%now >= sim%epoch_end)
+    if (yes) yes = is_at_rest(sim)
+  end function has_come_to_rest
+
   !> Whether all disks are at rest. A disk that bounces inelastically on a surface at rest makes infinitely many bounces in a finite
   !> time, because the durations of the bounces form a convergent series. With gravity a disk is considered at rest if its last
-  !> bounce occurred less than `negligible_time` ago, and its remaining bounces would end within `negligible_time`. Without gravity
-  !> a disk is at rest if it does not move.
+  !> bounce occurred less than `negligible_time` ago, and its remaining bounces would end within `negligible_time`. Bounces that are
+  !> lower than an eighth of the spacing of the coordinates are rest, too, because rounding errors can make them endless. Without gravity a disk
+  !> is at rest if it does not move.
   pure function is_at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
-    real(real64) :: slow                           ! [length/time]
+    real(real64) :: slow, long                     ! [length/time], [time]
     integer(int32) :: i
 
-    slow = magnitude(sim%box%gravity)*sim%negligible_time
+    long = sim%negligible_time
     yes = .true.
     do i = 1, sim%n_disks()
-      yes = magnitude(sim%velocity(i)) <= slow .and. abs(sim%spin(i))*sim%disk(i)%radius <= slow
-      if (sim%box%has_gravity()) yes = yes .and. sim%now - sim%disk(i)%clock <= sim%negligible_time
+      if (sim%box%has_gravity()) then
+        long = max(sim%negligible_time, sqrt(spacing(maxval(abs(sim%disk(i)%x)))/magnitude(sim%box%gravity)))
+        yes = sim%now - sim%disk(i)%clock <= long
+      end if
+      slow = magnitude(sim%box%gravity)*long
+      yes = yes .and. magnitude(sim%velocity(i)) <= slow .and. abs(sim%spin(i))*sim%disk(i)%radius <= slow
       if (.not. yes) return
     end do
   end function is_at_rest

@@ -7,7 +7,7 @@
 !> were last set, because the earlier energy determines the magnitude of the rounding errors.
 module stop_rules
   use kinds, only: int32, int64, never, real64
-  use epochs, only: is_at_rest, stands_still
+  use epochs, only: has_come_to_rest, is_at_rest, stands_still
   use evolution, only: evolution_t, limits_t
   use simulation_state, only: simulation_t
   use tally, only: dissipated
@@ -82,7 +82,9 @@ contains
     logical :: yes
 
     yes = sim%has_reached(self%limits%time) .or. self%limits%reached(sim%tally)
-    if (.not. yes .and. self%limits%at_rest) yes = stands_still(sim) .and. is_at_rest(sim)
+    if (yes .or. .not. self%limits%at_rest) return
+    yes = has_come_to_rest(sim)
+    if (.not. yes) yes = stands_still(sim) .and. is_at_rest(sim)
   end function is_met
 
   !> Whether the disks are at rest and the input contains the stop rule `at_rest`. The function `rests` is needed in simulations

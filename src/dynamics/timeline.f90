@@ -4,7 +4,8 @@
 module timeline
   use encounters, only: encounter_text
   use box_geometry, only: wall_normal
-  use epochs, only: are_crushed, ends_by_event, ends_by_kick, is_at_rest, last_time, most_events, move_epoch, stands_still
+  use epochs, only: are_crushed, ends_by_event, ends_by_kick, has_come_to_rest, is_at_rest, last_time, most_events, move_epoch
+  use epochs, only: stands_still
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t, is_full
   use evolution, only: evolution_t, limits_t
@@ -18,7 +19,7 @@ module timeline
   use texts, only: about, counted, written
   implicit none
   private
-  public :: adapted_iterations, advance, advance_once, next_kick, collapse_note
+  public :: adapted_iterations, advance, advance_once, next_kick, collapse_note, report_rest
 
   real(real64), parameter :: pause_interval = 0.05_real64  !! intended time between two checks of signals and of the wall clock [s]
 
@@ -114,17 +115,39 @@ contains
       if (are_crushed(sim)) then
         call fail(error, exit_broken, "side.end_time: the side crushes the disks, whose energy has grown a million times; " &
           //"choose a time before "//about(sim%time()))
-      else if (stands_still(sim)) then
+      else if (stands_still(sim) .or. has_come_to_rest(sim)) then
         if (limits%at_rest .and. is_at_rest(sim)) return
-        associate (i => evolution%last_event(1), code => evolution%last_event(2))
-          call fail(error, exit_broken, standstill(sim, i, code))
-        end associate
+        call fail_at_standstill(evolution, sim, error)
       else
         call move_epoch(sim, by_event)
         call evolution%start(sim)
       end if
     end subroutine end_epoch
   end subroutine advance_once
+
+  !> Reports that events no longer advance the time.
+  subroutine fail_at_standstill(evolution, sim, error)
+    class(evolution_t), intent(in) :: evolution
+    type(simulation_t), intent(in) :: sim
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (i => evolution%last_event(1), code => evolution%last_event(2))
+      call fail(error, exit_broken, standstill(sim, i, code))
+    end associate
+  end subroutine fail_at_standstill
+
+  !> Reports that all disks have come to rest, if a run has reached its number of events or collisions in this state. With a later
+  !> limit, time would no longer advance.
+  subroutine report_rest(evolution, sim, limits, error)
+    class(evolution_t), intent(in) :: evolution
+    type(simulation_t), intent(in) :: sim
+    type(limits_t), intent(in) :: limits
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error) .or. limits%at_rest .or. .not. (sim%epoch_end > 0 .and. limits%reached(sim%tally))) return
+    if (sim%box%has_gravity() .and. evolution%last_event(1) > 0 .and. is_at_rest(sim)) &
+      call fail_at_standstill(evolution, sim, error)
+  end subroutine report_rest
 
   !> Number of iterations of the event loop that take about the wall-clock time `pause_interval`. The number of iterations is
   !> increased only after a call that used all its iterations, and not after a call that reached a limit early. In a run with many

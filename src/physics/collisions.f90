@@ -78,7 +78,8 @@ contains
     class(contact_law_t), intent(in) :: self
     logical :: yes
 
-    yes = any(self%restitution < 1) .and. .not. self%contact_time > 0
+    yes = allocated(self%restitution) .and. .not. self%contact_time > 0
+    if (yes) yes = any(self%restitution < 1)
   end function can_collapse
 
   !> Coefficient of restitution at an impact velocity.
