@@ -53,10 +53,14 @@ contains
       return
     end if
     if (.not. s > 0) call count_collision(sim, i, j, t)
-    if (sim%tally%collapse < never) return
+    is_resolved = -dot_product(dx, dv)*s > resolved*spacing(maxval(abs([sim%disk(i)%x, sim%disk(j)%x])))*magnitude(dx)
+    if (sim%tally%collapse < never) then
+      ! Rounding errors of the positions can stop a collapse before its limit point.
+      if (.not. is_resolved) sim%tally%collapse = min(sim%tally%collapse, sim%box%epoch + t)
+      return
+    end if
     associate (known => sim%series(sim%tag([i, j])%id)%known_until, events => sim%tag([i, j])%collisions)
       if (all(events < known)) return
-      is_resolved = -dot_product(dx, dv)*s > resolved*spacing(maxval(abs([sim%disk(i)%x, sim%disk(j)%x])))*magnitude(dx)
       if (is_resolved .or. any(events > known)) then
         call judge(sim, i, j, t)
       else

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ricochet import Simulation, read_run
+from ricochet import ProgramError, Simulation, read_run
 
 from whole_runs import BROKEN, FINISHED, STOPPED, USAGE, differences, one_line, write_input
 
@@ -158,3 +158,29 @@ def test_the_contact_time_that_is_proposed_prevents_the_collapse(
     )
     run = ricochet(*COMMAND, "--force", f"--set=contact.contact_time={said[1]}")
     assert run.returncode == FINISHED and "collapse" not in run.stderr + run.stdout
+
+
+@pytest.mark.parametrize("stop", ["events=5000", "events=250", "time=9"])
+def test_disks_at_rest_end_a_run_alike_whatever_stops_it(ricochet, tmp_path, stop):
+    """A ball at rest ends the run with the same message, also in memory."""
+    write_input(tmp_path, BALL.format(height=2, restitution=0.5, more=""))
+    run = ricochet(*COMMAND, "--set=stop.at_rest=.false.", f"--set=stop.{stop}")
+    assert run.returncode == BROKEN and "disk 1 (ball) and the bottom side" in one_line(run)
+    ball = Simulation(tmp_path / "gas.nml", {"stop.at_rest": False, "stop.events": 5000})
+    with pytest.raises(ProgramError, match="time no longer advances"):
+        ball.advance(events=300)
+
+
+def test_bounces_lower_than_the_spacing_of_the_coordinates_are_rest(ricochet, tmp_path):
+    """In a symmetric corner rounding errors make the bounces of a disk endless."""
+    write_input(
+        tmp_path,
+        """&box gravity = 0, -1 / &wall points = 0.3, 0.7, 0.5, 0.5, 0.7, 0.7 /
+        &species radius = 0.0625 position = 0.5, 0.7 velocity = 0, 0 /
+        &contact restitution = 0.5 / &stop at_rest = .true. events = 20000 /""",
+    )
+    run = ricochet(*COMMAND)
+    hits = int(re.search(r"obstacle_collisions = (\d+)", run.stdout)[1])
+    assert run.returncode == FINISHED and hits < 20000
+    run = ricochet(*COMMAND, "--force", "--set=stop.at_rest=.false.", "--set=stop.time=9")
+    assert run.returncode == BROKEN and "time no longer advances" in one_line(run)

@@ -1,0 +1,226 @@
+"""Inelastic collapse: the report of the program against a calculation with 200 digits.
+
+The random systems are rows of two to eight disks, free, at a wall or nearly straight in the plane,
+with equal or unequal masses and with a common velocity.
+"""
+
+import re
+from decimal import Decimal, localcontext
+from math import pi, tan
+
+import numpy as np
+import pytest
+from ricochet import Simulation, read_run
+
+from whole_runs import FINISHED, STOPPED, write_input
+
+RADIUS = 0.0625
+KINDS = ("row", "wall", "plane", "masses")
+#: Stable limit of the collapse of three disks in the plane (Zhou and Kadanoff 1996).
+PLANE_LIMIT = 0.0557
+COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet", "--force"]
+
+
+def limit(disks: int, walls: int) -> float:
+    """Return the limit of collapse of a row of equal disks (Bernu and Mazighi 1990)."""
+    return tan(pi / 4 * (1 - (2 - walls) / disks)) ** 2
+
+
+class System:
+    """A random row of disks that approach each other."""
+
+    def __init__(self, seed: int):
+        self.rng = rng = np.random.default_rng(seed)
+        self.kind = KINDS[seed % len(KINDS)]
+        self.disks = 3 if self.kind == "plane" else int(rng.integers(2 + (self.kind != "wall"), 9))
+        below = rng.random() < 0.5
+        self.factor = rng.uniform(0.3, 0.97) if below else rng.uniform(1, 1.5)
+        critical = PLANE_LIMIT
+        if self.kind != "plane":
+            critical = limit(self.disks, self.kind == "wall")
+        elif not below:
+            self.factor = max(self.factor, 1.03)
+        self.restitution = min(self.factor * critical, 0.95)
+        self.wall = float(rng.choice([1, self.restitution, rng.random()]))
+        self.x = np.zeros((self.disks, 2))
+        gaps = rng.uniform(0.05, 1, self.disks) * rng.choice([0.1, 1])
+        self.x[:, 0] = np.cumsum(2 * RADIUS + gaps)
+        self.v = np.zeros((self.disks, 2))
+        self.v[:, 0] = -np.sort(rng.uniform(-1, 1, self.disks))
+        self.time, self.common = 20.0, float(rng.choice([0, 2.5, 40, 300]))
+        if self.kind == "wall":
+            self.v[:, 0] = np.sort(rng.uniform(-1.2, -0.8, self.disks))[::-1]
+            speed = float(rng.choice([1, 40, 300]))
+            self.v *= speed
+            self.time, self.common = 12 / speed, 0
+        if self.kind == "plane":
+            self.x[:, 1] = rng.uniform(-1, 1, 3) * 10 ** rng.uniform(-7, -2)
+        self.mass = np.ones(self.disks)
+        if self.kind == "masses":
+            self.mass = 10 ** rng.uniform(-1, 1, self.disks)
+
+    def text(self, order=None, length=1.0, time=1.0) -> str:
+        """Return the input, for an order of the disks and for other units of length and time."""
+        order = np.arange(self.disks) if order is None else order
+        x, v = self.x * length, (self.v + [self.common, 0]) * (length / time)
+        end = (70 + self.time * self.common) * length
+        start = 0.0 if self.kind == "wall" else -70 * length
+        text = f"&box upper = {end!r}, {length!r} lower = {start!r}, {-length!r} /"
+        text += f" &contact restitution = {self.restitution!r} wall_restitution = {self.wall!r}"
+        text += f" wall_rule = 'normal' / &stop time = {self.time * time!r} /\n"
+        for k in order:
+            place, speed = (", ".join(repr(float(a)) for a in b[k]) for b in (x, v))
+            text += f"&species name = 's{k}' radius = {RADIUS * length!r} position = {place}"
+            text += f" velocity = {speed} mass = {float(self.mass[k])!r} /\n"
+        return text
+
+    def collapses(self) -> bool:
+        """Return whether the collisions never end, by a calculation with 200 digits.
+
+        The relative velocities of a collapse have decreased by 150 powers of ten, or there have
+        been 2500 collisions; the longest finite series of the random systems are far shorter.
+        """
+        with localcontext() as context:
+            context.prec = 200
+            return self._goes_on([[Decimal(float(a)) for a in p] for p in self.x])
+
+    def _goes_on(self, x: list) -> bool:
+        v = [[Decimal(float(a)) for a in p] for p in self.v]
+        m = [Decimal(float(a)) for a in self.mass]
+        xi, wall, sigma = Decimal(self.restitution), Decimal(self.wall), 2 * Decimal(RADIUS)
+        left, last, flat = Decimal(self.time), None, self.kind != "plane"
+        pairs = [(i, j) for j in range(self.disks) for i in range(j) if j == i + 1 or not flat]
+        for _ in range(2500):
+            first = None
+            for i, j in pairs:
+                if last == (i, j):
+                    continue
+                s = contact_time(x[i], x[j], v[i], v[j], sigma, flat)
+                if s is not None and (first is None or s < first[0]):
+                    first = (s, i, j)
+            if self.kind == "wall" and v[0][0] < 0 and last != (0, 0):
+                s = max((x[0][0] - sigma / 2) / -v[0][0], Decimal(0))
+                if first is None or s < first[0]:
+                    first = (s, 0, 0)
+            if first is None or first[0] > left:
+                return False
+            s, i, j = first
+            left -= s
+            x = [[a + b * s for a, b in zip(p, u, strict=True)] for p, u in zip(x, v, strict=True)]
+            last = (i, j)
+            if i == j:
+                v[0][0] *= -wall
+                continue
+            dx = [b - a for a, b in zip(x[i], x[j], strict=True)]
+            n = [a / (dx[0] ** 2 + dx[1] ** 2).sqrt() for a in dx]
+            g = sum((b - a) * c for a, b, c in zip(v[i], v[j], n, strict=True))
+            if abs(g) < Decimal("1e-150"):
+                return True
+            for k in (0, 1):
+                impulse = (1 + xi) * g * n[k] / (m[i] + m[j])
+                v[i][k] += impulse * m[j]
+                v[j][k] -= impulse * m[i]
+        return True
+
+
+def contact_time(x, y, v, w, sigma, flat):
+    """Return the time until two disks touch, or None."""
+    dx, dv = ([b - a for a, b in zip(p, q, strict=True)] for p, q in ((x, y), (v, w)))
+    if flat:
+        return max(dx[0] - sigma, Decimal(0)) / -dv[0] if dv[0] < 0 else None
+    b, a = dx[0] * dv[0] + dx[1] * dv[1], dv[0] ** 2 + dv[1] ** 2
+    c = max(dx[0] ** 2 + dx[1] ** 2 - sigma**2, Decimal(0))
+    if b >= 0 or b * b <= a * c:
+        return None
+    return c / ((b * b - a * c).sqrt() - b)
+
+
+def reported(ricochet, folder, text) -> str:
+    """Return the report of a collapse, or an empty text."""
+    write_input(folder, text)
+    run = ricochet(*COMMAND)
+    said = re.search(r".*collapse.*", run.stdout + run.stderr)
+    return said[0] if said else ""
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_run_reports_exactly_the_collapses(ricochet, tmp_path, seed):
+    system = System(seed)
+    assert bool(reported(ricochet, tmp_path, system.text())) == system.collapses()
+
+
+@pytest.mark.check
+def test_many_runs_report_exactly_the_collapses(ricochet, tmp_path, rng):
+    for seed in rng.integers(2**40, size=500):
+        system = System(int(seed))
+        assert bool(reported(ricochet, tmp_path, system.text())) == system.collapses(), seed
+
+
+@pytest.mark.parametrize("seed", range(100, 112))
+def test_the_report_depends_neither_on_the_order_nor_on_binary_units(ricochet, tmp_path, seed):
+    """Other orders give the same verdict; binary units multiply the time of the collapse."""
+    system = System(seed)
+    said = reported(ricochet, tmp_path, system.text())
+    order = system.rng.permutation(system.disks)
+    assert bool(reported(ricochet, tmp_path, system.text(order))) == bool(said)
+    length, time = (2.0 ** int(power) for power in system.rng.integers(-60, 60, 2))
+    again = reported(ricochet, tmp_path, system.text(length=length, time=time))
+    assert bool(again) == bool(said)
+    if "occurred" in said:
+        ends = [float(re.search(r"at time ([^;]+)", text)[1]) for text in (said, again)]
+        assert ends[1] == pytest.approx(ends[0] * time, rel=1e-5)
+
+
+#: Three disks with a collapse, 9 % below the limit: 18 of 41 collisions take no time.
+THREE = """&box lower = -50, -1 upper = 50, 1 / &contact restitution = 0.065 /
+&species radius = 0.1 position = -1, 0, 0, 0, 1.3, 0 velocity = 1, 0, 0, 0, -1.1, 0 /
+&stop time = 10 /
+"""
+
+
+def test_a_run_in_parts_reports_the_same_collapse(ricochet, tmp_path):
+    """The report is the same for a run in parts, for time slices and for a copy in memory."""
+    write_input(tmp_path, THREE)
+    run = ricochet("gas.nml", "-o", "gas.h5")
+    note = re.search(r"\nnote = (.*)", run.stdout)[1]
+    assert run.returncode == FINISHED and run.stderr.endswith(f"note: {note}\n")
+    assert "collapsed" in read_run(tmp_path / "gas.h5").nature
+    assert "18 collisions took no time" in note
+    command = ["gas.nml", "-o", "parts.h5", "--quiet", "--set=stop.wall_clock=1e-9"]
+    run = ricochet(*command)
+    while run.returncode == STOPPED:
+        run = ricochet(*command, "--resume")
+    assert run.returncode == FINISHED and f"\nnote = {note}\n" in run.stdout
+    disks, whole = (Simulation(tmp_path / "gas.nml") for _ in range(2))
+    said = []
+    for events in range(1, 42):
+        disks = disks.advance(events=events).copy()
+        said.append("collapsed" in disks.nature)
+        assert said[-1] == ("collapsed" in whole.advance(events=events).nature)
+    assert said == sorted(said) and not said[17] and said[-1]
+
+
+def test_a_collapse_that_a_kick_or_a_change_prevents_is_not_reported(ricochet, tmp_path):
+    """A change of the velocities after the first collisions of a collapse ends the collapse."""
+    write_input(tmp_path, THREE)
+    disks = Simulation(tmp_path / "gas.nml")
+    disks.advance(events=18)
+    disks.velocity = disks.velocity + [[-1, 0], [0, 0], [1, 0]]
+    disks.advance(time=10)
+    assert "collapsed" not in disks.nature
+
+
+@pytest.mark.parametrize("restitution", [0.3, 0.8])
+def test_a_long_series_is_stated_in_the_summary(ricochet, tmp_path, restitution):
+    """Two disks between a disk and a wall: collisions without end, which the summary counts."""
+    write_input(
+        tmp_path,
+        f"""&box upper = 2, 1 / &contact restitution = {restitution} wall_rule = 'normal' /
+        &species radius = 0.0625 position = 0.5, 0.5, 1.5625, 0.5, 1.6875, 0.5, 1.8125, 0.5,
+        1.9375, 0.5 velocity = 1, 0, 0, 0, 0, 0, 0, 0, 0, 0 / &stop time = 1.5 /""",
+    )
+    run = ricochet(*COMMAND)
+    said = re.search(r"\nlongest_series = (\d+) collisions of (\d+) disks\n", run.stdout)
+    assert bool(said) == (restitution < limit(5, 1)) == ("\nsimultaneous_collisions" in run.stdout)
+    if said:
+        assert int(said[1]) > 10 * int(said[2]) ** 2
