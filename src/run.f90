@@ -9,7 +9,7 @@ module run
   use evolution, only: evolution_t, limits_t
   use initial_state, only: describe_system
   use memory, only: memory_needed
-  use kinds, only: int64, never, real64
+  use kinds, only: int64, real64
   use observables, only: energies
   use output, only: estimate_size, output_t
   use partners, only: n_sides

@@ -250,8 +250,8 @@ contains
   !> Whether all disks are at rest. A disk that bounces inelastically on a surface at rest makes infinitely many bounces in a finite
   !> time, because the durations of the bounces form a convergent series. With gravity a disk is considered at rest if its last
   !> bounce occurred less than `negligible_time` ago, and its remaining bounces would end within `negligible_time`. Bounces that are
-  !> lower than an eighth of the spacing of the coordinates are rest, too, because rounding errors can make them endless. Without gravity a disk
-  !> is at rest if it does not move.
+  !> lower than an eighth of the spacing of the coordinates are rest, too, because rounding errors can make them endless. Without
+  !> gravity a disk is at rest if it does not move.
   pure function is_at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes

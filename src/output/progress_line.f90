@@ -20,9 +20,11 @@ module progress_line
     real(real64) :: clock(0:window - 1) = 0.0_real64       !! [s]
     real(real64) :: share(0:window - 1) = 0.0_real64       !! completed fraction of the run
     integer(int64) :: collisions(0:window - 1) = 0_int64
+    integer(int64) :: events(0:window - 1) = 0_int64       !! number of events at each of the last reports
   contains
     procedure :: start
     procedure :: report
+    procedure, private :: bounces
   end type progress_line_t
 
 contains
@@ -44,7 +46,7 @@ contains
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(stop_rule_t), intent(in) :: stop_rule
-    character(len=160) :: line
+    character(len=200) :: line
     real(real64) :: span, rate, left
     integer :: first, last
 
@@ -58,8 +60,21 @@ contains
     if (self%share(last) > self%share(first)) left = (1 - self%share(last))*span/(self%share(last) - self%share(first))
     write (line, "(""t "",g0.6,""  "",f5.1,"" %  "",i0,"" collisions  "",a,"" per s  ETA "",a)") sim%time(), &
       100*self%share(last), sim%tally%collisions, about(max(rate, 1.0_real64)), clock_text(left)
+    if (self%bounces(sim, first, last)) line = trim(line)//"  slow: disks bounce on walls, which contact.contact_time prevents"
     call self%show(trim(line))
   end subroutine report
+
+  !> Whether almost all events between two reports were bounces on walls that dissipate energy, under gravity.
+  pure function bounces(self, sim, first, last) result(yes)
+    class(progress_line_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    integer, intent(in) :: first, last                !! positions of the two reports
+    logical :: yes
+    integer(int64), parameter :: many = 100           ! number of events per collision
+
+    yes = sim%n_disks() > 1 .and. sim%box%has_gravity() .and. sim%box%has_lossy_walls() &
+      .and. self%events(last) - self%events(first) > many*(1 + self%collisions(last) - self%collisions(first))
+  end function bounces
 
   !> Records the present time, the completed fraction of the run and the number of collisions. A report calculates average rates
   !> from the difference between the latest record and an earlier record.
@@ -73,6 +88,7 @@ contains
     self%clock(k) = seconds()
     self%share(k) = stop_rule%share(sim, self%clock(k) - self%started)
     self%collisions(k) = sim%tally%collisions
+    self%events(k) = sim%tally%events
     self%n = self%n + 1
   end subroutine remember
 

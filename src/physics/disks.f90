@@ -57,7 +57,8 @@ module disks
   !> `collapses`.
   type :: series_t
     real(real64) :: time = -never               !! time of the last series, relative to the time origin `box%epoch` [time]
-    integer(int32) :: root = 0                  !! id of a disk of the same series; this leads to the disk that represents the series
+    !> Id of a disk of the same series, which leads to the disk that represents the series
+    integer(int32) :: root = 0
     integer(int32) :: disks = 0                 !! number of disks in the series that this disk represents
     integer(int64) :: collisions = 0            !! number of collisions in the series that this disk represents
     integer(int64) :: known_until = 0           !! number of events of this disk up to which no collapse is possible

@@ -2,11 +2,11 @@
 !> collapse)?
 !>
 !> The disks of a cluster move so little that the normals of their contacts do not change. The state of a cluster is therefore the
-!> gap of each contact and the velocity at which this gap closes, and not the positions and velocities of the disks. Gaps and closing
-!> velocities have no common part that limits their precision: they can decrease by hundreds of powers of ten, as in a collapse,
-!> without becoming dominated by rounding errors. The motion of the disks along their surfaces is included to first order: two disks
-!> that slip past each other at the velocity w separate with the acceleration w**2/r, where r is their distance (Zhou and Kadanoff,
-!> Physical Review E 54, 623 (1996)).
+!> gap of each contact and the velocity at which this gap closes, and not the positions and velocities of the disks. Gaps and
+!> closing velocities have no common part that limits their precision: they can decrease by hundreds of powers of ten, as in a
+!> collapse, without becoming dominated by rounding errors. The motion of the disks along their surfaces is included to first order:
+!> two disks that slip past each other at the velocity w separate with the acceleration w**2/r, where r is their distance (Zhou and
+!> Kadanoff, Physical Review E 54, 623 (1996)).
 module clusters
   use kinds, only: int32, real64
   use collisions, only: speed_law_t

@@ -1,13 +1,13 @@
 !> Detects inelastic collapses, which are unbounded numbers of collisions in a finite time, and counts the collisions that occur at
 !> one time.
 !>
-!> If the gap of two disks was negligible before they collided, the collision may belong to a collapse. Whether it does cannot be
-!> seen from the simulation itself: near a limit of collapse, rounding errors of the positions and of a common velocity determine
-!> the motion before time stops. The disks that almost touch are therefore copied to a cluster, whose collisions are followed without
+!> If the gap of two disks was negligible before they collided, the collision may belong to a collapse. The simulation itself does
+!> not show whether it does: near a limit of collapse, rounding errors of the positions, or of a common velocity, determine the
+!> motion before time stops. The disks that almost touch are therefore copied to a cluster, whose collisions are followed without
 !> such rounding errors (see `clusters`). The verdict depends on the state at a collision alone, and not on the search, the number
 !> of threads or the times at which the run pauses.
 module collapses
-  use kinds, only: int32, int64, never, real64
+  use kinds, only: int32, never, real64
   use box_geometry, only: wall_normal
   use box_sides, only: bounds
   use clusters, only: cluster_t, contact_t, most_disks
@@ -299,7 +299,7 @@ contains
       if (gap > reach*disk%radius) return
       associate (law => sim%box%surface(surface)%law)
         contacts = [contacts, contact_t(number, 0, normal, max(gap, 0.0_real64), dot_product(disk%v, normal) + velocity, &
-          0.0_real64, merge(law%restitution, 1.0_real64, .not. law%temperature > 0), law%by_speed)]
+          0.0_real64, merge(1.0_real64, law%restitution, law%temperature > 0), law%by_speed)]
       end associate
     end subroutine add
   end function surface_contacts

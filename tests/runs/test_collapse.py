@@ -30,6 +30,7 @@ class System:
     """A random row of disks that approach each other."""
 
     def __init__(self, seed: int):
+        """Draw the system with the given seed."""
         self.rng = rng = np.random.default_rng(seed)
         self.kind = KINDS[seed % len(KINDS)]
         self.disks = 3 if self.kind == "plane" else int(rng.integers(2 + (self.kind != "wall"), 9))
@@ -62,7 +63,7 @@ class System:
     def text(self, order=None, length=1.0, time=1.0) -> str:
         """Return the input, for an order of the disks and for other units of length and time."""
         order = np.arange(self.disks) if order is None else order
-        x, v = self.x * length, (self.v + [self.common, 0]) * (length / time)
+        x, v = self.x * length, (self.v + np.array([self.common, 0])) * (length / time)
         end = (70 + self.time * self.common) * length
         start = 0.0 if self.kind == "wall" else -70 * length
         text = f"&box upper = {end!r}, {length!r} lower = {start!r}, {-length!r} /"
@@ -205,7 +206,7 @@ def test_a_collapse_that_a_kick_or_a_change_prevents_is_not_reported(ricochet, t
     write_input(tmp_path, THREE)
     disks = Simulation(tmp_path / "gas.nml")
     disks.advance(events=18)
-    disks.velocity = disks.velocity + [[-1, 0], [0, 0], [1, 0]]
+    disks.velocity = disks.velocity + np.array([[-1, 0], [0, 0], [1, 0]])
     disks.advance(time=10)
     assert "collapsed" not in disks.nature
 

@@ -84,8 +84,8 @@ under certain conditions. A number in parentheses is the standard error of the l
   packing 0.1. At higher packing the same disks collide repeatedly: at packing 0.2 the fraction is
   0.850 for w t_c = 1 (0.86 at low packing) and 0.612 for w t_c = 0.5 (0.62 at low packing). The
   collision rate of a disk is denoted by w.
-- **P10-04, craters without the TC model.** Without the TC model a collapse occurred in 14 of 18
-  runs before a tenth of the energy was left.
+- **P10-04, craters without the TC model.** Without the TC model a collapse occurs in all 12 runs
+  before a tenth of the energy is left. In 7 of them time no longer advances, and the run ends.
 - **P11-01, energy under gravity.** In the published table the centres of the disks start between R
   and 8. In this program a disk lies completely inside its starting region, which therefore ends at
   8 + R.
