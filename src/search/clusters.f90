@@ -15,8 +15,9 @@ module clusters
   public :: cluster_t, contact_t, most_disks
 
   integer(int32), parameter :: most_disks = 40       !! largest number of disks in a cluster
-  !> A series is unbounded if it has more than `longest` collisions per square of the number of disks, or if closing velocities have
-  !> decreased by the factor `slowest`. Finite series are shorter and less slow, except within about 1 % of a limit of collapse.
+  !> A series is unbounded if it has more than `longest` collisions per square of the number of disks that collide, or if closing
+  !> velocities have decreased by the factor `slowest`. Finite series are shorter and less slow, except within about 1 % of a limit
+  !> of collapse.
   integer, parameter :: longest = 24
   real(real64), parameter :: slowest = 1.0e-200_real64
 
@@ -59,7 +60,9 @@ contains
     last = 0
     slow = slowest*maxval(abs(self%contact%closing))
     associate (contact => self%contact)
-      do step = 1, longest*self%n**2
+      step = 0
+      do while (step < longest*max(count(events > 0), 2)**2)
+        step = step + 1
         next = 0
         earliest = limit - duration
         do k = 1, size(contact)

@@ -7,7 +7,7 @@
 !> such rounding errors (see `clusters`). The verdict depends on the state at a collision alone, and not on the search, the number
 !> of threads or the times at which the run pauses.
 module collapses
-  use kinds, only: int32, never, real64
+  use kinds, only: int32, int64, never, real64
   use box_geometry, only: wall_normal
   use box_sides, only: bounds
   use clusters, only: cluster_t, contact_t, most_disks
@@ -62,7 +62,7 @@ contains
     associate (known => sim%series(sim%tag([i, j])%id)%known_until, events => sim%tag([i, j])%collisions)
       if (all(events < known)) return
       if (is_resolved .or. any(events > known)) then
-        call judge(sim, i, j, t)
+        call judge(sim, i, j, t, is_resolved)
       else
         ! A series outlives its prediction because rounding errors now determine the gaps.
         sim%series(sim%tag([i, j])%id)%known_until = events + 1
@@ -144,11 +144,13 @@ contains
   end subroutine count_collision
 
   !> Determines whether the collisions of disks i and j, and of the disks around them, are a collapse. If the collisions end, they
-  !> are not examined again before the disks have had as many collisions as predicted.
-  subroutine judge(sim, i, j, t)
+  !> are not examined again before the disks have had as many collisions as predicted. If rounding errors determine the gaps, the
+  !> number of collisions until the next examination doubles each time.
+  subroutine judge(sim, i, j, t, is_resolved)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
+    logical, intent(in) :: is_resolved               !! as in `watch`
     type(cluster_t) :: cluster
     integer(int32) :: member(most_disks), k
     integer :: events(most_disks)
@@ -165,8 +167,9 @@ contains
     end if
     do k = 1, cluster%n
       associate (tag => sim%tag(member(k)))
-        associate (known_until => sim%series(tag%id)%known_until)
-          known_until = max(known_until, tag%collisions + events(k))
+        associate (series => sim%series(tag%id))
+          series%patience = merge(0_int64, 2*series%patience + 1, is_resolved)
+          series%known_until = max(series%known_until, tag%collisions + max(int(events(k), int64), series%patience))
         end associate
       end associate
     end do

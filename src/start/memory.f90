@@ -21,7 +21,7 @@ module memory
   real(real64), parameter :: record = 103, cell = 32
   !> Memory of the image indices, contact time and rotation of a disk (`extra`), and of an individual mass (`own_size`)
   real(real64), parameter :: extra = 40, own_size = 8
-  real(real64), parameter :: watched = 32                    !! memory for the series of simultaneous collisions of a disk
+  real(real64), parameter :: watched = 40                    !! memory for the series of simultaneous collisions of a disk
   real(real64), parameter :: sampled = 8.8_real64            !! memory for each value of a disk in a frame
   real(real64), parameter :: listed = 264                    !! neighbour list of a disk
   !> Memory per disk of the random numbers of the driving (`kicked`), of the test for free positions of recycled disks
