@@ -176,6 +176,7 @@ def repeated(browser):
 def test_the_mouse_grips_each_side_from_both_faces(opened):
     """The pointer has another shape within 12 pixels of a side, which it drags inwards."""
     names = ("left", "right", "bottom", "top")
+    cursor = "return filmOf(current()).document.getElementById('stage').style.cursor[0]"
     for shift, number in itertools.product((-12, 12), range(4)):
         axis, inwards = number // 2, (1, -1, -1, 1)[number]  # in window coordinates
         place = [0.4, 0.4]
@@ -186,8 +187,7 @@ def test_the_mouse_grips_each_side_from_both_faces(opened):
         end[axis] += 9 * inwards
         count = len(opened.run("return current().changes"))
         mouse(opened, start)
-        cursor = "filmOf(current()).document.getElementById('stage').style.cursor"
-        wait_for(lambda shape=f"{'en'[axis]}": opened.run(f"return {cursor}[0]") == shape)
+        wait_for(lambda shape="en"[axis]: opened.run(cursor) == shape)
         mouse(opened, "down", end)
         wait_for(lambda n=count: len(opened.run("return current().changes")) > n)
         mouse(opened, "up")
