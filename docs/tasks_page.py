@@ -157,7 +157,14 @@ def filled(page: str, numbers: Numbers) -> str:
         text = BLANK.sub(lambda blank: words(numbers[blank[1]]), template)
         items = [" ".join(item.split()) for item in re.split(r"\n(?=- )", text)]
         wrapped = [
-            textwrap.fill(item, 112, subsequent_indent=2 * " " * (item[0] == "-")) + "\n"
+            textwrap.fill(
+                item,
+                120,
+                subsequent_indent=2 * " " * (item[0] == "-"),
+                break_long_words=False,
+                break_on_hyphens=False,
+            )
+            + "\n"
             for item in items
         ]
         before, _, rest = page.partition(start)

@@ -87,7 +87,7 @@ def test_what_a_page_leads_to_and_names_is_there(page):
     assert [section for path, section in sections if section not in sections_of(path)] == []
     folders, endings = "post|runs|input|tests|src|docs", "py|sh|nml|f90|pf"
     named = re.findall(rf"\b((?:{folders})/(?:\w+/)*\w+\.(?:{endings})\b)", text)
-    new = re.findall(r"`(src/\S+)`, a new file|[Cc]reate a file `(\S+)`", text)
+    new = re.findall(r"`(src/\S+)`, a new file|[Cc]reate a\s+file\s+`(\S+)`", text)
     mine = {"runs/mine.nml", *(name for pair in new for name in pair)}
     missing = [name for name in named if not (ROOT / name).exists()]
     assert [name for name in missing if name not in mine and name == name.lower()] == []
