@@ -1,7 +1,7 @@
 // ---------- texts and numbers beside the picture ----------
 
 const short = value => (Math.abs(value) >= 1e5 || (value && Math.abs(value) < 1e-3)
-  ? value.toExponential(2) : String(+value.toPrecision(4))).replace('-', '−');
+  ? value.toExponential(2) : String(+value.toPrecision(4))).replaceAll('-', '−');
 
 const safe = text => text.replace(/[&<]/g, sign => `&#${sign.charCodeAt(0)};`);
 
