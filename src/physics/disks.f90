@@ -62,7 +62,8 @@ module disks
     integer(int32) :: disks = 0                 !! number of disks in the series that this disk represents
     integer(int64) :: collisions = 0            !! number of collisions in the series that this disk represents
     integer(int64) :: known_until = 0           !! number of events of this disk up to which no collapse is possible
-    integer(int64) :: patience = 0              !! smallest number of events until the disk is examined again, see `collapses: judge`
+    !> Smallest number of events until the disk is examined again, see `collapses: judge`
+    integer(int64) :: patience = 0
   end type series_t
 
   !> All data of one disk, combined in one type so that they can be copied together.

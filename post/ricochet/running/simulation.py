@@ -144,8 +144,9 @@ class Simulation(State):
 
         The output file that `save` writes contains the present state, and the samples of the
         initial state (after a change: of the present state).  It needs space for these data only;
-        the command checks the space for the rest of the run.  If variables have been changed with `change`, INPUT must be a file with the changed
-        values; `save` writes this file if the argument `input` is given.
+        the command checks the space for the rest of the run.  If variables have been changed with
+        `change`, INPUT must be a file with the changed values; `save` writes this file if the
+        argument `input` is given.
 
         Parameters
         ----------
