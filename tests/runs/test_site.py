@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+import wrap_pages
 from synthetic_run import ROOT
 
 KINDS = ("tutorials", "guides", "reference", "explanation")
@@ -124,3 +125,17 @@ def test_the_search_page_has_the_text_of_each_page(site, tmp_path):
     script = (tmp_path / "_static" / "excerpts.js").read_text()
     texts = json.loads(script.partition(" = ")[2].partition(";\nwindow.fetch")[0])
     assert texts == {"sub/a.html": 'A &lt; B "1" 2'}
+
+
+def test_the_lines_of_all_pages_have_one_width():
+    """Wrapping changes neither the words of a page nor a page that is wrapped."""
+    for page in wrap_pages.pages():
+        text = page.read_text()
+        assert wrap_pages.wrapped(text) == text, "python tests/support/wrap_pages.py does it"
+        code = "```text\n" + "word " * 40 + "\n```\n| " + "cell " * 40 + "|\n"
+        item = "- " + "word " * 20 + "- " + "word " * 20 + "`" + "code " * 9 + "`\n\n"
+        long = wrap_pages.wrapped(text + "\n" + item + code)
+        assert long.endswith(code) and long.split() == (text + item + code).split()
+        lines = long.removeprefix(text).removesuffix(code).split("\n")
+        assert not re.search(r"^\s*- ", "\n".join(lines[2:]), re.M)
+        assert "`" + "code " * 9 + "`" in long and max(map(len, lines)) <= 125
