@@ -48,7 +48,7 @@ c_flags = -Wall -Wextra -fPIC $(filter -O% -g -march=% -flto% -fsanitize% -fno-s
 wrapped := -Wl,--wrap=malloc,--wrap=realloc
 hints = $(if $(HINTS),$(wrapped))
 
-announce := . .ci/progress.sh; announce
+announce := . src/progress.sh; announce
 PYTHON := $(if $(wildcard .venv/bin/python),.venv/bin/python,python3)
 Q := $(if $(V),,@)
 
@@ -97,7 +97,7 @@ counted = $(objects) $(if $(call goals,ricochet),main program_heap) $(if $(call 
   $(filter %_without_hdf5.o,$(without_hdf5))) $(if $(call goals,unit_tests),$(test_objects) $(shared_objects))
 total := $(if $(V)$(wildcard $(BUILD)/kinds.o),,$(words $(counted)))
 $(shell : > $(BUILD)/progress)
-say = . .ci/progress.sh; count $(BUILD)/progress '$(total)'
+say = . src/progress.sh; count $(BUILD)/progress '$(total)'
 
 # Under another name first: a build that is killed leaves no half of a program that looks finished.
 define link
@@ -120,7 +120,7 @@ endif
 linked ?= $(objects)
 
 $(BUILD)/event_loop.o: $(hot_objects)
-	+$(Q)$(announce) 'optimise the event loop (10 s on two idle cores)' $(FC) $(filter-out -fopenmp,$(flags)) $(hot) $(merge) -o $@ $^
+	$(Q)$(announce) 'optimise the event loop (10 s on two idle cores)' $(FC) $(filter-out -fopenmp,$(flags)) $(hot) $(merge) -o $@ $^
 
 $(BUILD)/ricochet: $(BUILD)/main.o $(BUILD)/program_heap_c.o $(linked)
 	$(call link,$(LDFLAGS),$^)

@@ -9,7 +9,7 @@ runner=$1 program=$2 limit=${LIMIT:-300} hours=2
 export OMP_WAIT_POLICY=passive
 shift 2
 expected=$(cat "$@" | grep -ciE '^[[:space:]]*@test[[:space:]]*$')
-. "$(dirname "$0")/../../.ci/progress.sh"
+. "$(dirname "$0")/../../src/progress.sh"
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 run() { (ulimit -S -c 0 -t "$limit" && timeout "${hours}h" "$program" >"$log" 2>&1); }

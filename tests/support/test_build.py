@@ -345,8 +345,9 @@ def test_an_old_python_is_told_before_anything_is_installed(tmp_path):
     """Nobody is asked for a password in vain."""
     (tmp_path / ".ci").mkdir()
     (tmp_path / "bin").mkdir()
-    for file in ("set-up", "progress.sh"):
-        shutil.copy(ROOT / ".ci" / file, tmp_path / ".ci" / file)
+    (tmp_path / "src").mkdir()
+    for file in (".ci/set-up", "src/progress.sh"):
+        shutil.copy(ROOT / file, tmp_path / file)
     old = """case "$*" in --version) echo Python 3.10.12 ;; *) exit 1 ;; esac"""
     executable(tmp_path / "bin/python3", old, "sh")
     for name in ("apt-get", "sudo"):
@@ -367,7 +368,7 @@ def test_who_cannot_install_packages_is_told_which_are_missing(tmp_path, apt):
     (tmp_path / "bin").mkdir()
     for folder in (".ci", "src"):
         (tmp_path / folder).mkdir()
-    for file in (".ci/set-up", ".ci/progress.sh", "src/find_h5fc.sh"):
+    for file in (".ci/set-up", "src/progress.sh", "src/find_h5fc.sh"):
         shutil.copy(ROOT / file, tmp_path / file)
     for name in FEW_TOOLS.split():
         (tmp_path / "bin" / name).symlink_to(shutil.which(name))

@@ -1,4 +1,4 @@
-"""Tests of .ci/progress.sh, which shows the progress of long commands."""
+"""Tests of src/progress.sh, which shows the progress of long commands."""
 
 import subprocess
 
@@ -7,7 +7,7 @@ from synthetic_run import ROOT
 
 def shell(commands: str) -> subprocess.CompletedProcess:
     """Run shell commands that can use the functions of the script."""
-    text = f". {ROOT}/.ci/progress.sh\n{commands}"
+    text = f". {ROOT}/src/progress.sh\n{commands}"
     return subprocess.run(["sh", "-c", text], capture_output=True, text=True, check=False)
 
 
