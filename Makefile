@@ -59,7 +59,7 @@ modules := $(filter-out main library library_events library_files %_without_hdf5
 objects := $(modules:%=$(BUILD)/%.o) $(patsubst src/base/%.c,$(BUILD)/%_c.o,$(filter-out %/program_heap.c,$(wildcard src/base/*.c)))
 objects_in = $(patsubst %.f90,$(BUILD)/%.o,$(notdir $(wildcard $(1:%=src/%/*.f90))))
 # The modules of the event loop. Those of its folders that it calls seldom or never are compiled like the others.
-seldom := changes clusters stop_rules observables sample_values packing obstacle_cells time_stepped verlet_list recycling
+seldom := changes clusters collapses stop_rules observables sample_values packing obstacle_cells time_stepped verlet_list recycling
 hot_objects := $(filter-out $(seldom:%=$(BUILD)/%.o),$(call objects_in,dynamics parallel physics search geometry)) \
   $(patsubst %,$(BUILD)/%.o,random_stream sorting memory_hints memory_hints_c)
 cold_objects := $(call objects_in,. input variables output files)

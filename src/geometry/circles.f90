@@ -96,9 +96,14 @@ contains
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
     real(real64), intent(in), optional :: heading(2)
-    real(real64) :: direction(2)
+    real(real64) :: direction(2), inwards(2)        ! a variable, because gfortran passes a copy of an expression
 
-    direction = unit_vector(merge(-d, d, self%encloses), heading)
+    if (self%encloses) then
+      inwards = -d
+      direction = unit_vector(inwards, heading)
+    else
+      direction = unit_vector(d, heading)
+    end if
   end function normal
 
   !> Whether a disk whose centre is in a rectangle can touch the circle.

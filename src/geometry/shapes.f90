@@ -115,12 +115,13 @@ contains
     real(real64) :: e(2)
     real(real64), parameter :: shortest = sqrt(tiny(1.0_real64))   ! the squares of smaller components are not precise
 
-    e = [1.0_real64, 0.0_real64]
     if (magnitude(v) > shortest) then
       e = v/magnitude(v)
-    else if (present(otherwise)) then
-      if (magnitude(otherwise) > shortest) e = otherwise/magnitude(otherwise)
+      return
     end if
+    e = [1.0_real64, 0.0_real64]
+    if (.not. present(otherwise)) return
+    if (magnitude(otherwise) > shortest) e = otherwise/magnitude(otherwise)
   end function unit_vector
 
   !> Vector to the point x from the middle of the nearest periodic image of the obstacle. The distances of x from the outlines of

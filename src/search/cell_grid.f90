@@ -207,9 +207,8 @@ contains
     integer(int16), intent(in) :: cell(2)
     logical :: special
 
-    special = .not. self%patch%holds(cell)
-    if (.not. special) special = self%patch%at_seam(cell) .or. self%reach%has_any(cell) &
-      .or. (size(self%reach%big) > 0 .and. all(cell == 1)) .or. self%lists%used
+    special = .not. self%patch%holds(cell) .or. (size(self%reach%big) > 0 .and. all(cell == 1)) .or. self%lists%used
+    if (.not. special) special = self%patch%at_seam(cell) .or. self%reach%has_any(cell)
     call self%cells%mark(self%cells%number(cell), special)
   end subroutine mark
 
@@ -550,6 +549,7 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prediction_t), intent(inout) :: near
+    integer(int32) :: first                        ! first entry in the list of obstacles and big disks of the cell
 
     associate (i => near%disk, cell => sim%tag(near%disk)%cell)
       if (self%lists%used) then
@@ -558,7 +558,8 @@ contains
       else
         call self%faces%next(sim%box, sim%disk(i), cell, sim%now, self%faces%falling, near)
       end if
-      if (self%reach%has_any(cell)) call scan_reach(self%reach, cell, sim, self%images, known, near)
+      first = self%reach%first_in(cell)
+      if (first > 0) call scan_reach(self%reach, first, sim, self%images, known, near)
       if (self%lists%used) then
         if (is_plainly_listed(self, cell, i)) then
           call self%lists%copy_list(near)

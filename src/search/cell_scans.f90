@@ -74,9 +74,9 @@ contains
   end subroutine scan_disks
 
   !> Finds contacts of a small disk with the obstacles and big disks that reach into its cell.
-  subroutine scan_reach(reach, cell, sim, images, known, near)
+  subroutine scan_reach(reach, first, sim, images, known, near)
     type(object_lists_t), intent(in) :: reach
-    integer(int16), intent(in) :: cell(2)          !! cell of the small disk
+    integer(int32), intent(in) :: first            !! first entry in the list of the cell
     type(simulation_t), intent(in) :: sim
     type(images_t), intent(in) :: images
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
@@ -89,8 +89,8 @@ contains
 
     near%n = 0
     falling = iand(known, no_gravity) == 0
-    next = reach%first(cell(1), cell(2))
-    associate (disk => sim%disk(near%disk), tag => sim%tag(near%disk))
+    next = first
+    associate (disk => sim%disk(near%disk), last_partner => sim%tag(near%disk)%last_partner)
       do while (next > 0)
         entry = reach%entry(next)
         next = entry%next
@@ -98,7 +98,7 @@ contains
           number = entry%image
           shift = images%shift(number)
           if (.not. stays_clear(sim%box, disk, entry%code, shift, near%time, falling)) &
-            call find_image_contact(sim%box, disk, tag%last_partner, entry%code, shift, near%time, near%partner)
+            call find_image_contact(sim%box, disk, last_partner, entry%code, shift, near%time, near%partner)
         else
           if (near%n > 0 .and. (near%n == list_capacity .or. any(entry%image /= last))) call test_disks()
           last = entry%image

@@ -56,6 +56,7 @@ module object_lists
     procedure :: renew
     procedure :: renew_big
     procedure :: rims
+    procedure :: first_in
     procedure :: has_any
     procedure :: number_of
     procedure :: follow
@@ -159,14 +160,23 @@ contains
     end do
   end function rims
 
+  !> Index of the first entry in the list of a cell; 0 if neither an obstacle nor a big disk reaches into the cell.
+  pure function first_in(self, cell) result(e)
+    class(object_lists_t), intent(in) :: self
+    integer(int16), intent(in) :: cell(2)          !! column and row, counted from 1
+    integer(int32) :: e
+
+    e = 0
+    if (allocated(self%first)) e = self%first(cell(1), cell(2))
+  end function first_in
+
   !> Whether any obstacle or big disk reaches into a cell.
   pure function has_any(self, cell) result(yes)
     class(object_lists_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)          !! column and row, counted from 1
     logical :: yes
 
-    yes = allocated(self%first)
-    if (yes) yes = self%first(cell(1), cell(2)) > 0
+    yes = self%first_in(cell) > 0
   end function has_any
 
   !> Index of disk i among the big disks; 0 if disk i is not a big disk.
