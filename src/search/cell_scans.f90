@@ -1,7 +1,7 @@
 !> Finds contacts that the simple search of nine cells does not find: contacts with disks in the linked lists of crowded cells, with
 !> disks across a periodic side, with obstacles and big disks, and with given disks.
 module cell_scans
-  use kinds, only: int16, int32, int64, real64
+  use kinds, only: int32, int64, real64
   use box_geometry, only: find_image_contact, stays_clear
   use cell_contents, only: append, cell_capacity, cell_contents_t
   use cell_faces, only: patch_t
