@@ -77,6 +77,7 @@ if TYPE_CHECKING:  # imports for type checkers of the modules that `__getattr__`
     from .reading import bridges as bridges
     from .reading import contacts as contacts
     from .reading import files as files
+    from .reading import foreign as foreign
     from .reading import frames as frames
     from .reading import layout as layout
     from .reading import nature as nature
