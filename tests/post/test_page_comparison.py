@@ -196,6 +196,8 @@ def test_a_scan_beside_a_kept_run_is_seen_and_moves_nothing(opened):
     """The figure is in the form, in the visible part of the window, and covers no other element."""
     opened.press("c")
     moving(opened, 1)
+    begun = "return films()[1].document.getElementById('clock').textContent.startsWith('t = 0 ')"
+    wait_for(lambda: not opened.run(begun))  # the text of the first moment is longer
     places = """const parts = ['stage', 'controls', 'speeds', 'energy', 'pressure'];
         return films().flatMap(one => parts.map(id => one.document.getElementById(id)))
           .map(one => one.getBoundingClientRect().toJSON());"""
