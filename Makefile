@@ -112,7 +112,7 @@ ifneq ($(and $(usual),$(gnu)),)
 $(hot_objects): private of_part := $(hot)
 $(cold_objects): private of_part := $(cold)
 ifneq ($(MERGE),)
-linked := $(filter-out $(hot_objects),$(objects)) $(BUILD)/event_loop.o
+linked := $(BUILD)/event_loop.o $(filter-out $(hot_objects),$(objects)) # in this order: other files are compiled meanwhile
 else
 together := $(hot)
 endif
@@ -122,7 +122,7 @@ linked ?= $(objects)
 $(BUILD)/event_loop.o: $(hot_objects)
 	$(Q)$(announce) 'optimise the event loop (10 s on two idle cores)' $(FC) $(filter-out -fopenmp,$(flags)) $(hot) $(merge) -o $@ $^
 
-$(BUILD)/ricochet: $(BUILD)/main.o $(BUILD)/program_heap_c.o $(linked)
+$(BUILD)/ricochet: $(linked) $(BUILD)/main.o $(BUILD)/program_heap_c.o
 	$(call link,$(LDFLAGS),$^)
 
 # Nothing but the C interface is to be seen.
@@ -133,7 +133,7 @@ $(BUILD)/libricochet.so: $(filter-out $(BUILD)/main.o $(objects),$(without_hdf5)
 	$(call link,$(as_library),$(filter %.o,$^))
 
 $(BUILD)/libricochet_files.so: hdf5_libs = $(filter-out -I%,$(wordlist 2,99,$(shell $(H5FC) -shlib -show)))
-$(BUILD)/libricochet_files.so: $(BUILD)/library.o $(BUILD)/library_events.o $(BUILD)/library_files.o $(linked)
+$(BUILD)/libricochet_files.so: $(linked) $(BUILD)/library.o $(BUILD)/library_events.o $(BUILD)/library_files.o
 	$(call link,$(as_library),$^)
 
 $(BUILD)/ricochet.h: src/ricochet.h
