@@ -46,7 +46,8 @@ module test_systems
 
 contains
 
-  !> Returns the number of random cases that a test draws: `most` if the environment variable THOROUGH is set, otherwise half of them.
+  !> Returns the number of random cases that a test draws: `most` if the environment variable THOROUGH is set, otherwise half of
+  !> them.
   integer function cases(most)
     integer, intent(in) :: most
     integer :: length
