@@ -1,4 +1,4 @@
-"""Inelastic collapse: the report of the program against a calculation with 200 digits.
+"""Inelastic collapse: the report of the program against a calculation with 600 digits.
 
 The random systems are rows of two to eight disks, free, at a wall or nearly straight in the plane,
 with equal or unequal masses and with a common velocity.
@@ -19,6 +19,7 @@ RADIUS = 0.0625
 KINDS = ("row", "wall", "plane", "masses")
 #: Stable limit of the collapse of three disks in the plane (Zhou and Kadanoff 1996).
 PLANE_LIMIT = 0.0557
+NEVER = Decimal("Infinity")
 COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet", "--force"]
 
 
@@ -76,64 +77,70 @@ class System:
             text += f" velocity = {speed} mass = {float(self.mass[k])!r} /\n"
         return text
 
-    def collapses(self) -> bool:
-        """Return whether the collisions never end, by a calculation with 200 digits.
+    def collapses(self, factor: float = 1) -> bool:
+        """Return whether the collisions never end, by a calculation with 600 digits.
 
-        The relative velocities of a collapse have decreased by 150 powers of ten, or there have
-        been 2500 collisions; the longest finite series of the random systems are far shorter.
+        All coefficients of restitution are multiplied by the factor, up to 1. The relative
+        velocities of a collapse have decreased by 100 powers of ten, or there have been 2500
+        collisions. Gaps decrease faster than relative velocities: with 200 digits, rounding errors
+        determine the last gaps.
         """
         with localcontext() as context:
-            context.prec = 200
-            return self._goes_on([[Decimal(float(a)) for a in p] for p in self.x])
+            context.prec = 600
+            return self._goes_on(Decimal(factor))
 
-    def _goes_on(self, x: list) -> bool:
-        v = [[Decimal(float(a)) for a in p] for p in self.v]
-        m = [Decimal(float(a)) for a in self.mass]
-        xi, wall, sigma = Decimal(self.restitution), Decimal(self.wall), 2 * Decimal(RADIUS)
-        left, last, flat = Decimal(self.time), None, self.kind != "plane"
-        pairs = [(i, j) for j in range(self.disks) for i in range(j) if j == i + 1 or not flat]
+    def is_near_a_limit(self) -> bool:
+        """Return whether a change of all coefficients of restitution by 3 % changes the verdict."""
+        return len({self.collapses(factor) for factor in (0.97, 1, 1.03)}) > 1
+
+    def _goes_on(self, factor: Decimal) -> bool:
+        axes = range(2 if self.kind == "plane" else 1)
+        x, v = ([[Decimal(float(p[k])) for k in axes] for p in a] for a in (self.x, self.v))
+        inverse_mass = [1 / Decimal(float(m)) for m in self.mass]
+        sigma, left = 2 * Decimal(RADIUS), Decimal(self.time)
+        if self.kind == "wall":  # a disk of infinite mass
+            x.insert(0, [-sigma / 2])
+            v.insert(0, [Decimal(0)])
+            inverse_mass.insert(0, Decimal(0))
+        pairs = [(i, j) for j in range(len(x)) for i in range(j) if j == i + 1 or len(axes) > 1]
+        xi = [self.wall if self.kind == "wall" and i == 0 else self.restitution for i, _ in pairs]
+        xi = [min(factor * Decimal(a), Decimal(1)) for a in xi]
+        due = [contact_time(x[i], x[j], v[i], v[j], sigma) for i, j in pairs]
         for _ in range(2500):
-            first = None
-            for i, j in pairs:
-                if last == (i, j):
-                    continue
-                s = contact_time(x[i], x[j], v[i], v[j], sigma, flat)
-                if s is not None and (first is None or s < first[0]):
-                    first = (s, i, j)
-            if self.kind == "wall" and v[0][0] < 0 and last != (0, 0):
-                s = max((x[0][0] - sigma / 2) / -v[0][0], Decimal(0))
-                if first is None or s < first[0]:
-                    first = (s, 0, 0)
-            if first is None or first[0] > left:
+            s = min(due)
+            if s > left:
                 return False
-            s, i, j = first
             left -= s
+            due = [t - s for t in due]
             x = [[a + b * s for a, b in zip(p, u, strict=True)] for p, u in zip(x, v, strict=True)]
-            last = (i, j)
-            if i == j:
-                v[0][0] *= -wall
-                continue
+            pair = due.index(0)
+            i, j = pairs[pair]
             dx = [b - a for a, b in zip(x[i], x[j], strict=True)]
-            n = [a / (dx[0] ** 2 + dx[1] ** 2).sqrt() for a in dx]
+            distance = abs(dx[0]) if len(axes) == 1 else (dx[0] ** 2 + dx[1] ** 2).sqrt()
+            n = [a / distance for a in dx]
             g = sum((b - a) * c for a, b, c in zip(v[i], v[j], n, strict=True))
-            if abs(g) < Decimal("1e-150"):
+            if abs(g) < Decimal("1e-100"):
                 return True
-            for k in (0, 1):
-                impulse = (1 + xi) * g * n[k] / (m[i] + m[j])
-                v[i][k] += impulse * m[j]
-                v[j][k] -= impulse * m[i]
+            impulse = (1 + xi[pair]) * g / (inverse_mass[i] + inverse_mass[j])
+            for k in axes:
+                v[i][k] += impulse * n[k] * inverse_mass[i]
+                v[j][k] -= impulse * n[k] * inverse_mass[j]
+            for k, (a, b) in enumerate(pairs):
+                if {a, b} & {i, j}:
+                    due[k] = contact_time(x[a], x[b], v[a], v[b], sigma)
+            due[pair] = NEVER
         return True
 
 
-def contact_time(x, y, v, w, sigma, flat):
-    """Return the time until two disks touch, or None."""
+def contact_time(x, y, v, w, sigma):
+    """Return the time until two disks touch, or NEVER."""
     dx, dv = ([b - a for a, b in zip(p, q, strict=True)] for p, q in ((x, y), (v, w)))
-    if flat:
-        return max(dx[0] - sigma, Decimal(0)) / -dv[0] if dv[0] < 0 else None
+    if len(dx) == 1:
+        return max(dx[0] - sigma, Decimal(0)) / -dv[0] if dv[0] < 0 else NEVER
     b, a = dx[0] * dv[0] + dx[1] * dv[1], dv[0] ** 2 + dv[1] ** 2
     c = max(dx[0] ** 2 + dx[1] ** 2 - sigma**2, Decimal(0))
     if b >= 0 or b * b <= a * c:
-        return None
+        return NEVER
     return c / ((b * b - a * c).sqrt() - b)
 
 
@@ -153,13 +160,19 @@ def test_a_run_reports_exactly_the_collapses(ricochet, tmp_path, seed):
 
 @pytest.mark.check
 def test_many_runs_report_exactly_the_collapses(ricochet, tmp_path):
-    """500 systems, with other seeds if the variable SEED is set, as in `make check`."""
+    """540 systems, with other seeds if the variable SEED is set, as in `make check`.
+
+    Systems near a limit of collapse are excluded if the verdicts differ: there, rounding errors can
+    stop the time of a finite series.
+    """
     first = 1000 * (1 + int(os.environ.get("SEED", "0")) % 10**6)
-    for seed in range(first, first + 667):
+    excluded = 0
+    for seed in range(first, first + 540):
         system = System(seed)
-        if system.kind == "masses":  # rounding errors can stop the time of a finite series
-            continue
-        assert bool(reported(ricochet, tmp_path, system.text())) == system.collapses(), seed
+        if bool(reported(ricochet, tmp_path, system.text())) != system.collapses():
+            assert system.is_near_a_limit(), seed
+            excluded += 1
+    assert excluded <= 40
 
 
 @pytest.mark.parametrize("seed", range(100, 112))
