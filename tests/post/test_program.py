@@ -196,7 +196,7 @@ class Notebook(io.StringIO):
 def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch, number):
     """A notebook interrupts Python only; the program ends whenever Python ends."""
     (tmp_path / "gas.nml").write_text(TEXT)
-    endless = {"stop.collisions": 10**12, "output.event_log": False}  # a log would need too much room
+    endless = {"stop.collisions": 10**12, "output.event_log": False}  # a log is too big
     code = f"import ricochet; ricochet.run('gas.nml', {endless}, 'long.h5')"
     paths = environment(PYTHONPATH=ROOT / "post")
     python = subprocess.Popen(
