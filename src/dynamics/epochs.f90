@@ -238,14 +238,29 @@ contains
 
   !> Whether all disks under gravity are at rest at the end of an epoch. The test is made only there, so that it does not depend on
   !> the times at which the caller pauses. A state in which the epoch has ended in spite of this remains the last state of the run.
+  !> The whole epoch must consist of unresolved bounces: those of a ball whose bounces still converge are all executed.
   pure function has_come_to_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
     yes = sim%box%has_gravity() .and. sim%tally%events > sim%epoch_events &
       .and. (sim%tally%events >= most_events(sim) .or. sim%now >= sim%epoch_end)
+    if (yes) yes = sim%now - sim%epoch_begin <= real(sim%tally%events - sim%epoch_events, real64)*longest_bounce(sim)
     if (yes) yes = is_at_rest(sim)
   end function has_come_to_rest
+
+  !> Largest duration of a bounce that the coordinates of the disks do not resolve: the bounce is lower than an eighth of the spacing
+  !> of the largest coordinate [time].
+  pure function longest_bounce(sim) result(long)
+    type(simulation_t), intent(in) :: sim
+    real(real64) :: long
+    integer(int32) :: i
+
+    long = sim%negligible_time
+    do i = 1, sim%n_disks()
+      long = max(long, sqrt(spacing(maxval(abs(sim%disk(i)%x)))/magnitude(sim%box%gravity)))
+    end do
+  end function longest_bounce
 
   !> Whether all disks are at rest. A disk that bounces inelastically on a surface at rest makes infinitely many bounces in a finite
   !> time, because the durations of the bounces form a convergent series. With gravity a disk is considered at rest if its last
