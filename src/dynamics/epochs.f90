@@ -249,8 +249,8 @@ contains
     if (yes) yes = is_at_rest(sim)
   end function has_come_to_rest
 
-  !> Largest duration of a bounce that the coordinates of the disks do not resolve: the bounce is lower than an eighth of the spacing
-  !> of the largest coordinate [time].
+  !> Largest duration of a bounce that the coordinates of the disks do not resolve [time]. Such a bounce is lower than an eighth of
+  !> the spacing of the largest coordinate.
   pure function longest_bounce(sim) result(long)
     type(simulation_t), intent(in) :: sim
     real(real64) :: long

@@ -47,8 +47,7 @@ module cell_grid
     procedure :: read_ahead
     procedure, private :: find_event_of_big        ! as above
     procedure, private :: cross_with_care
-    procedure, private :: follow_big
-    procedure, private :: list
+    procedure, private :: follow_big, list
     procedure, private :: predict_both_with_care
   end type cell_grid_t
 
