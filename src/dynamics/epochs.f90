@@ -242,25 +242,29 @@ contains
   pure function has_come_to_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
+    real(real64) :: longest                        ! [time]
+    integer(int32) :: i
 
     yes = sim%box%has_gravity() .and. sim%tally%events > sim%epoch_events &
       .and. (sim%tally%events >= most_events(sim) .or. sim%now >= sim%epoch_end)
-    if (yes) yes = sim%now - sim%epoch_begin <= real(sim%tally%events - sim%epoch_events, real64)*longest_bounce(sim)
-    if (yes) yes = is_at_rest(sim)
+    if (yes) yes = is_at_rest(sim)                 ! first, because this ends at the first disk that moves
+    if (.not. yes) return
+    longest = 0
+    do i = 1, sim%n_disks()
+      longest = max(longest, unresolved_bounce(sim, i))
+    end do
+    yes = sim%now - sim%epoch_begin <= real(sim%tally%events - sim%epoch_events, real64)*longest
   end function has_come_to_rest
 
-  !> Largest duration of a bounce that the coordinates of the disks do not resolve [time]. Such a bounce is lower than an eighth of
-  !> the spacing of the largest coordinate.
-  pure function longest_bounce(sim) result(long)
+  !> Largest duration of a bounce of disk i that is negligible, or that its coordinates do not resolve [time]: the bounce is lower
+  !> than an eighth of their spacing.
+  pure function unresolved_bounce(sim, i) result(long)
     type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
     real(real64) :: long
-    integer(int32) :: i
 
-    long = sim%negligible_time
-    do i = 1, sim%n_disks()
-      long = max(long, sqrt(spacing(maxval(abs(sim%disk(i)%x)))/magnitude(sim%box%gravity)))
-    end do
-  end function longest_bounce
+    long = max(sim%negligible_time, sqrt(spacing(maxval(abs(sim%disk(i)%x)))/magnitude(sim%box%gravity)))
+  end function unresolved_bounce
 
   !> Whether all disks are at rest. A disk that bounces inelastically on a surface at rest makes infinitely many bounces in a finite
   !> time, because the durations of the bounces form a convergent series. With gravity a disk is considered at rest if its last
@@ -277,7 +281,7 @@ contains
     yes = .true.
     do i = 1, sim%n_disks()
       if (sim%box%has_gravity()) then
-        long = max(sim%negligible_time, sqrt(spacing(maxval(abs(sim%disk(i)%x)))/magnitude(sim%box%gravity)))
+        long = unresolved_bounce(sim, i)
         yes = sim%now - sim%disk(i)%clock <= long
       end if
       slow = magnitude(sim%box%gravity)*long
